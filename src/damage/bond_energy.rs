@@ -1,41 +1,44 @@
-//! A bond breaks for good when the work of its force states reaches w_c, by default only when it is pulled.
+//! Energy criterion: a bond breaks irreversibly when the work of its force states reaches w_c. By default
+//! only stretched bonds break.
 //!
-//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work that a linear bond
-//! has taken is w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. All bonds across a unit area take G0 together: in the plane
-//! 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
+//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work on a linear bond is w =
+//! ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η.
+//! Breaking all bonds across a unit area takes G0. In the plane G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ
+//! dz = (2/3) h δ³ w_c.
 
 use std::f64::consts::PI;
 
 use super::WorkRule;
 use crate::dimension::Dimension;
 
-/// How w_c follows from the fracture energy.
+/// Formula for w_c from the fracture energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Calibration {
-    /// So that all bonds across a unit area take it.
+    /// Breaking all bonds across a unit area takes the fracture energy.
     Energy,
-    /// So that opening a crack costs it: as [`Self::Energy`], over the share of the fracture energy that opening costs
-    /// then. It is measured before a run, by [`crate::solver::calibration::calibrated`].
+    /// Opening a crack takes the fracture energy: w_c of [`Self::Energy`] is divided by the separation energy
+    /// ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None` until then.
     Opening(Option<f64>),
-    /// As Willberg et al. 2022 print it in eq. 16 and 18: their w has no ½, and in the plane their w_c
-    /// is 3G0/(πδ³h). Their w is the work on η, so that it holds for small rotations only.
+    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). Their
+    /// w is the work on η, so it holds for small rotations only.
     Willberg2022,
-    /// As PeriLab computes it: a bond breaks at ¼ |(T_i − T_j)·η| = 3G0/(πδ³h) in the plane and 4G0/(πδ⁴) in space.
+    /// PeriLab's formula: a bond breaks at ¼ |(T_i − T_j)·η| = 3G0/(πδ³h) in the plane and 4G0/(πδ⁴) in
+    /// space.
     PeriLab,
-    /// As Peridigm computed it in the plane in 2021, before π was in: ¼ (|T_i·η| + |T_j·η|) = 3G0/(δ³h).
+    /// Peridigm's formula of 2021 for the plane, which lacks π: ¼ (|T_i·η| + |T_j·η|) = 3G0/(δ³h).
     Peridigm2021,
 }
 
-/// The law with its constants.
+/// The constants of the criterion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BondEnergy {
-    /// w_c, J/m⁶.
+    /// Critical work w_c, J/m⁶.
     pub critical: f64,
-    /// α.
+    /// α: effect of the smallest stretch of a point on its threshold.
     pub alpha: f64,
-    /// The critical stretch s0 that belongs to the same fracture energy, which α acts on.
+    /// Critical stretch s0 of the same fracture energy, to which α refers.
     pub stretch: f64,
-    /// How the work of bonds is looked at.
+    /// Rule for the work of bonds.
     pub rule: WorkRule,
 }
 
@@ -49,7 +52,7 @@ impl Calibration {
         }
     }
 
-    /// The share of the fracture energy that a unit area costs.
+    /// Return the energy per area that breaking all bonds takes, divided by the fracture energy.
     pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         match (self, dimension) {
@@ -65,8 +68,8 @@ impl Calibration {
 }
 
 impl BondEnergy {
-    /// w_c (J/m⁶) from what a unit area costs, G0 (J/m²), and the horizon δ (m): 3-D 4G0/(πδ⁴), in the
-    /// plane 3G0/(2δ³h), 1-D 2G0/(δ²A).
+    /// Return w_c (J/m⁶) from the energy per area G0 (J/m²) and the horizon δ (m). It is 4G0/(πδ⁴) in 3-D,
+    /// 3G0/(2δ³h) in the plane, and 2G0/(δ²A) in 1-D.
     pub fn from_energy(dimension: Dimension, energy: f64, horizon: f64) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         energy
@@ -79,8 +82,8 @@ impl BondEnergy {
             }
     }
 
-    /// The threshold (J/m⁶) of a point with this strength f, 1 without scatter, whose intact bonds have this smallest
-    /// stretch: that of a stretch f s0 − α s_min in place of s0.
+    /// Return the threshold (J/m⁶) of a point with strength f and the smallest stretch s_min of its intact
+    /// bonds. It is w_c ((f s0 − α s_min)/s0)²; without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         let share = (strength - self.alpha * smallest / self.stretch).max(0.0);
@@ -94,7 +97,7 @@ mod tests {
     use crate::damage::{Sense, WorkMeasure};
     use crate::dimension::Constraint;
 
-    /// All bonds across a unit area, by the midpoint rule, over the fracture energy.
+    /// Energy of all bonds across a unit area by the midpoint rule, divided by the fracture energy.
     fn taken(dimension: Dimension) -> f64 {
         let (horizon, energy, cells) = (3e-3, 135.0, 1500_u32);
         let critical = BondEnergy::from_energy(dimension, energy, horizon);
@@ -106,7 +109,7 @@ mod tests {
             for j in i + 1..cells {
                 let r = middle(j);
                 sum += match dimension {
-                    // The cap of directions that cross.
+                    // Solid angle of the directions that cross the plane, times r².
                     Dimension::Space => 2.0 * PI * (1.0 - z / r) * r * r,
                     Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
                         2.0 * libm::acos(z / r) * r * thickness
@@ -136,7 +139,7 @@ mod tests {
 
     #[test]
     fn as_printed_bonds_are_weaker() {
-        // Eq. 18, 3G0/(πδ³h), of a work without the ½ of eq. 16.
+        // Eq. 18, 3G0/(πδ³h), belongs to a work without the ½ of eq. 16.
         let (energy, horizon, thickness) = (135.0, 3e-3, 0.01);
         let printed = 3.0 * energy / (PI * horizon * horizon * horizon * thickness);
         let plane = Dimension::PlaneStress { thickness };

@@ -1,50 +1,53 @@
-//! When a bond breaks, decided by the same operations from both ends: stretches are compared by x of
-//! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states.
+//! Criteria that break bonds. Both ends of a bond decide with the same operations. Stretches are compared by
+//! x of [`crate::material::bond`], which needs no root; energies by the work of both force states.
 
 use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, Law};
 
-/// When the bonds between two blocks break.
+/// Criterion for the bonds between two blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Criterion {
-    /// Never.
+    /// Bonds never break.
     Never,
-    /// At this stretch.
+    /// Bonds break at this stretch.
     Stretch(f64),
-    /// At the smaller of the threshold stretches of the two points; the critical stretches of their
-    /// blocks are the part of it that a law may scale, 0 where a block has none.
+    /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
+    /// of both blocks, the part of the thresholds that a law may scale; 0 for a block without critical
+    /// stretch.
     Thresholds([f64; 2]),
-    /// As [`Self::Stretch`], between points whose critical stretches belong to different horizons; ∞ where a block has none.
+    /// Same as [`Self::Stretch`], for critical stretches that belong to different horizons; ∞ for a block
+    /// without critical stretch.
     StretchBetween([f64; 2], StretchConversion),
-    /// As [`Self::Thresholds`], between points whose critical stretches belong to different horizons.
+    /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion),
-    /// When the work of the acting force states reaches the sum of what each of them takes, J/m⁶.
+    /// Bonds break when the work of the acting force states reaches the sum of their critical works, J/m⁶.
     Work([f64; 2], WorkRule),
-    /// As [`Self::Work`], from the work thresholds of the two points.
+    /// Same as [`Self::Work`], with the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule),
 }
 
-/// Factors that convert the work threshold of a point to the horizon of an end of the bond: entry `[e][k]` takes that of
-/// point k to end e; all are 1 between equal horizons.
+/// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k
+/// to end e; all are 1 if both horizons are equal.
 pub type HorizonRatios = [[f64; 2]; 2];
 
-/// Critical stretch of a bond between points whose own critical stretches belong to different horizons.
+/// Critical stretch of a bond between points whose critical stretches belong to different horizons.
 ///
-/// An end e of the bond takes ½ k_e s² |ξ| of its energy, with the stiffness k_e of its point, if it acts there: if the bond
-/// is within the horizon of e. A fracture energy lets it take as much as at m_e = min_k t_k √(δ_k/δ_e), with the critical
-/// stretch t_k of point k and its horizon δ_k. The bond breaks where its acting ends have taken theirs together:
-/// s² = Σ k_e m_e²/Σ k_e.
+/// An end e acts on the bond if the bond is within the horizon of e. Its energy is then ½ k_e s² |ξ|, with
+/// the stiffness k_e.
+/// By the fracture energy, end e alone would break the bond at m_e = min_k t_k √(δ_k/δ_e), with the critical
+/// stretch t_k and the horizon δ_k of point k.
+/// The bond breaks when the acting ends together have the energy of these stretches: s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is √(δ_k/δ_e).
     pub ratios: HorizonRatios,
-    /// k_e, in any unit.
+    /// Stiffnesses k_e, in any unit.
     pub stiffness: [f64; 2],
 }
 
 impl StretchConversion {
-    /// The critical stretch of each bond, from those of points i and j.
+    /// Return the critical stretch of each bond, from those of points i and j.
     #[inline(always)]
     fn convert<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Lanes {
         let [[ii, ij], [ji, jj]] = self.ratios;
@@ -55,7 +58,7 @@ impl StretchConversion {
         ((takes_i * takes_i * k_i + takes_j * takes_j * k_j) / (k_i + k_j)).sqrt()
     }
 
-    /// A stretch below which none of the bonds breaks.
+    /// Return a lower bound on the critical stretch of all bonds.
     #[inline(always)]
     fn smallest(self, [i, j]: [f64; 2]) -> f64 {
         let of_end = |[from_i, from_j]: [f64; 2]| (i * from_i).min(j * from_j);
@@ -63,60 +66,61 @@ impl StretchConversion {
     }
 }
 
-/// How the work of bonds is looked at.
+/// Rule for the work of bonds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
-    /// Which bonds break.
+    /// Bonds that can break.
     pub sense: Sense,
-    /// c from 0 to 1: thresholds are multiplied by 1 + c (f − 1) with the [truncation factor](Law::truncation_factor) f.
+    /// c from 0 to 1: thresholds are multiplied by 1 + c (f − 1), with the
+    /// [truncation factor](Law::truncation_factor) f.
     pub family_correction: f64,
-    /// Which relative displacement the force states work on.
+    /// Relative displacement on which the force states do work.
     pub measure: WorkMeasure,
 }
 
-/// The relative displacement that the force state of a point works on. Forces along the bond always work on its
-/// extension.
+/// Relative displacement on which the force state of a point does work. Forces along the bond always work on
+/// its extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkMeasure {
-    /// Y − R ξ with the rotation R of the point's family: rigid rotation does no work.
+    /// Y − R ξ with the rotation R of the point's family; rigid rotation does no work.
     Objective,
     /// η = Y − ξ, for small rotations (Willberg et al. 2022, eq. 16).
     Displacement,
 }
 
-/// Which bonds break by their work.
+/// Bonds that the energy criterion can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
-    /// Those that are longer than in the undeformed body.
+    /// Only bonds that are longer than in the undeformed body.
     Pulled,
-    /// Pressed ones as well.
+    /// Compressed bonds as well.
     Either,
 }
 
-/// The own and the far ends of eight bonds: their laws and what they know.
+/// Data of both ends of eight bonds.
 #[derive(Clone, Copy)]
 pub struct Ends<'a, L, P> {
-    /// The laws.
+    /// Laws of points i and j.
     pub laws: &'a [L; 2],
-    /// The numbers of the points.
+    /// Numbers of the points.
     pub points: [&'a P; 2],
-    /// What criteria alone read of them.
+    /// Data of the points that only criteria read.
     pub limits: [&'a Limits; 2],
-    /// Influence and volume share of the bonds.
+    /// Influence times volume correction of the bonds.
     pub weights: Weights,
 }
 
-/// What criteria read of eight points, where they read it.
+/// Data of eight points that criteria read.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// The stretches or works (J/m⁶) at which their bonds break.
+    /// Stretches or works (J/m⁶) at which the bonds of the points break.
     pub thresholds: Lanes,
-    /// Their [`Law::truncation_factor`].
+    /// [`Law::truncation_factor`] of the points.
     pub truncation_factors: Lanes,
 }
 
 impl Limits {
-    /// Where no criterion reads them.
+    /// Placeholder for criteria that read no limits.
     #[inline(always)]
     pub fn unread() -> Self {
         Self {
@@ -127,7 +131,7 @@ impl Limits {
 }
 
 impl Criterion {
-    /// Whether it depends on the thresholds of the ends.
+    /// Whether the criterion reads the thresholds of both points.
     #[inline(always)]
     pub fn reads_thresholds(self) -> bool {
         matches!(
@@ -136,7 +140,7 @@ impl Criterion {
         )
     }
 
-    /// It reads the truncation factors of the points.
+    /// Whether the criterion reads the truncation factors of the points.
     #[inline(always)]
     pub fn reads_truncation_factors(self) -> bool {
         match self {
@@ -145,7 +149,7 @@ impl Criterion {
         }
     }
 
-    /// Whether it depends on the rotations of the ends.
+    /// Whether the criterion reads the rotations of both families.
     #[inline(always)]
     pub fn reads_rotations(self) -> bool {
         match self {
@@ -156,19 +160,20 @@ impl Criterion {
         }
     }
 
-    /// Whether it asks for the work of the force states.
+    /// Whether the criterion reads the work of the force states.
     #[inline(always)]
     pub fn reads_work(self) -> bool {
         matches!(self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] from which bonds count as beyond the series. Below it none breaks by its stretch.
+    /// The |x| of [`crate::material::bond`] above which bonds leave the series. Bonds below this limit do not
+    /// break by their stretch.
     #[inline(always)]
     pub fn limit(self) -> f64 {
         match self {
-            // What equals the limit is not beyond it.
+            // A bond at exactly the limit is not beyond the series, but must break.
             Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
-            // The bound is rounded otherwise than the threshold of a bond.
+            // The round-off of this bound differs from that of a bond's threshold.
             Self::StretchBetween(critical, conversion) => {
                 let smallest = conversion.smallest(critical) * (1.0 - 1e-12);
                 NEAR.min(relative_square_extension_of(smallest))
@@ -177,7 +182,7 @@ impl Criterion {
         }
     }
 
-    /// All bonds that break are beyond the series; `scaled` for laws that scale thresholds.
+    /// Whether all bonds that break are beyond the series; `scaled` for laws that scale thresholds.
     #[inline(always)]
     pub fn marks_all(self, scaled: bool) -> bool {
         match self {
@@ -187,7 +192,7 @@ impl Criterion {
         }
     }
 
-    /// A bit for each bond that breaks; `work` is in J/m⁶, and read only if it is asked for.
+    /// Return one bit per bond that breaks; `work` (J/m⁶) is read only if [`Self::reads_work`].
     #[inline(always)]
     pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -198,7 +203,7 @@ impl Criterion {
     ) -> u8 {
         match self {
             Self::Never => 0,
-            // A bond that breaks is beyond the series.
+            // Bonds that break are beyond the series.
             Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(critical) if !L::SCALED => simd.at_least(
                 bond.relative_square_extension,
@@ -224,7 +229,7 @@ impl Criterion {
         }
     }
 
-    /// The stretch or work at which each bond breaks.
+    /// Return the stretch or work at which each bond breaks.
     #[inline(always)]
     fn threshold<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -272,8 +277,8 @@ impl Criterion {
         }
     }
 
-    /// The share of the energy of each broken bond that it held above its criterion, because it was
-    /// seen late: 1 − (s_c/s)² or 1 − w_c/w. The bond must know its stretch.
+    /// Fraction of the energy of each broken bond that exceeds its criterion, because breaking is checked
+    /// once per step: 1 − (s_c/s)² or 1 − w_c/w. The stretch of the bond must be set.
     #[inline(always)]
     pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -294,8 +299,8 @@ impl Criterion {
 }
 
 impl WorkRule {
-    /// That of bonds between points with this and another one: a pressed bond breaks where both say so, the smaller
-    /// correction counts, and work is objective where either is.
+    /// Combine the rules of two blocks for the bonds between them. Compressed bonds break if both rules say
+    /// so. The smaller correction holds. Work is objective if either rule says so.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             sense: if self.sense == Sense::Either {
@@ -317,8 +322,9 @@ impl WorkRule {
         self.family_correction > 0.0
     }
 
-    /// What the acting force states of bonds take together, by what each takes in a whole family. Written out: array
-    /// methods are not always inlined, and the compiler would keep all of a bond in memory for them.
+    /// Return the critical work of bonds from the critical works of both ends in untruncated families; only
+    /// acting ends count. Written out: array methods are not always inlined, and then all data of a bond
+    /// would stay in memory.
     #[inline(always)]
     fn sum_of_acting<S: Simd, L, P>(
         self,
@@ -332,7 +338,7 @@ impl WorkRule {
         takes_i + takes_j
     }
 
-    /// What the force state of an end takes, by what it takes in a whole family.
+    /// Return the critical work of an end from that in an untruncated family.
     #[inline(always)]
     fn corrected(self, takes: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {

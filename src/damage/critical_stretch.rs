@@ -1,8 +1,9 @@
-//! A bond breaks for good when its stretch reaches s0 − α s_min.
+//! Stretch criterion: a bond breaks irreversibly when its stretch reaches s0 − α s_min.
 //!
-//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s_min is the smallest stretch among the
-//! intact bonds of a point now; a bond takes the smaller of its ends' thresholds, so that both ends
-//! agree. α = 0 is the plain critical stretch of Dipasquale et al. 2014, eq. 6. Bonds are compared with it in
+//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s_min is the smallest stretch of the intact bonds
+//! of a point.
+//! The smaller threshold of points i and j holds for a bond, so that both ends agree.
+//! α = 0 is the plain critical stretch of Dipasquale et al. 2014, eq. 6. The comparison is in
 //! [`Criterion::breaking`](crate::damage::Criterion::breaking).
 
 use std::f64::consts::PI;
@@ -13,22 +14,26 @@ use crate::material::{Influence, Ordinary};
 
 use super::pull_apart::pull_apart;
 
-/// The law with its constants.
+/// The constants of the criterion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CriticalStretch {
-    /// s0.
+    /// Critical stretch s0.
     pub critical: f64,
-    /// α.
+    /// α: effect of the smallest stretch of a point on its threshold.
     pub alpha: f64,
 }
 
 impl CriticalStretch {
-    /// s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio that a
-    /// bond-based law has.
+    /// Return s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio of
+    /// bond-based laws.
     ///
-    /// 3-D: √(5G0/(9Kδ)). Plane stress: √(4πG0/(9Eδ)), Dipasquale et al. eq. 5. Plane strain:
-    /// √(5πG0/(12Eδ)). 1-D, from G0 = A ∫₀^δ ∫_z^δ ½ c s0² r dr dz = c A s0² δ³/6: √(3G0/(Eδ)) under uniaxial stress,
-    /// √(5G0/(2Eδ)) under uniaxial strain.
+    /// | dimension | s0 | source |
+    /// |---|---|---|
+    /// | 3-D | √(5G0/(9Kδ)) | |
+    /// | plane stress | √(4πG0/(9Eδ)) | Dipasquale et al., eq. 5 |
+    /// | plane strain | √(5πG0/(12Eδ)) | |
+    /// | 1-D, uniaxial stress | √(3G0/(Eδ)) | G0 = A ∫₀^δ ∫_z^δ ½ c s0² r dr dz = c A s0² δ³/6 |
+    /// | 1-D, uniaxial strain | √(5G0/(2Eδ)) | same |
     pub fn from_energy(dimension: Dimension, elastic: Isotropic, energy: f64, horizon: f64) -> f64 {
         let factor = match dimension {
             Dimension::Space => 5.0 / (9.0 * elastic.bulk_modulus()),
@@ -42,8 +47,8 @@ impl CriticalStretch {
         (factor * energy / horizon).sqrt()
     }
 
-    /// s0 of an ordinary state-based law, from the fracture energy G0 (J/m²) and the horizon δ (m): the
-    /// stretch at which pulling a body apart costs G0.
+    /// Return s0 of an ordinary state-based law from the fracture energy G0 (J/m²) and the horizon δ (m).
+    /// Pulling a body apart at this stretch takes G0 per area.
     pub fn from_energy_ordinary(
         law: &Ordinary,
         influence: Influence,
@@ -56,8 +61,8 @@ impl CriticalStretch {
         (energy / (cost * horizon)).sqrt()
     }
 
-    /// The fracture energy G0 = K_Ic²/E′ (J/m²) of a fracture toughness (Pa·√m), where E′ is E in
-    /// plane stress and uniaxial stress, and E/(1−ν²) otherwise (Irwin).
+    /// Return the fracture energy G0 = K_Ic²/E′ (J/m²) of a fracture toughness (Pa·√m) (Irwin). E′ is E in
+    /// plane stress and uniaxial stress, and E/(1−ν²) otherwise.
     pub fn energy_from_toughness(dimension: Dimension, elastic: Isotropic, toughness: f64) -> f64 {
         let effective = match dimension {
             Dimension::PlaneStress { .. }
@@ -70,16 +75,19 @@ impl CriticalStretch {
         toughness * toughness / effective
     }
 
-    /// The critical stretch of bonds between two bodies that begin to open at a stress σ (Pa) normal to their interface: the
-    /// mean of the strains σ/E′ of both bodies in tension along the normal, which is the stretch of a bond along it that
-    /// lies in both by halves. E′ is E in 3-D, plane stress and uniaxial stress, E/(1−ν²) in plane strain and
-    /// E(1−ν)/((1+ν)(1−2ν)) under uniaxial strain.
+    /// Return the critical stretch of bonds between two bodies whose interface opens at a normal stress σ
+    /// (Pa).
+    ///
+    /// It is the mean of the strains σ/E′ of both bodies in tension along the normal. A bond along the normal
+    /// has this stretch if half of it lies in each body.
+    /// E′ is E in 3-D, plane stress and uniaxial stress, E/(1−ν²) in plane strain, and E(1−ν)/((1+ν)(1−2ν))
+    /// under uniaxial strain.
     pub fn from_strength(dimension: Dimension, bodies: [Isotropic; 2], strength: f64) -> f64 {
         let [a, b] = bodies.map(|elastic| strength / Self::tensile_modulus(dimension, elastic));
         0.5 * (a + b)
     }
 
-    /// Stress over strain in tension along one direction, without load across it, Pa.
+    /// Return the ratio of stress to strain in tension along one direction, without transverse load, Pa.
     pub fn tensile_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
         let (modulus, nu) = (elastic.youngs_modulus, elastic.poisson_ratio);
         match dimension {
@@ -97,8 +105,8 @@ impl CriticalStretch {
         }
     }
 
-    /// The threshold of a point with this strength, 1 without scatter, whose intact bonds have this smallest stretch:
-    /// s0 times the strength takes the place of s0.
+    /// Return the threshold of a point with strength f and the smallest stretch s_min of its intact bonds: f
+    /// s0 − α s_min. Without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         strength * self.critical - self.alpha * smallest
@@ -111,7 +119,7 @@ mod tests {
 
     #[test]
     fn toughness_and_energy_agree_in_three_dimensions() {
-        // Diehl & Schweitzer's form: s0 = (5√2/12) K_Ic / (K √δ).
+        // Diehl & Schweitzer's formula: s0 = (5√2/12) K_Ic / (K √δ).
         let alon = Isotropic {
             youngs_modulus: 1.5 * 210e9,
             poisson_ratio: 0.25,

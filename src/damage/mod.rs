@@ -1,4 +1,4 @@
-//! Damage laws, one a file: when a bond breaks.
+//! Damage laws, one per file: criteria that break bonds.
 
 mod bond_energy;
 mod criterion;
@@ -14,14 +14,14 @@ pub use critical_stretch::CriticalStretch;
 /// The damage law of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DamageLaw {
-    /// By the stretch of bonds.
+    /// Bonds break by their stretch.
     CriticalStretch(CriticalStretch),
-    /// By the work that bonds have taken.
+    /// Bonds break by the work of their force states.
     BondEnergy(BondEnergy),
 }
 
 impl DamageLaw {
-    /// The stretch or work (J/m⁶) at which bonds of the undeformed body break.
+    /// Return the stretch or work (J/m⁶) at which bonds of the undeformed body break.
     pub fn critical(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.critical,
@@ -29,7 +29,7 @@ impl DamageLaw {
         }
     }
 
-    /// α: how much the smallest stretch of a point moves its threshold.
+    /// α: effect of the smallest stretch of a point on its threshold.
     pub fn alpha(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.alpha,
@@ -37,7 +37,7 @@ impl DamageLaw {
         }
     }
 
-    /// The share of [`WorkRule::family_correction`].
+    /// The factor [`WorkRule::family_correction`]; 0 for the stretch criterion.
     pub fn family_correction(&self) -> f64 {
         match self {
             Self::CriticalStretch(_) => 0.0,
@@ -45,7 +45,7 @@ impl DamageLaw {
         }
     }
 
-    /// Whether bonds break by the work of their force states on more than the rotation of their points' families.
+    /// Whether bonds break by work without the part of rigid rotation ([`WorkMeasure::Objective`]).
     pub fn is_objective_work(&self) -> bool {
         match self {
             Self::CriticalStretch(_) => false,
@@ -53,7 +53,8 @@ impl DamageLaw {
         }
     }
 
-    /// The threshold of a point with this strength, 1 without scatter, whose intact bonds have this smallest stretch.
+    /// Return the threshold of a point with this strength (1 without scatter) and this smallest stretch of
+    /// its intact bonds.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         match self {

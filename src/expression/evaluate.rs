@@ -1,34 +1,33 @@
-//! The postfix code of an expression, its folding of constants, and the arithmetic of its
-//! operations.
+//! Postfix code of an expression: constant folding and evaluation.
 
 use std::sync::Arc;
 
 use super::{Table, Variable};
 
-/// Largest magnitude of an integer exponent that is raised by multiplication.
+/// Largest absolute integer exponent for which a power is computed by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
 
-/// Stack size that is enough for nearly all expressions; clearing it is cheap.
+/// Stack size that is enough for nearly all expressions; zeroing it is cheap.
 const SHALLOW_STACK: usize = 16;
 
-/// Stack that the most deeply nested expression fits in: while the parser is inside one level of
-/// nesting, that level has left at most two operands waiting (the first two arguments of three).
+/// Stack size for the most deeply nested expression. A level of nesting holds at most two pending operands,
+/// the first two of three arguments.
 const DEEP_STACK: usize = 2 * super::parse::DEEPEST_NESTING + 1;
 
 /// One step of postfix code.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Instruction {
-    /// Pushes a value.
+    /// Push a value.
     Constant(f64),
-    /// Pushes the value of a variable.
+    /// Push the value of a variable.
     Variable(Variable),
-    /// Pushes the value of the table with this number.
+    /// Push the value of the table with this index.
     Table(usize),
-    /// Replaces the topmost value.
+    /// Replace the topmost value by the result.
     Unary(Unary),
-    /// Replaces the two topmost values by one.
+    /// Replace the two topmost values by the result.
     Binary(Binary),
-    /// Replaces the three topmost values by one.
+    /// Replace the three topmost values by the result.
     Ternary(Ternary),
 }
 
@@ -39,7 +38,7 @@ pub(super) enum Unary {
     Negate,
     /// `!a`
     Not,
-    /// `a^n` with a small integer `n` known when the expression was parsed.
+    /// `a^n` with a small integer `n` that is known at parse time.
     IntegerPower(i32),
     /// `sin(a)`
     Sine,
@@ -130,7 +129,7 @@ pub(super) enum Ternary {
 }
 
 impl Unary {
-    /// The operation's value.
+    /// Compute the result of the operation.
     pub(super) fn apply(self, value: f64) -> f64 {
         match self {
             Self::Negate => -value,
@@ -152,7 +151,7 @@ impl Unary {
             Self::Absolute => value.abs(),
             Self::Floor => value.floor(),
             Self::Ceiling => value.ceil(),
-            // Unlike `signum`, zero has sign zero.
+            // Unlike `signum`, the sign of zero is zero.
             Self::Sign if value > 0.0 => 1.0,
             Self::Sign if value < 0.0 => -1.0,
             Self::Sign => value,
@@ -163,7 +162,7 @@ impl Unary {
 }
 
 impl Binary {
-    /// The operation's value.
+    /// Compute the result of the operation.
     pub(super) fn apply(self, left: f64, right: f64) -> f64 {
         match self {
             Self::Add => left + right,
@@ -191,7 +190,7 @@ impl Binary {
 }
 
 impl Ternary {
-    /// The operation's value.
+    /// Compute the result of the operation.
     pub(super) fn apply(self, first: f64, second: f64, third: f64) -> f64 {
         match self {
             Self::Choose if first != 0.0 => second,
@@ -204,13 +203,13 @@ impl Ternary {
     }
 }
 
-/// 1 for true, 0 for false.
+/// Return 1 for true, 0 for false.
 fn truth(condition: bool) -> f64 {
     f64::from(u8::from(condition))
 }
 
-/// The lesser value, or NaN if either is; `f64::min` would hide the NaN and leaves the sign of zero
-/// open.
+/// Return the smaller value, or NaN if either is NaN. `f64::min` would ignore NaN, and does not specify the
+/// sign of zero.
 fn minimum(left: f64, right: f64) -> f64 {
     if left < right || left.is_nan() {
         left
@@ -219,7 +218,7 @@ fn minimum(left: f64, right: f64) -> f64 {
     }
 }
 
-/// The greater value, or NaN if either is.
+/// Return the larger value, or NaN if either is NaN.
 fn maximum(left: f64, right: f64) -> f64 {
     if left > right || left.is_nan() {
         left
@@ -228,16 +227,16 @@ fn maximum(left: f64, right: f64) -> f64 {
     }
 }
 
-/// The exponent as an integer, if it is one that is raised by multiplication.
+/// Return the exponent as an integer, if the power is computed by multiplication.
 fn small_integer(exponent: f64) -> Option<i32> {
     (exponent.abs() <= LARGEST_INTEGER_EXPONENT && exponent.fract() == 0.0)
         .then_some(exponent as i32)
 }
 
-/// Appends an instruction, or replaces it and its operands by their value if they are constants.
+/// Append an instruction. If all its operands are constants, replace the operands by the result.
 ///
-/// A constant at the end of postfix code is a whole operand, so looking at the last instructions
-/// is enough.
+/// A constant at the end of postfix code is always a complete operand. It is therefore enough to check the
+/// last instructions.
 pub(super) fn append(code: &mut Vec<Instruction>, instruction: Instruction) {
     use Instruction::{Constant, Unary as One};
     let (operands, replacement) = match (instruction, code.as_slice()) {
@@ -261,7 +260,7 @@ pub(super) fn append(code: &mut Vec<Instruction>, instruction: Instruction) {
     code.push(replacement);
 }
 
-/// Largest stack size of the code, in values.
+/// Return the largest stack size that the code needs, in values.
 pub(super) fn stack_size(code: &[Instruction]) -> usize {
     let mut size = 0;
     let mut largest = 0;
@@ -279,7 +278,7 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Whether the form of the code guarantees a value of 0 or 1, as for a comparison.
+/// Whether the code always returns 0 or 1, as a comparison does.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);
@@ -322,8 +321,8 @@ pub(super) fn is_truth(code: &[Instruction]) -> bool {
     truths == [true]
 }
 
-/// The code's value with the variables x, y, z, t, where `stack_size` is what
-/// the function of that name says.
+/// Evaluate the code with the variables x, y, z, t. `stack_size` is the result of the function
+/// [`stack_size`].
 pub(super) fn evaluate(
     code: &[Instruction],
     tables: &[Arc<Table>],
@@ -337,7 +336,7 @@ pub(super) fn evaluate(
     }
 }
 
-/// Runs the code on a stack of a fixed size.
+/// Run the code on a stack of a fixed size.
 fn run<const SIZE: usize>(code: &[Instruction], tables: &[Arc<Table>], variables: [f64; 4]) -> f64 {
     let mut stack = [0.0; SIZE];
     let mut size = 0;

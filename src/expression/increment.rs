@@ -1,16 +1,17 @@
-//! How an expression changes in time, without the rounding of its values.
+//! Change of an expression's value over a time interval, without cancellation.
 //!
-//! The difference of two values of a motion has an error of ε|u|, that of their second difference by the
-//! square of a small step is large. Here each operation gives the change of its value from the changes of
-//! its operands, by identities such as sin b − sin a = 2 cos((a + b)/2) sin((b − a)/2); so the error is one of
-//! the change.
+//! The difference of two computed values u has an error of ε|u|. Dividing a second difference by the square
+//! of a small step amplifies this error.
+//! Here each operation computes the change of its result from the changes of its operands. For example sin b
+//! − sin a = 2 cos((a + b)/2) sin((b − a)/2).
+//! The error is therefore relative to the change.
 
 use std::sync::Arc;
 
 use super::evaluate::{Binary, Instruction, Ternary, Unary};
 use super::{Table, Variable};
 
-/// A value, and how it changes.
+/// A value and its change over the time interval.
 #[derive(Debug, Clone, Copy)]
 struct Moving {
     value: f64,
@@ -23,7 +24,7 @@ impl Moving {
     }
 }
 
-/// By how much the code's value changes while the time does so by `step`, from the variables x, y, z, t on.
+/// Compute the change of the code's value from the variables x, y, z, t when the time grows by `step`.
 pub(super) fn increment(
     code: &[Instruction],
     tables: &[Arc<Table>],
@@ -87,7 +88,7 @@ fn unary(operation: Unary, a: Moving) -> Moving {
     Moving { value, change }
 }
 
-/// to^n − from^n.
+/// Compute to^n − from^n, where to = from + change.
 fn power_change(from: f64, to: f64, change: f64, power: i32) -> f64 {
     let count = power.unsigned_abs() as i32;
     let sum: f64 = (0..count)

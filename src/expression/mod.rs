@@ -15,30 +15,29 @@
 //! | `a && b` | from the left |
 //! | `a \|\| b` | from the left |
 //!
-//! `and`, `or` and `not` are other names of `&&`, `||` and `!`. As `not x < 1` reads like
-//! `not (x < 1)` but would be `(not x) < 1`, a `!` at the start of a comparison has to be put in
-//! parentheses one way or the other.
+//! `and`, `or` and `not` are synonyms of `&&`, `||` and `!`. `not x < 1` reads like `not (x < 1)` but would
+//! mean `(not x) < 1`. A `!` at the start of a comparison therefore requires parentheses.
 //!
-//! The variables are `x`, `y`, `z` and `t`, as far as they are allowed where the expression stands;
-//! the only constant is `pi`. These names, and not those of functions, hide parameters of the same
-//! name. Names of [tables](Table) are values by time, and may be used where `t` may be. The functions are:
+//! The variables are `x`, `y`, `z` and `t`, where the deck allows these; the only constant is `pi`. These
+//! names hide parameters of the same name; names of functions do not. Names of [tables](Table) are values by
+//! time, and are allowed where `t` is allowed. The functions are:
 //!
 //! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
 //! - `sign(a)`: -1, 0 or 1;
-//! - `min(a, b, …)`, `max(a, b, …)`: NaN if any argument is;
+//! - `min(a, b, …)`, `max(a, b, …)`: NaN if any argument is NaN;
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
 //! - `step(a)`: 0 if `a < 0`, otherwise 1;
-//! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 from there on; if
-//!   `end` is not after `start`, it jumps at `end`;
-//! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. What is not chosen does
-//!   not matter, even if it is infinite or NaN.
+//! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
+//!   after `start`, it jumps at `end`;
+//! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The other argument has no effect,
+//!   even if it is infinite or NaN.
 //!
 //! # Powers
 //!
-//! If the exponent is an integer from -16 to 16, `a ^ b` is evaluated by multiplication
-//! (`f64::powi`), so that `x^2` is exactly `x * x`; all other powers are `f64::powf`. This depends
-//! only on the exponent's value, not on whether it was written as a number.
+//! If the exponent is an integer from -16 to 16, `a ^ b` is computed by multiplication (`f64::powi`), so that
+//! `x^2` is exactly `x * x`. All other powers use `f64::powf`. The choice depends only on the exponent's
+//! value, not on its notation.
 
 mod evaluate;
 mod increment;
@@ -54,7 +53,7 @@ use crate::error::{self, Error};
 use evaluate::Instruction;
 pub use table::Table;
 
-/// A variable that an expression may use at evaluation time, in addition to named parameters.
+/// A variable of expressions, as opposed to a named parameter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Variable {
     /// `x`, the first coordinate.
@@ -76,14 +75,14 @@ pub const POSITION_AND_TIME: [Variable; 4] = [Variable::X, Variable::Y, Variable
 pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 impl Variable {
-    /// The variable of that name.
+    /// Find the variable of this name.
     fn from_name(name: &str) -> Option<Self> {
         [Self::X, Self::Y, Self::Z, Self::T, Self::R]
             .into_iter()
             .find(|variable| variable.name() == name)
     }
 
-    /// The variable's name.
+    /// Name of the variable.
     fn name(self) -> &'static str {
         match self {
             Self::X => "x",
@@ -94,7 +93,7 @@ impl Variable {
         }
     }
 
-    /// Its index among x, y, z, t.
+    /// Index of the variable among x, y, z, t.
     fn slot(self) -> usize {
         match self {
             Self::X | Self::R => 0,
@@ -105,19 +104,19 @@ impl Variable {
     }
 }
 
-/// An error with the byte range that it has in the expression's text.
+/// An error with its byte range in the text of the expression.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpressionError {
-    /// The first byte.
+    /// Index of the first byte.
     pub start: usize,
-    /// The byte after the last; the same as `start` at the end of the text.
+    /// Index after the last byte; equal to `start` at the end of the text.
     pub end: usize,
     /// Message: what is wrong, and what is allowed.
     pub message: String,
 }
 
 impl ExpressionError {
-    /// An error about a byte range.
+    /// Create an error for a byte range.
     fn new(start: usize, end: usize, message: impl Into<String>) -> Self {
         Self {
             start,
@@ -135,31 +134,30 @@ impl fmt::Display for ExpressionError {
 
 impl std::error::Error for ExpressionError {}
 
-/// An expression whose parameters have been replaced by their values and whose constant parts have
-/// been evaluated.
+/// A parsed expression: parameters are replaced by their values, and constant parts are evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
-    /// Postfix code, which is never empty.
+    /// Postfix code; never empty.
     code: Vec<Instruction>,
-    /// Largest stack size of the code, in values.
+    /// Largest stack size that the code needs, in values.
     stack_size: usize,
-    /// Tables that the code reads, by number, in the order of their first use.
+    /// Tables that the code reads, in the order of their first use.
     tables: Vec<Arc<Table>>,
 }
 
 impl Expression {
-    /// An expression of position and time, without parameters.
+    /// Parse an expression of position and time, without parameters.
     ///
     /// # Errors
-    /// When the text is none.
+    /// If the text is not a valid expression.
     pub fn of(text: &str) -> error::Result<Self> {
         Self::with(text, &POSITION_AND_TIME)
     }
 
-    /// An expression of a length `r` (m), without parameters.
+    /// Parse an expression of a length `r` (m), without parameters.
     ///
     /// # Errors
-    /// When the text is none.
+    /// If the text is not a valid expression.
     pub fn of_length(text: &str) -> error::Result<Self> {
         Self::with(text, &[Variable::R])
     }
@@ -169,13 +167,14 @@ impl Expression {
         parsed.map_err(|error| Error::input(format!("`{text}`: {error}")))
     }
 
-    /// Parses the text, where `parameters` gives the value of a named parameter, `known_names` are
-    /// the names that an error about an unknown one may offer, and `variables` are the variables
-    /// that may be used.
+    /// Parse an expression.
+    ///
+    /// `parameters` returns the value of a named parameter. `known_names` are the names that error messages
+    /// suggest for an unknown name. `variables` are the allowed variables.
     ///
     /// # Errors
     ///
-    /// If the text is not an expression, or uses a name that has no value here.
+    /// If the text is not a valid expression, or uses a name without a value.
     pub fn parse(
         text: &str,
         parameters: &dyn Fn(&str) -> Option<f64>,
@@ -185,11 +184,11 @@ impl Expression {
         Self::parse_with_tables(text, parameters, known_names, variables, &[])
     }
 
-    /// As [`Self::parse`], with the names of these tables.
+    /// Same as [`Self::parse`], with named tables.
     ///
     /// # Errors
     ///
-    /// As [`Self::parse`], and if a table is named where `t` may not be used.
+    /// Same as [`Self::parse`], and if the text uses a table where `t` is not allowed.
     pub fn parse_with_tables(
         text: &str,
         parameters: &dyn Fn(&str) -> Option<f64>,
@@ -204,7 +203,7 @@ impl Expression {
             tables,
         };
         let mut code = parse::parse(text, &scope)?;
-        // Expressions with the same tables are equal whatever other tables there are.
+        // Drop unused tables, so that equality of expressions does not depend on these.
         let mut used: Vec<usize> = Vec::new();
         for instruction in &mut code {
             if let Instruction::Table(number) = instruction {
@@ -226,7 +225,8 @@ impl Expression {
         })
     }
 
-    /// The value of a table as an expression of time; its first and last segment extend beyond its rows.
+    /// Create an expression of time from a table. The first and the last segment extend beyond the rows of
+    /// the table.
     pub fn of_table(table: Table) -> Self {
         Self {
             code: vec![Instruction::Table(0)],
@@ -235,12 +235,13 @@ impl Expression {
         }
     }
 
-    /// The tables that the expression reads.
+    /// Tables that the expression reads.
     pub fn tables(&self) -> &[Arc<Table>] {
         &self.tables
     }
 
-    /// Whether the expression is the same as another one up to the end of the tables of that one.
+    /// Whether the code equals that of another expression, and each table starts with all rows of the other's
+    /// table.
     pub fn extends(&self, other: &Self) -> bool {
         let mut tables = self.tables.iter().zip(&other.tables);
         self.code == other.code
@@ -248,12 +249,12 @@ impl Expression {
             && tables.all(|(own, other)| own.extends(other))
     }
 
-    /// Whether a name is the name of a function.
+    /// Whether a function of this name exists.
     pub fn is_function(name: &str) -> bool {
         names::is_function(name)
     }
 
-    /// The expression that has the same value everywhere and always.
+    /// Create an expression with the same value at all positions and times.
     pub fn constant(value: f64) -> Self {
         Self {
             code: vec![Instruction::Constant(value)],
@@ -262,14 +263,14 @@ impl Expression {
         }
     }
 
-    /// The value at a position and a time.
+    /// Evaluate the expression at a position and a time.
     pub fn evaluate(&self, position: [f64; 3], time: f64) -> f64 {
         let [x, y, z] = position;
         evaluate::evaluate(&self.code, &self.tables, self.stack_size, [x, y, z, time])
     }
 
-    /// Change of the value from a time over a step, which may be negative. The round-off is relative to the change, not
-    /// to the value.
+    /// Compute the change of the value from a time over a step, which may be negative. Round-off is relative
+    /// to the change, not to the value.
     pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
         let [x, y, z] = position;
         increment::increment(&self.code, &self.tables, [x, y, z, time], step)
@@ -280,18 +281,18 @@ impl Expression {
         self.evaluate(position, time) != 0.0
     }
 
-    /// Whether the form of the expression guarantees a value of 0 or 1, as for a comparison.
+    /// Whether the expression always returns 0 or 1, as a comparison does.
     pub fn is_condition(&self) -> bool {
         evaluate::is_truth(&self.code)
     }
 
-    /// Whether the value depends on the variable; tables depend on `t`.
+    /// Whether the value depends on this variable; tables depend on `t`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.code.contains(&Instruction::Variable(variable))
             || variable == Variable::T && !self.tables.is_empty()
     }
 
-    /// The value, if no variable occurs in the expression.
+    /// Return the value of an expression without variables and tables.
     pub fn as_constant(&self) -> Option<f64> {
         match self.code[..] {
             [Instruction::Constant(value)] => Some(value),
@@ -299,9 +300,8 @@ impl Expression {
         }
     }
 
-    /// The names in the text that are neither functions nor constants, each once, in the order in
-    /// which they first occur. Variables are among them. The text may be wrong in ways that only
-    /// [`Expression::parse`] sees.
+    /// Return the names in the text that are neither functions nor constants, in the order of their first
+    /// use. Variables are included. The text need not be a valid expression.
     ///
     /// # Errors
     ///

@@ -1,14 +1,14 @@
-//! The functions, and what the other names in an expression mean.
+//! Functions, and the meaning of other names in an expression.
 
 use std::sync::Arc;
 
 use super::evaluate::{Binary, Instruction, Ternary, Unary};
 use super::{Table, Variable};
 
-/// How many of the known names an error message lists.
+/// Largest number of known names in an error message.
 const MOST_NAMES_LISTED: usize = 16;
 
-/// A function: the instruction that evaluates it, which says how many arguments it takes.
+/// A function, as the instruction that evaluates it; the variant gives the number of arguments.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Function {
     /// One argument.
@@ -17,11 +17,11 @@ pub(super) enum Function {
     Binary(Binary),
     /// Three arguments.
     Ternary(Ternary),
-    /// Two or more arguments, taken together from the left.
+    /// Two or more arguments, combined from the left.
     Several(Binary),
 }
 
-/// Every function by its name.
+/// All functions by name.
 const FUNCTIONS: &[(&str, Function)] = &[
     ("sin", Function::Unary(Unary::Sine)),
     ("cos", Function::Unary(Unary::Cosine)),
@@ -50,28 +50,28 @@ const FUNCTIONS: &[(&str, Function)] = &[
     ("clamp", Function::Ternary(Ternary::Clamp)),
 ];
 
-/// The name of the circle's constant.
+/// Name of the constant π.
 pub(super) const PI: &str = "pi";
 
-/// What the names in an expression mean.
+/// Meaning of the names in an expression.
 pub(super) struct Scope<'a> {
-    /// The value of a named parameter.
+    /// Returns the value of a named parameter.
     pub(super) parameters: &'a dyn Fn(&str) -> Option<f64>,
-    /// The names to offer in error messages.
+    /// Names that error messages suggest.
     pub(super) known_names: &'a [&'a str],
-    /// The variables that may be used.
+    /// Allowed variables.
     pub(super) variables: &'a [Variable],
     /// Tables by name.
     pub(super) tables: &'a [(&'a str, &'a Arc<Table>)],
 }
 
-/// Whether a function has that name.
+/// Whether a function of this name exists.
 pub(super) fn is_function(name: &str) -> bool {
     FUNCTIONS.iter().any(|(known, _)| *known == name)
 }
 
 impl Scope<'_> {
-    /// The function of that name, or the message about it.
+    /// Find the function of this name, or return an error message.
     pub(super) fn function(&self, name: &str) -> Result<Function, String> {
         if let Some((_, function)) = FUNCTIONS.iter().find(|(known, _)| *known == name) {
             return Ok(*function);
@@ -93,14 +93,14 @@ impl Scope<'_> {
         Err(message)
     }
 
-    /// The number of the table of that name.
+    /// Find the index of the table of this name.
     fn table(&self, name: &str) -> Option<usize> {
         self.tables.iter().position(|(known, _)| *known == name)
     }
 
-    /// What pushes the value of that name, or the message about it.
+    /// Return the instruction that pushes the value of this name, or an error message.
     pub(super) fn value(&self, name: &str) -> Result<Instruction, String> {
-        // `r` is a variable only where it can be used: it is a likely name of a parameter.
+        // `r` is a variable only in expressions of a length; elsewhere parameters often have this name.
         let reserved =
             |variable: &Variable| *variable != Variable::R || self.variables.contains(variable);
         if let Some(variable) = Variable::from_name(name).filter(reserved) {
@@ -136,7 +136,7 @@ impl Scope<'_> {
         })
     }
 
-    /// The message about a variable that may not be used.
+    /// Return the error message for a variable that is not allowed.
     fn not_allowed(&self, name: &str) -> String {
         let allowed: Vec<&str> = self
             .variables
@@ -152,7 +152,7 @@ impl Scope<'_> {
         )
     }
 
-    /// The message about a name that nothing has.
+    /// Return the error message for an unknown name.
     fn unknown(&self, name: &str) -> String {
         let variables = self.variables.iter().map(|variable| variable.name());
         let names: Vec<&str> = variables
@@ -169,17 +169,17 @@ impl Scope<'_> {
     }
 }
 
-/// The part of a message that offers the nearest name, ending the sentence before it.
+/// Return the end of an error message, with the most similar name if there is one.
 fn suggestion(name: &str, names: &[&str]) -> String {
     let lower = name.to_lowercase();
     let tolerance = match lower.len() {
-        // Every other single letter is one edit away.
+        // Any two single letters differ by one edit.
         1 => 0,
         length => (length / 3).clamp(1, 3),
     };
     let nearest = names
         .iter()
-        // Also keeps absurdly long names out of the quadratic comparison.
+        // This condition also keeps very long names out of the quadratic comparison.
         .filter(|known| known.len().abs_diff(name.len()) <= tolerance)
         .map(|known| {
             (

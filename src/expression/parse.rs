@@ -1,14 +1,14 @@
-//! From an expression's text to postfix code, by precedence climbing.
+//! Parser from the text of an expression to postfix code, by precedence climbing.
 
 use super::ExpressionError;
 use super::evaluate::{Binary, Instruction, Unary, append};
 use super::names::{Function, PI, Scope};
 use super::token::{Kind, Precedence, Token, tokenize};
 
-/// How many operands, parentheses, calls and signs may be open inside one another.
+/// Largest depth of nested operands, parentheses, calls and signs.
 pub(super) const DEEPEST_NESTING: usize = 200;
 
-/// Parses the text to postfix code with its constants folded.
+/// Parse the text to postfix code with folded constants.
 pub(super) fn parse(text: &str, scope: &Scope) -> Result<Vec<Instruction>, ExpressionError> {
     let tokens = tokenize(text)?;
     if tokens.len() == 1 {
@@ -33,7 +33,7 @@ pub(super) fn parse(text: &str, scope: &Scope) -> Result<Vec<Instruction>, Expre
     }
 }
 
-/// The names in the text that are neither functions nor constants, each once, in order.
+/// Return the names in the text that are neither functions nor constants, each once, in order.
 pub(super) fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
     let tokens = tokenize(text)?;
     let mut names: Vec<String> = Vec::new();
@@ -47,29 +47,29 @@ pub(super) fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
     Ok(names)
 }
 
-/// The parser, part way through the text.
+/// State of the parser.
 struct Parser<'a> {
     /// The whole text.
     text: &'a str,
-    /// What the names mean.
+    /// Meaning of the names.
     scope: &'a Scope<'a>,
-    /// The whole text's tokens, ending with [`Kind::End`].
+    /// All tokens of the text; the last one is [`Kind::End`].
     tokens: Vec<Token>,
-    /// The index of the next token.
+    /// Index of the next token.
     next: usize,
-    /// How many expressions are open inside one another.
+    /// Number of expressions that are open at this position.
     nesting: usize,
-    /// The code so far.
+    /// Code so far.
     code: Vec<Instruction>,
 }
 
 impl Parser<'_> {
-    /// The next token.
+    /// Return the next token without consuming it.
     fn peek(&self) -> Token {
         self.tokens[self.next]
     }
 
-    /// Takes the next token; the end is never passed.
+    /// Consume the next token; [`Kind::End`] is never consumed.
     fn take(&mut self) -> Token {
         let token = self.peek();
         if token.kind != Kind::End {
@@ -78,29 +78,29 @@ impl Parser<'_> {
         token
     }
 
-    /// A token's text.
+    /// Text of a token.
     fn text_of(&self, token: Token) -> &str {
         &self.text[token.start..token.end]
     }
 
-    /// The text in a byte range, without the blanks around it.
+    /// Text in a byte range, trimmed.
     fn trimmed(&self, start: usize, end: usize) -> &str {
         self.text[start..end].trim()
     }
 
-    /// Where the last token taken ends.
+    /// Byte index after the last consumed token.
     fn end_of_last(&self) -> usize {
         self.next
             .checked_sub(1)
             .map_or(0, |last| self.tokens[last].end)
     }
 
-    /// Appends an instruction to the code.
+    /// Append an instruction to the code.
     fn append(&mut self, instruction: Instruction) {
         append(&mut self.code, instruction);
     }
 
-    /// Parses a value and the operators after it that bind at least as tightly as `loosest`.
+    /// Parse a value and the following operators that bind at least as tightly as `loosest`.
     fn expression(&mut self, loosest: Precedence) -> Result<(), ExpressionError> {
         let first = self.peek();
         if self.nesting > DEEPEST_NESTING {
@@ -124,8 +124,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// Rejects comparisons that would silently mean something else than what was most likely
-    /// meant: `a < b < c` and `!a < b`.
+    /// Reject comparisons whose meaning probably differs from the intention: `a < b < c` and `!a < b`.
     fn check_comparison(&mut self, first: Token, operator: Token) -> Result<(), ExpressionError> {
         let next = self.peek();
         let (end, message) = if let Kind::Operator(_, Precedence::Comparison) = next.kind {
@@ -160,7 +159,7 @@ impl Parser<'_> {
         Err(ExpressionError::new(first.start, end, message))
     }
 
-    /// Parses a number, a name, a call, a parenthesis, or one of these after a sign.
+    /// Parse a number, a name, a call, a parenthesis, or a sign followed by one of these.
     fn value(&mut self) -> Result<(), ExpressionError> {
         let token = self.peek();
         match token.kind {
@@ -208,7 +207,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// Parses the arguments of the function of that name.
+    /// Parse the arguments of a call of this function.
     fn call(&mut self, name: Token) -> Result<(), ExpressionError> {
         let function = self
             .scope
@@ -258,7 +257,7 @@ impl Parser<'_> {
         Err(ExpressionError::new(name.start, close.end, message))
     }
 
-    /// The error about the next token, which is not the value that has to be there.
+    /// Return the error for a next token that is not a value.
     fn missing_value(&self) -> ExpressionError {
         let token = self.peek();
         let after = match self.next.checked_sub(1) {
@@ -272,7 +271,7 @@ impl Parser<'_> {
         token.error(message)
     }
 
-    /// The error about what follows a value inside a parenthesis, and does not close it.
+    /// Return the error for a token after a value inside a parenthesis that does not close it.
     fn unclosed(&self, open: Token) -> ExpressionError {
         if self.peek().kind == Kind::End {
             return open.error("unbalanced parenthesis: this `(` is never closed");
@@ -280,7 +279,7 @@ impl Parser<'_> {
         self.misplaced()
     }
 
-    /// The error about the next token, which can not follow a value.
+    /// Return the error for a next token that cannot follow a value.
     fn misplaced(&self) -> ExpressionError {
         let token = self.peek();
         let text = self.text_of(token);
@@ -295,7 +294,7 @@ impl Parser<'_> {
     }
 }
 
-/// The loosest operator that the right operand of an operator may have in it.
+/// Return the loosest precedence that is allowed in the right operand of an operator.
 fn tighter(precedence: Precedence) -> Precedence {
     match precedence {
         Precedence::Or => Precedence::And,

@@ -1,18 +1,19 @@
-//! Values by time, linear between the rows of a table.
+//! Tables of values by time, with linear interpolation.
 
-/// A function of time, from rows.
+/// A piecewise linear function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// s, each above the one before.
+    /// Times in s, strictly increasing.
     times: Vec<f64>,
     values: Vec<f64>,
 }
 
 impl Table {
-    /// A table of times (s) and as many values.
+    /// Create a table of times (s) and values of the same count.
     ///
     /// # Errors
-    /// If there are fewer than two rows, or the times do not grow: the number of the row, from 0, and what is wrong.
+    /// If there are fewer than two rows, or the times do not increase. The error holds the row index, from 0,
+    /// and a message.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
         if times.len() < 2 || times.len() != values.len() {
             let message = format!("needs two rows or more, has {}", times.len());
@@ -30,7 +31,7 @@ impl Table {
         Ok(Self { times, values })
     }
 
-    /// The first and the last time, s.
+    /// First and last time, s.
     pub fn range(&self) -> [f64; 2] {
         [self.times[0], self.times[self.times.len() - 1]]
     }
@@ -40,13 +41,13 @@ impl Table {
         [&self.times, &self.values]
     }
 
-    /// Whether the rows begin with those of another table.
+    /// Whether the table starts with all rows of another table.
     pub(super) fn extends(&self, other: &Self) -> bool {
         self.times.starts_with(&other.times) && self.values.starts_with(&other.values)
     }
 
-    /// The value at a time (s). Before the first and after the last row the first and the last segment go on: the last step
-    /// may pass the end of the run by a part of a step, and the velocity of a support is that of its motion around a time.
+    /// Return the value at a time (s). The first and the last segment extend beyond the rows: the last step
+    /// of a run may pass its end, and the velocity of a support is a difference around a time.
     pub(super) fn at(&self, time: f64) -> f64 {
         let k = self.segment(time);
         let [from, to] = [self.values[k], self.values[k + 1]];
@@ -56,8 +57,8 @@ impl Table {
         from + (to - from) * ((time - self.times[k]) / (self.times[k + 1] - self.times[k]))
     }
 
-    /// The change of the value from a time on while the time changes by a step, s. Within a segment its round-off is that of
-    /// the change, not of the value.
+    /// Compute the change of the value from a time over a step, s. Within a segment round-off is relative to
+    /// the change, not to the value.
     pub(super) fn increment(&self, time: f64, step: f64) -> f64 {
         let end = time + step;
         let k = self.segment(0.5 * (time + end));
@@ -73,7 +74,7 @@ impl Table {
         self.at(end) - self.at(time)
     }
 
-    /// The first row of the segment of a time (s), which is the first or last one beyond the rows.
+    /// Index of the first row of the segment that contains a time (s), or of the nearest segment.
     fn segment(&self, time: f64) -> usize {
         let after = self.times.partition_point(|row| *row <= time);
         after.clamp(1, self.times.len() - 1) - 1
@@ -120,7 +121,7 @@ mod tests {
             let difference = table.at(time + step) - table.at(time);
             assert!((table.increment(time, step) - difference).abs() < 1e-15);
         }
-        // Without the round-off of the values.
+        // The round-off is not that of the values.
         let steep = Table::new(vec![0.0, 1.0], vec![1e6, 1e6 + 1.0]).unwrap();
         assert_eq!(steep.increment(0.3, 1e-9), 1e-9);
     }

@@ -1,11 +1,11 @@
-//! Tests of the whole language.
+//! Tests of the expression language.
 
 use super::{Expression, ExpressionError, Variable};
 use proptest::prelude::*;
 
 const ALL: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
 
-/// Parses with the parameters `dx` = 0.5 and `fo` = 3 and all variables.
+/// Parse with the parameters `dx` = 0.5 and `fo` = 3 and all variables.
 fn parse(text: &str) -> Result<Expression, ExpressionError> {
     let parameters = |name: &str| match name {
         "dx" => Some(0.5),
@@ -15,14 +15,14 @@ fn parse(text: &str) -> Result<Expression, ExpressionError> {
     Expression::parse(text, &parameters, &["dx", "fo", "later"], &ALL)
 }
 
-/// The value at x = 2, y = 3, z = 5, t = 7.
+/// Evaluate at x = 2, y = 3, z = 5, t = 7.
 fn value(text: &str) -> f64 {
     parse(text)
         .unwrap_or_else(|error| panic!("{text}: {error}"))
         .evaluate([2.0, 3.0, 5.0], 7.0)
 }
 
-/// Whether two values have the same bits or are both NaN.
+/// Whether two values have the same bits, or both are NaN.
 fn same(left: f64, right: f64) -> bool {
     left.to_bits() == right.to_bits() || (left.is_nan() && right.is_nan())
 }
@@ -403,23 +403,23 @@ fn deep_nesting_is_an_error_and_long_sums_are_not() {
     assert_eq!(value(&format!("min(9{})", ", x".repeat(100_000))), 2.0);
 }
 
-/// An expression that is evaluated directly.
+/// A syntax tree with direct evaluation, as a reference.
 #[derive(Debug, Clone)]
 enum Tree {
-    /// A number, not negative.
+    /// A nonnegative number.
     Number(f64),
-    /// One of four names.
+    /// Index of one of four names.
     Name(usize),
-    /// A sign before a value.
+    /// A prefix operator with its operand.
     Prefix(&'static str, Box<Tree>),
-    /// An operator between values.
+    /// An infix operator with its operands.
     Infix(&'static str, Box<Tree>, Box<Tree>),
-    /// A function of values.
+    /// A function with its arguments.
     Call(&'static str, Vec<Tree>),
 }
 
 impl Tree {
-    /// The value, where the names have these values.
+    /// Evaluate the tree with these values of the names.
     fn value(&self, names: &[f64; 4]) -> f64 {
         let truth = |condition| if condition { 1.0 } else { 0.0 };
         match self {
@@ -495,7 +495,7 @@ impl Tree {
         }
     }
 
-    /// How tightly the outermost operator binds.
+    /// Precedence of the outermost operator; larger binds more tightly.
     fn precedence(&self) -> u8 {
         match self {
             Self::Infix("||", ..) => 1,
@@ -509,7 +509,7 @@ impl Tree {
         }
     }
 
-    /// The text, either with parentheses around every operand or with only those that are needed.
+    /// Return the text, with parentheses around every operand or only around those that need them.
     fn text(&self, names: &[&str; 4], minimal: bool) -> String {
         let operand = |tree: &Self, needed: bool| {
             let text = tree.text(names, minimal);
@@ -553,7 +553,7 @@ impl Tree {
     }
 }
 
-/// The lesser value, the right one of equals, NaN before all others.
+/// Return the smaller value, the right one of equal values, and NaN if either is NaN.
 fn lesser(left: f64, right: f64) -> f64 {
     if left.is_nan() || right.is_nan() {
         f64::NAN
@@ -608,7 +608,7 @@ fn trees() -> impl Strategy<Value = Tree> {
     })
 }
 
-/// Values of the four names: small integers, moderate and any numbers.
+/// Values of the four names: small integers, moderate numbers and arbitrary numbers.
 fn values() -> impl Strategy<Value = [f64; 4]> {
     prop::array::uniform4(prop_oneof![
         (-17..18i8).prop_map(f64::from),
@@ -617,7 +617,7 @@ fn values() -> impl Strategy<Value = [f64; 4]> {
     ])
 }
 
-/// Strings of the language's words and symbols in any order.
+/// Words and symbols of the language in any order.
 fn jumbles() -> impl Strategy<Value = String> {
     let words = vec![
         "x", "t", "dx", "foo", "é", "1", "1e", ".", ".5", "e5", "(", "(", ")", ")", ",", "+", "-",
@@ -627,7 +627,7 @@ fn jumbles() -> impl Strategy<Value = String> {
     prop::collection::vec(prop::sample::select(words), 0..60).prop_map(|words| words.concat())
 }
 
-/// Whether the text is either evaluated or rejected with a range that lies within it.
+/// Whether the text is evaluated, or rejected with a range inside the text.
 fn is_handled(text: &str) -> bool {
     let _ = Expression::names(text);
     match parse(text) {
@@ -692,7 +692,7 @@ proptest! {
 
 #[test]
 fn increments_have_the_rounding_of_a_change() {
-    // Exact to the digits shown, from a far value in a small step.
+    // Slope and curvature are exact to the digits given; the start value is large and the step small.
     let (time, step) = (7.0, 1e-9);
     let sech = 1.0 - 1_f64.tanh().powi(2);
     let change = |text: &str| parse(text).unwrap().increment([2.0, 3.0, 5.0], time, step);
@@ -729,7 +729,7 @@ fn increments_have_the_rounding_of_a_change() {
             change(text)
         );
     }
-    // What jumps, jumps.
+    // A jump within the step is the full change.
     assert_eq!(change("step(t - 7 - 1e-12)"), 1.0);
     assert_eq!(change("3 + x"), 0.0);
 }

@@ -1,16 +1,16 @@
-//! The words and symbols of an expression's text.
+//! Tokens of an expression's text.
 
 use super::ExpressionError;
 use super::evaluate::Binary;
 
-/// How tightly operators bind, loosest first.
+/// Precedence of operators, from the loosest to the tightest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Precedence {
     /// `||`
     Or,
     /// `&&`
     And,
-    /// `<` and its like
+    /// `<` and other comparisons
     Comparison,
     /// `+` and `-`
     Sum,
@@ -22,14 +22,14 @@ pub(super) enum Precedence {
     Power,
 }
 
-/// What a token is.
+/// Kind of a token.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
     /// A number.
     Number(f64),
     /// The name of a variable, parameter, constant or function.
     Name,
-    /// An operator between two values; `+` and `-` may also stand before one.
+    /// An operator between two values; `+` and `-` may also be prefix operators.
     Operator(Binary, Precedence),
     /// `!` or `not`
     Not,
@@ -43,25 +43,25 @@ pub(super) enum Kind {
     End,
 }
 
-/// A word or symbol and the byte range that it has in the text.
+/// A token and its byte range in the text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Token {
-    /// What it is.
+    /// Kind of the token.
     pub(super) kind: Kind,
-    /// Where it starts.
+    /// Index of the first byte.
     pub(super) start: usize,
-    /// Where it ends.
+    /// Index after the last byte.
     pub(super) end: usize,
 }
 
 impl Token {
-    /// An error about the token.
+    /// Create an error for this token.
     pub(super) fn error(self, message: impl Into<String>) -> ExpressionError {
         ExpressionError::new(self.start, self.end, message)
     }
 }
 
-/// Every symbol; one that begins another comes after it.
+/// All symbols; a symbol comes before its own prefixes, so the longest match is found first.
 const SYMBOLS: &[(&str, Kind)] = &[
     (
         "<=",
@@ -91,7 +91,7 @@ const SYMBOLS: &[(&str, Kind)] = &[
     (",", Kind::Comma),
 ];
 
-/// Symbols of other languages, with what to write in their place.
+/// Symbols of other languages, with the correction for the error message.
 const FOREIGN_SYMBOLS: &[(&str, &str)] = &[
     ("**", "to raise to a power, write `^`"),
     ("=", "to compare, write `==`"),
@@ -99,7 +99,7 @@ const FOREIGN_SYMBOLS: &[(&str, &str)] = &[
     ("|", "for a logical or, write `||`"),
 ];
 
-/// Splits the text into tokens, of which the last is always [`Kind::End`].
+/// Split the text into tokens; the last token is always [`Kind::End`].
 pub(super) fn tokenize(text: &str) -> Result<Vec<Token>, ExpressionError> {
     let mut tokens = Vec::new();
     let mut start = 0;
@@ -131,7 +131,7 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token>, ExpressionError> {
     Ok(tokens)
 }
 
-/// The token that the text starts with and its length, or the length that is wrong and why.
+/// Return the first token of the text and its length, or the length of the wrong part and a message.
 fn first_token(text: &str, character: char) -> Result<(Kind, usize), (usize, String)> {
     let number_length = number_length(text.as_bytes());
     if number_length > 0 {
@@ -153,7 +153,7 @@ fn first_token(text: &str, character: char) -> Result<(Kind, usize), (usize, Str
         };
         return Ok((kind, length));
     }
-    // The longer one counts: `**` is not two `*`, and `==` is not two `=`.
+    // The longer match wins: `**` is not two `*`, and `==` is not two `=`.
     let symbol = SYMBOLS.iter().find(|(symbol, _)| text.starts_with(symbol));
     let foreign = FOREIGN_SYMBOLS
         .iter()
@@ -174,7 +174,7 @@ fn first_token(text: &str, character: char) -> Result<(Kind, usize), (usize, Str
     }
 }
 
-/// The length of the number that the text starts with, or 0.
+/// Return the length of the number at the start of the text, or 0.
 fn number_length(text: &[u8]) -> usize {
     let digits = |from: usize| {
         text.get(from..)

@@ -1,4 +1,5 @@
-//! Bodies of an import: blocks with a material, a damage model and a horizon, and damage that fits the law.
+//! Bodies of the new deck, with material, damage model and horizon; conversion of damage models to damage
+//! laws.
 
 use super::draft::{Section, Value};
 use super::elastic::Constants;
@@ -10,42 +11,42 @@ use crate::error::Result;
 /// A material of the new deck.
 #[derive(Debug, Clone)]
 pub struct Material {
-    /// Its name in the deck that is read.
+    /// Name in the source deck.
     pub read: String,
-    /// Its name in the new deck.
+    /// Name in the new deck.
     pub written: String,
-    /// Its law.
+    /// Material law.
     pub law: &'static str,
-    /// Its elastic constants.
+    /// Elastic constants.
     pub constants: Constants,
 }
 
-/// When bonds of a deck break.
+/// Criterion of a damage model.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Criterion {
-    /// At a stretch.
+    /// Bonds break at this stretch.
     Stretch(Value, f64),
-    /// At a work that follows from a fracture energy by PeriLab's formula.
+    /// Bonds break at a work that follows from a fracture energy by PeriLab's formula.
     Energy {
         /// Fracture energy, J/m².
         energy: Value,
-        /// Compressed bonds do not break.
+        /// Whether compressed bonds never break.
         tension_only: bool,
     },
 }
 
-/// A damage model of the deck that is read.
+/// A damage model of the source deck.
 #[derive(Debug, Clone)]
 pub struct DamageModel {
-    /// Its name there.
+    /// Name in the source deck.
     pub read: String,
-    /// When bonds break.
+    /// Criterion that breaks bonds.
     pub criterion: Criterion,
-    /// The criterion's value.
+    /// Node of the criterion's value.
     pub node: Node,
 }
 
-/// Note the damage models that no block names; `models` are the tables of models, `blocks` those of blocks.
+/// Log the damage models that no block uses. `models` is the table of damage models, `blocks` that of blocks.
 pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &Node) {
     let used = |name: &str| {
         blocks.tables().any(|(_, block)| {
@@ -60,20 +61,20 @@ pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &No
     }
 }
 
-/// Laws whose bonds break by work only.
+/// Laws that support only the energy criterion.
 const BY_ENERGY: [&str; 3] = [
     "ordinary_plastic",
     "correspondence",
     "bond_associated_correspondence",
 ];
 
-/// Laws of bonds.
+/// Bond-based laws.
 const BOND_BASED: [&str; 1] = ["pmb"];
 
 /// Write the damage law of a body; return its name.
 ///
 /// # Errors
-/// If the law needs an energy and the elastic constants do not give one.
+/// If the law needs a fracture energy and the elastic constants do not determine one.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,
@@ -103,7 +104,7 @@ pub fn damage(
                 translation.log.left_out(&model.node, note);
                 return Ok(None);
             };
-            // Silling & Askari (2005) for the solid: G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)).
+            // Silling & Askari (2005), for a state-based solid: G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)).
             let energy = stretch
                 * stretch
                 * horizon
@@ -147,19 +148,19 @@ pub fn damage(
 
 /// A body of the new deck.
 pub struct Body {
-    /// Its name in the new deck.
+    /// Name in the new deck.
     pub name: String,
-    /// Its material.
+    /// Name of the material.
     pub material: String,
-    /// Its damage law.
+    /// Name of the damage law.
     pub damage: Option<String>,
-    /// Its horizon as it stands.
+    /// Horizon as written in the source deck.
     pub horizon: Value,
-    /// The key and value of its points: `points` or `shape.box`.
+    /// Key and value of the points: `points` or `shape.box`.
     pub points: (String, Value),
 }
 
-/// Write bodies. The horizon of the first one is that of the grid.
+/// Write the bodies. The horizon of the first body becomes that of `[grid]`.
 pub fn write(translation: &mut Translation, bodies: &[Body]) {
     let Some(first) = bodies.first() else {
         return;

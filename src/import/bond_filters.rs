@@ -1,17 +1,17 @@
-//! Bond filters: surfaces that cut bonds, which become pre-cracks.
+//! Bond filters of Peridigm and PeriLab: surfaces that cut bonds. These become pre-cracks.
 
 use super::draft::{Section, Value};
 use super::translation::Translation;
 use super::tree::Node;
 use crate::error::Result;
 
-/// Smallest cosine between a bottom edge and the normal at which they are not perpendicular.
+/// Largest cosine between bottom edge and normal that counts as perpendicular.
 const SLANT: f64 = 1e-9;
 
-/// Write the pre-cracks of a table of bond filters.
+/// Write a pre-crack for each bond filter of a table.
 ///
 /// # Errors
-/// If a key is missing or no number.
+/// If a key is missing or not a number.
 pub fn bond_filters(translation: &mut Translation, filters: &Node) -> Result<()> {
     for (name, filter) in filters.tables() {
         let kind = translation.required(filter, "Type", &format!("the bond filter `{name}`"))?;
@@ -31,7 +31,7 @@ pub fn bond_filters(translation: &mut Translation, filters: &Node) -> Result<()>
     Ok(())
 }
 
-/// The vector of three keys with the same beginning. In the plane, the third one may be missing.
+/// Read the vector of the keys `key X`, `key Y` and `key Z`. In 2-D the last key may be missing.
 fn vector(translation: &Translation, filter: &Node, key: &str, note: &str) -> Result<[f64; 3]> {
     let mut vector = [0.0; 3];
     for (k, axis) in ["X", "Y", "Z"].iter().enumerate() {
@@ -60,7 +60,7 @@ fn scaled(vector: [f64; 3], factor: f64) -> [f64; 3] {
     vector.map(|component| factor * component)
 }
 
-/// A vector of length 1, or the zero vector.
+/// Scale a vector to length 1; the zero vector stays.
 fn unit(vector: [f64; 3]) -> [f64; 3] {
     let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
     if length > 0.0 {
@@ -78,7 +78,10 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// The rectangle with the bottom edge ub·b from a corner and the side edge (ub × n)·a. In the plane, its bottom edge.
+/// Write a rectangle as a pre-crack; in 2-D its bottom edge.
+///
+/// The edges are ub·b from the corner and (ub × n)·a, with the bottom unit vector ub, the normal n, and the
+/// lengths b and a.
 fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
     let written = translation.name("crack", name);
     let shape = match translation.dimension {
@@ -90,8 +93,8 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
     let corner = vector(translation, filter, "Lower Left Corner", &header)?;
     let given = unit(vector(translation, filter, "Bottom Unit Vector", &header)?);
     let bottom_length = length(translation, filter, "Bottom Length", &header)?;
-    // Intersections are compared along the given vector and its cross product with the normal: where the vector leaves
-    // the plane, both extents are longer by 1 over its part in the plane.
+    // Peridigm and PeriLab compare intersections along ub and along ub × n. If ub leaves the plane, both
+    // edges are longer by the factor 1/|ub_t|, with the part ub_t of ub in the plane.
     let along: f64 = given.iter().zip(&normal).map(|(g, n)| g * n).sum();
     let (mut bottom, mut stretch) = (given, 1.0);
     if along.abs() > SLANT {
@@ -131,7 +134,7 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
     Ok(())
 }
 
-/// A disc; in the plane, the line across its normal.
+/// Write a disc as a pre-crack; in 2-D the line normal to the disc's normal.
 fn disc(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
     let written = translation.name("crack", name);
     let shape = match translation.dimension {

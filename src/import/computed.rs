@@ -1,4 +1,4 @@
-//! Computed quantities of Peridigm and PeriLab: columns of the history.
+//! Computed quantities of Peridigm and PeriLab, which become columns of the history.
 
 use super::draft::Value;
 use super::log::Fate;
@@ -10,13 +10,13 @@ use crate::component::entries;
 use crate::error::{Result, excerpt};
 use crate::problem::Field;
 
-/// The note of the angular momentum.
+/// Log note for the angular momentum.
 pub(super) const ANGULAR_MOMENTUM: &str = "[history] angular_momentum: about the origin";
 
-/// The difference of variables that are a density times the volume of a point.
+/// Difference of variables that are a density times the volume of a point.
 const TIMES_VOLUME: &str = "times the volume";
 
-/// A computed quantity of the deck.
+/// A computed quantity of the source deck.
 pub(super) struct Quantity<'n> {
     label: &'n str,
     table: &'n Node,
@@ -24,13 +24,13 @@ pub(super) struct Quantity<'n> {
     variable: &'n str,
 }
 
-/// What became of a computed quantity.
+/// Outcome of a computed quantity.
 pub(super) struct Written {
     pub(super) fate: Fate,
     pub(super) note: String,
-    /// A set whose reaction the history has too.
+    /// Set whose reaction is added to the history.
     pub(super) reaction: Option<String>,
-    /// The history has the angular momentum.
+    /// Whether the angular momentum is added to the history.
     pub(super) angular_momentum: bool,
 }
 
@@ -50,7 +50,7 @@ impl Written {
 }
 
 impl<'n> Quantity<'n> {
-    /// The quantity of a table.
+    /// Create the quantity of a table.
     pub(super) fn new(label: &'n str, table: &'n Node) -> Self {
         let word = |key: &str| table.get(key).and_then(Node::text).unwrap_or("");
         Self {
@@ -61,10 +61,10 @@ impl<'n> Quantity<'n> {
         }
     }
 
-    /// Write the quantity.
+    /// Write the quantity to the new deck.
     ///
     /// # Errors
-    /// If a position is no number, or a set is unknown.
+    /// If a position is not a number, or a set is unknown.
     pub(super) fn write(
         &self,
         translation: &mut Translation,
@@ -119,7 +119,7 @@ impl<'n> Quantity<'n> {
         ))
     }
 
-    /// Write the values of the nearest point. A probe has displacement and velocity without further keys.
+    /// Write the values of the nearest point. A probe reports displacement and velocity without further keys.
     fn probe(&self, translation: &mut Translation) -> Result<Written> {
         let mut position = Vec::new();
         for axis in ["X", "Y", "Z"].iter().take(translation.dimension) {
@@ -158,7 +158,7 @@ impl<'n> Quantity<'n> {
         })
     }
 
-    /// Write a sum or an extreme over a set, one table for each component.
+    /// Write a sum or an extreme over a set, one table per component.
     fn statistics(&self, translation: &mut Translation, set: String) -> Result<Written> {
         let calculation = self.table.get("Calculation Type").and_then(Node::text);
         let calculation = calculation.unwrap_or("");
@@ -206,13 +206,13 @@ impl<'n> Quantity<'n> {
         let Some((field, known)) = known else {
             return Written::left_out("there is no such field");
         };
-        // A density times the volume of a point has the integral of the density as its sum.
+        // The sum of a density times the volume of a point is the integral of the density.
         let (statistic, difference) = match (*statistic, field.difference) {
             ("sum", TIMES_VOLUME) => ("integral", ""),
             ("mean", "") => ("mean", "weighted by volume"),
             (statistic, difference) => (statistic, difference),
         };
-        // Symmetric tensors have xy for yx.
+        // Symmetric tensors store xy, not yx.
         let part = field.part.map(|part| {
             let mut axes: Vec<char> = part.to_lowercase().chars().collect();
             if known.components() == 6 {

@@ -1,4 +1,4 @@
-//! Initial values, loads and supports of decks that give one component each.
+//! Initial values, loads and supports of decks in which each condition has one component.
 
 use super::draft::{Section, Value};
 use super::sets::Sets;
@@ -6,18 +6,18 @@ use super::translation::Translation;
 use super::tree::Node;
 use crate::error::{Result, excerpt};
 
-/// What a condition prescribes.
+/// Quantity that a condition prescribes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Quantity {
-    /// Initial displacement or velocity: the key of `[initial.NAME]`.
+    /// Initial displacement or velocity; the text is the key of `[initial.NAME]`.
     Initial(&'static str),
-    /// Displacement or velocity of a support: the key of `[condition.NAME]`.
+    /// Displacement or velocity of a support; the text is the key of `[condition.NAME]`.
     Support(&'static str),
     /// Force density.
     BodyForce,
     /// Force on each point of the set, N.
     ForceOfPoint,
-    /// Temperature minus another one, which is 0 if not given.
+    /// Temperature minus the reference temperature, which is 0 if not given.
     Temperature(Option<Value>),
 }
 
@@ -27,33 +27,33 @@ struct Initial {
     key: &'static str,
     component: usize,
     value: Value,
-    /// Where the value stands.
+    /// Node of the value.
     node: Node,
 }
 
-/// Writes conditions one after the other.
+/// Writer of conditions; collects initial values until the end.
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
     /// Names of the conditions in the new deck, with the numbers of their steps.
     pub written: Vec<(String, Vec<u64>)>,
-    /// Temperatures are among them.
+    /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,
 }
 
-/// A condition as the deck has it.
+/// A condition of the source deck.
 pub struct Given<'n> {
-    /// Its name.
+    /// Name of the condition.
     pub name: &'n str,
-    /// Its table.
+    /// Table of the condition.
     pub node: &'n Node,
-    /// What it prescribes.
+    /// Quantity that the condition prescribes.
     pub quantity: Quantity,
-    /// Numbers of the steps in which it acts; in all if there are none.
+    /// Numbers of the steps in which the condition acts; empty for all steps.
     pub steps: Vec<u64>,
 }
 
-/// The coordinate of a condition: its node, its name and its number.
+/// Return the component of a condition: its node, its name and its index.
 fn component<'n>(
     translation: &Translation,
     node: &'n Node,
@@ -211,7 +211,7 @@ impl Conditions {
         Ok(())
     }
 
-    /// Write the initial values, one table a set.
+    /// Write the initial values, one table per set.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self

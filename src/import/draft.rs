@@ -1,10 +1,10 @@
-//! The deck that an import writes: sections with keys, and their text.
+//! The new deck of an import: sections with keys, and their conversion to TOML.
 
 use std::fmt::Write;
 
 use super::log::Entry;
 
-/// Order of the sections in the text, by the first word of their headers.
+/// Order of the sections in the text, by the first word of the header.
 const ORDER: [&str; 16] = [
     "parameters",
     "grid",
@@ -27,7 +27,7 @@ const ORDER: [&str; 16] = [
 /// A value of a deck.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// A number as it is written.
+    /// A number, as text.
     Number(String),
     /// A text, a name or an expression.
     Text(String),
@@ -47,7 +47,7 @@ impl Value {
         Self::Text(text.into())
     }
 
-    /// A computed number, with 15 digits, so that round-off does not show.
+    /// Create a value from a computed number. The text has 15 digits, which hides round-off.
     pub fn number(value: f64) -> Self {
         let rounded = format!("{value:.14e}").parse::<f64>().unwrap_or(value);
         Self::Number(if rounded.is_nan() {
@@ -57,7 +57,7 @@ impl Value {
         })
     }
 
-    /// A number as text where TOML writes it alike, an expression otherwise.
+    /// Create a number if TOML reads the text as the same number; otherwise an expression.
     pub fn number_or_expression(text: &str) -> Self {
         match text.parse::<f64>() {
             Ok(_) if is_toml_number(text) => Self::Number(text.to_owned()),
@@ -66,7 +66,7 @@ impl Value {
         }
     }
 
-    /// A number or expression without quotes.
+    /// Return a number or expression without quotes.
     pub fn plain(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -85,7 +85,7 @@ impl Value {
     }
 }
 
-/// Test whether TOML reads a text as the number that it is elsewhere.
+/// Test whether the text of a number is also a number in TOML.
 fn is_toml_number(text: &str) -> bool {
     let digits = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
     let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
@@ -105,19 +105,19 @@ fn is_toml_number(text: &str) -> bool {
         && exponent.is_none_or(exponent_digits)
 }
 
-/// A section of the deck.
+/// A section of the new deck.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
     header: String,
-    /// Lines of comment in front of it.
+    /// Comment lines before the section.
     comments: Vec<String>,
     lines: Vec<(String, Value)>,
-    /// Only the comments are written.
+    /// Whether only the comments are written.
     is_left_out: bool,
 }
 
 impl Section {
-    /// A section without keys; the header is that between the brackets.
+    /// Create a section without keys; the header is the text between the brackets.
     pub fn new(header: impl Into<String>) -> Self {
         Self {
             header: header.into(),
@@ -127,7 +127,7 @@ impl Section {
         }
     }
 
-    /// Test whether it is the section with a header.
+    /// Test whether this is the section with a header.
     fn is(&self, header: &str) -> bool {
         !self.is_left_out && self.header == header
     }
@@ -137,13 +137,13 @@ impl Section {
         &self.header
     }
 
-    /// Add a comment in front.
+    /// Add a comment line before the section.
     pub fn comment(&mut self, comment: impl Into<String>) -> &mut Self {
         self.comments.push(comment.into());
         self
     }
 
-    /// The value of a key.
+    /// Return the value of a key.
     pub fn get(&self, key: &str) -> Option<&Value> {
         let (_, value) = self.lines.iter().find(|(known, _)| known == key)?;
         Some(value)
@@ -160,21 +160,21 @@ impl Section {
     }
 }
 
-/// The deck that an import writes.
+/// The new deck of an import.
 #[derive(Debug, Default)]
 pub struct Draft {
-    /// Keys in front of all sections.
+    /// Keys before all sections.
     top: Vec<(String, Value)>,
     sections: Vec<Section>,
 }
 
 impl Draft {
-    /// Set a key in front of all sections.
+    /// Set a key before all sections.
     pub fn top(&mut self, key: &str, value: Value) {
         self.top.push((key.to_owned(), value));
     }
 
-    /// Test whether a key in front of all sections is set.
+    /// Test whether a key before all sections is set.
     pub fn has_top(&self, key: &str) -> bool {
         self.top.iter().any(|(known, _)| known == key)
     }
@@ -184,7 +184,7 @@ impl Draft {
         self.sections.push(section);
     }
 
-    /// The section with a header, which is added if it is missing.
+    /// Return the section with a header; add the section if it is missing.
     pub fn section(&mut self, header: &str) -> &mut Section {
         let found = self.sections.iter().position(|section| section.is(header));
         let index = found.unwrap_or_else(|| {
@@ -208,7 +208,7 @@ impl Draft {
         })
     }
 
-    /// Write a comment in place of a section that is left out.
+    /// Write a comment in place of a section that the import cannot translate.
     pub fn leave_out(&mut self, header: &str, why: &str) {
         let mut section = Section::new(header);
         section.comment(format!("left out: [{header}] {why}"));
@@ -216,7 +216,7 @@ impl Draft {
         self.sections.push(section);
     }
 
-    /// The text of the deck with comments in front: `heading`, then the list of keys.
+    /// Return the text of the deck. It starts with the comments of `heading` and the list of keys.
     pub fn text(&self, heading: &[String], entries: &[Entry]) -> String {
         let mut text = String::new();
         let comment = |text: &mut String, line: &str| {
@@ -261,12 +261,12 @@ impl Draft {
     }
 }
 
-/// A text without characters that a comment must not have.
+/// Replace control characters, which a comment must not contain.
 fn printable(text: &str) -> String {
     text.replace(char::is_control, " ")
 }
 
-/// A value as TOML.
+/// Return a value as TOML.
 fn written(value: &Value) -> String {
     match value {
         Value::Number(text) => text.clone(),
@@ -297,7 +297,7 @@ fn written(value: &Value) -> String {
     }
 }
 
-/// A text as a basic string of TOML.
+/// Return a text as a basic string of TOML.
 fn quoted(text: &str) -> String {
     let mut quoted = "\"".to_owned();
     for c in text.chars() {

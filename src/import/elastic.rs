@@ -5,7 +5,7 @@ use super::translation::Translation;
 use super::tree::Node;
 use crate::error::Result;
 
-/// The names of the constants in other decks and here.
+/// Names of the constants in source decks and in the new deck.
 const NAMES: [(&str, &str); 5] = [
     ("Young's Modulus", "youngs_modulus"),
     ("Poisson's Ratio", "poisson_ratio"),
@@ -14,10 +14,10 @@ const NAMES: [(&str, &str); 5] = [
     ("Youngs Modulus", "youngs_modulus"),
 ];
 
-/// The constants that a material gives.
+/// The elastic constants of a material.
 #[derive(Debug, Clone, Default)]
 pub struct Constants {
-    /// New key, value and text.
+    /// Per constant: key in the new deck, number, and value to write.
     given: Vec<(&'static str, f64, Value)>,
 }
 
@@ -25,7 +25,7 @@ impl Constants {
     /// Read the constants of a material.
     ///
     /// # Errors
-    /// On a constant that is no number.
+    /// If a constant is not a number.
     pub fn read(translation: &Translation, material: &Node) -> Result<Self> {
         let mut given = Vec::new();
         for (name, key) in NAMES {
@@ -40,7 +40,7 @@ impl Constants {
         Ok(Self { given })
     }
 
-    /// Constants by their values.
+    /// Create constants from numbers.
     pub fn of(given: &[(&'static str, f64)]) -> Self {
         let with_value = |(key, value): &(&'static str, f64)| (*key, *value, Value::number(*value));
         Self {
@@ -48,7 +48,7 @@ impl Constants {
         }
     }
 
-    /// The value of a constant.
+    /// Return the number of a constant.
     fn get(&self, key: &str) -> Option<f64> {
         let (_, value, _) = self.given.iter().find(|(known, ..)| *known == key)?;
         Some(*value)
@@ -59,7 +59,7 @@ impl Constants {
         self.given.len()
     }
 
-    /// Bulk and shear modulus of the solid in space, Pa, if two constants give them.
+    /// Return bulk and shear modulus of the solid in 3-D, Pa, if two constants determine these.
     pub fn moduli(&self) -> Option<[f64; 2]> {
         let get = |key| self.get(key);
         let of_young = |e: f64, nu: f64| [e / (3.0 * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))];
@@ -76,15 +76,15 @@ impl Constants {
         })
     }
 
-    /// Write two constants.
+    /// Write the first two constants.
     pub fn write_two(&self, section: &mut Section) {
         for (key, _, value) in self.given.iter().take(2) {
             section.set(*key, value.clone());
         }
     }
 
-    /// Write the one constant of a bond-based law: Young's modulus, or the bulk modulus. `factor` gives Young's
-    /// modulus from a bulk modulus, where this is not that of the solid in space.
+    /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. If the bulk modulus
+    /// is not that of the solid in 3-D, Young's modulus is `factor` times the bulk modulus.
     pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {

@@ -1,34 +1,34 @@
-//! Expressions of other codes, rewritten in the grammar of this one.
+//! Translation of expressions of other codes into Fissure's grammar.
 //!
-//! Peridigm has statements of C, such as `if(t<=1){value=2*t;} else{value=2;}`. PeriLab has Julia, and the short form
-//! `if t>2 0 else 20 end`. LAMMPS has formulas of variables.
+//! Peridigm uses statements of C, such as `if(t<=1){value=2*t;} else{value=2;}`. PeriLab uses Julia, and the
+//! short form `if t>2 0 else 20 end`. LAMMPS uses formulas of variables.
 
 use crate::expression::{Expression, Variable};
 
-/// Maximum depth of parentheses and blocks.
+/// Maximum nesting depth of parentheses and blocks.
 const DEEPEST: usize = 48;
 
-/// Maximum length of a result, bytes.
+/// Maximum length of a translated expression, bytes.
 const LONGEST: usize = 4096;
 
-/// How an expression is written.
+/// Source language of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dialect {
-    /// Statements of C that set `value`.
+    /// C statements that set `value`.
     Peridigm,
     /// Julia.
     PeriLab,
-    /// A formula of a variable.
+    /// A formula of a LAMMPS variable.
     Lammps,
 }
 
-/// What the names of a code's expression become; `None` leaves a name as it is.
+/// Translation of names in an expression; `None` keeps the name.
 pub type Names<'a> = &'a dyn Fn(&str) -> Option<String>;
 
-/// Rewrite an expression.
+/// Translate an expression.
 ///
 /// # Errors
-/// If the result would be no expression of these variables; the message says why.
+/// If the result is not an expression of these variables; `Err` holds a message.
 pub fn rewrite(
     text: &str,
     dialect: Dialect,
@@ -50,7 +50,7 @@ pub fn rewrite(
     }
     match Expression::parse(&result, &|_| None, &[], variables) {
         Ok(expression) => Ok(match expression.as_constant() {
-            // A plain number stays as it is written.
+            // A plain number keeps its notation.
             Some(value) if result.parse::<f64>().is_err() => format!("{value:?}"),
             _ => result,
         }),
@@ -58,7 +58,7 @@ pub fn rewrite(
     }
 }
 
-/// A piece of an expression.
+/// A token of an expression.
 #[derive(Debug, Clone, PartialEq)]
 enum Token {
     Number(String),
@@ -72,7 +72,7 @@ const SYMBOLS: [&str; 27] = [
     "!", "=", ";", "{", "}", "?", ":", "&", "|", "≤",
 ];
 
-/// Split an expression.
+/// Split an expression into tokens.
 fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
     let mut tokens = Vec::new();
     let mut rest = text.trim_start();
@@ -90,7 +90,8 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
             tokens.push(Token::Symbol(symbol));
             symbol.len()
         } else if first == '\\' || (first == '.' && dialect == Dialect::PeriLab) {
-            // Braces are escaped in parameter lists; Julia marks operations on arrays by dots.
+            // Skip: parameter lists escape braces with a backslash, and Julia marks operations on arrays with
+            // dots.
             1
         } else {
             return Err(format!("unexpected character `{}`", first.escape_debug()));
@@ -100,7 +101,7 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
     Ok(tokens)
 }
 
-/// Length of the number that a text starts with, or 0.
+/// Return the length of the number at the start of a text, or 0.
 fn number_length(text: &[u8]) -> usize {
     let digits = |from: usize| {
         text[from.min(text.len())..]
@@ -134,12 +135,12 @@ fn is_name(token: &Token, name: &str) -> bool {
     matches!(token, Token::Name(text) if text == name)
 }
 
-/// Test whether an expression of Peridigm sets `value` by statements.
+/// Test whether an expression of Peridigm contains statements that set `value`.
 fn has_statements(tokens: &[Token]) -> bool {
     tokens.iter().any(|token| is_name(token, "value"))
 }
 
-/// Index of the symbol that closes the one at `start`.
+/// Return the index of the symbol that closes the symbol at `start`.
 fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
     let (open, close) = match &tokens[start] {
         Token::Symbol("{") => ("{", "}"),
@@ -159,7 +160,7 @@ fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
     Err(format!("`{open}` is not closed"))
 }
 
-/// What a function becomes: `$1`, `$2`, `$3` stand for its arguments.
+/// Return the translation of a function; `$1`, `$2`, `$3` are placeholders for its arguments.
 fn template(dialect: Dialect, name: &str, arguments: usize) -> Option<&'static str> {
     Some(match (dialect, name, arguments) {
         (_, "pow", 2) => "(($1)^($2))",
@@ -181,7 +182,7 @@ struct Rewriter<'a> {
 }
 
 impl Rewriter<'_> {
-    /// The value that statements leave in `value`.
+    /// Return the expression that all statements assign to `value`.
     fn statements(&self, tokens: &[Token]) -> Result<String, String> {
         let (value, end) = self.block(tokens, 0, None, 0)?;
         if end < tokens.len() {
@@ -190,7 +191,8 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// The value after the statements from `at` to the end or a `}`, and the index behind them.
+    /// Translate the statements from `at` to the end or a `}`. Return the new `value` and the index after the
+    /// last statement.
     fn block(
         &self,
         tokens: &[Token],
@@ -211,7 +213,7 @@ impl Rewriter<'_> {
         Ok((value, at))
     }
 
-    /// The value after the statement at `at`, and the index behind it.
+    /// Translate the statement at `at`. Return the new `value` and the index after the statement.
     fn statement(
         &self,
         tokens: &[Token],
@@ -256,7 +258,7 @@ impl Rewriter<'_> {
         Ok((Some(set), end))
     }
 
-    /// As [`statement`](Self::statement), of a block in braces or one statement.
+    /// Same as [`statement`](Self::statement), for a block in braces or one statement.
     fn body(
         &self,
         tokens: &[Token],
@@ -280,7 +282,7 @@ impl Rewriter<'_> {
         }
     }
 
-    /// A formula in which `value` has an earlier value.
+    /// Translate a formula in which `value` stands for its earlier expression.
     fn with_value(
         &self,
         tokens: &[Token],
@@ -298,7 +300,7 @@ impl Rewriter<'_> {
         rewriter.formula(tokens, depth)
     }
 
-    /// A formula of Julia: `if a b else c end`, `a ? b : c`, or a plain one.
+    /// Translate a Julia formula: `if a b else c end`, `a ? b : c`, or one without a choice.
     fn choice(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());
@@ -341,7 +343,7 @@ impl Rewriter<'_> {
         self.formula(tokens, depth)
     }
 
-    /// Where the condition of `if a b` ends: at the first operand that follows another one.
+    /// Find the end of the condition in `if a b`: two operands in sequence separate condition and result.
     fn condition_end(&self, tokens: &[Token]) -> Option<usize> {
         let mut level = 0_i64;
         for (index, pair) in tokens.windows(2).enumerate() {
@@ -363,7 +365,7 @@ impl Rewriter<'_> {
         None
     }
 
-    /// A formula.
+    /// Translate a formula without a choice.
     fn formula(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());
@@ -407,7 +409,7 @@ impl Rewriter<'_> {
         Ok(text)
     }
 
-    /// A call of a function.
+    /// Translate a function call.
     fn call(&self, name: &str, tokens: &[Token], depth: usize) -> Result<String, String> {
         let mut arguments = vec![Vec::new()];
         let mut level = 0_i64;
@@ -453,7 +455,7 @@ mod tests {
         rewrite(text, dialect, &|_| None, &POSITION_AND_TIME)
     }
 
-    /// The value at x = 0.3, y = −2, z = 5, t = 1.5.
+    /// Evaluate at x = 0.3, y = −2, z = 5, t = 1.5.
     fn value(text: &str, dialect: Dialect) -> f64 {
         let text = rewritten(text, dialect).unwrap();
         Expression::of(&text)

@@ -1,4 +1,4 @@
-//! Files that an imported deck names: their paths, and what the import needs to know of them.
+//! Files that a source deck names: their paths, and the data that the import reads from them.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -7,10 +7,10 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::points::columns::{Columns, entries, heading, is_comment};
 
-/// The path of a file as seen from another folder, with `/` between its parts.
+/// Return the path of a file relative to a folder, with `/` between its parts.
 pub fn relative(file: &Path, folder: &Path) -> PathBuf {
     let absolute = |path: &Path| {
-        // No path at all is the working directory.
+        // The empty path is the working directory.
         let path = if path.as_os_str().is_empty() {
             Path::new(".")
         } else {
@@ -31,7 +31,7 @@ pub fn relative(file: &Path, folder: &Path) -> PathBuf {
     up.chain(file.components().skip(common)).collect()
 }
 
-/// A path without `.` and `..`, as far as its text tells.
+/// Remove `.` and `..` from a path, without access to the file system.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for component in path.components() {
@@ -46,19 +46,20 @@ fn plain(path: &Path) -> PathBuf {
     plain
 }
 
-/// What the import needs to know of a point file.
+/// Summary of a point file.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PointFile {
-    /// Names of its columns, if a header gives them.
+    /// Column names, if the file has a header.
     pub names: Option<Vec<String>>,
-    /// Block numbers of its rows.
+    /// Block numbers in the file.
     pub blocks: BTreeSet<u32>,
-    /// Number of its rows.
+    /// Number of rows with points.
     pub rows: u64,
 }
 
 impl PointFile {
-    /// Read a point file; `order` are its columns if it has no header. Rows that are no points do not count.
+    /// Read a point file; `order` gives the columns of a file without header. Rows that are not points are
+    /// not counted.
     ///
     /// `None` if the file cannot be read.
     pub fn read(path: &Path, order: &[&str]) -> Option<Self> {
@@ -67,7 +68,7 @@ impl PointFile {
             Some(heading) => heading.names.clone(),
             None => order.iter().map(|name| (*name).to_owned()).collect(),
         };
-        // The coordinates do not count here, nor their number.
+        // Only the block column matters here, so the number of coordinates is arbitrary.
         let columns = Columns::named(&names, 1).ok();
         let mut file = Self {
             names: heading.as_ref().map(|heading| heading.names.clone()),
@@ -92,7 +93,7 @@ impl PointFile {
         Some(file)
     }
 
-    /// Number of coordinates that the header names.
+    /// Number of coordinates in the header.
     pub fn dimension(&self) -> Option<usize> {
         let names = self.names.as_ref()?;
         let has = |name: &str| names.iter().any(|known| known.eq_ignore_ascii_case(name));

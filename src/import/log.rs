@@ -1,4 +1,4 @@
-//! What became of each key of an imported deck.
+//! The log of an import: the outcome of each key of the source deck.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -7,14 +7,14 @@ use std::fmt;
 use super::tree::{Content, Node, is_key};
 use crate::error::excerpt;
 
-/// What became of a key.
+/// Outcome of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// The new deck says the same.
+    /// The new deck has the same meaning.
     Taken,
-    /// The new deck says something similar.
+    /// The new deck has a similar meaning.
     Approximated,
-    /// The new deck does not say it.
+    /// The new deck lacks the meaning of this key.
     LeftOut,
 }
 
@@ -28,23 +28,23 @@ impl fmt::Display for Fate {
     }
 }
 
-/// A key of the imported deck and what became of it.
+/// A key of the source deck and its outcome.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
     /// Line, from 1.
     pub line: usize,
-    /// The keys from the top of the deck, or the command.
+    /// Path of keys from the top of the deck, or the command.
     pub key: String,
-    /// Its value; empty for a table.
+    /// Value of the key; empty for a table.
     pub value: String,
-    /// What became of it.
+    /// Outcome of the key.
     pub fate: Fate,
-    /// The new key, or why it is left out.
+    /// The key in the new deck, or the reason for leaving it out.
     pub note: String,
 }
 
 impl fmt::Display for Entry {
-    /// As one line.
+    /// Format the entry on one line.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             line,
@@ -61,18 +61,18 @@ impl fmt::Display for Entry {
     }
 }
 
-/// Styles of the fixes of a script that are loads or supports.
+/// Styles of LAMMPS fixes that are loads or supports.
 pub(super) const LOADS_OF_SCRIPTS: [&str; 8] = [
     "addforce", "aveforce", "efield", "gravity", "indent", "move", "setforce", "spring",
 ];
 
-/// The note of a damage model that no block names.
+/// Log note for a damage model that no block uses.
 pub(super) const UNUSED_DAMAGE: &str = "no block uses this damage model";
 
-/// The key of the bonds between blocks.
+/// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
-/// What is left out and changes the results, by lines.
+/// Lines of keys that are left out and change the results.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.
@@ -84,14 +84,14 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// Those among the keys of a deck.
+    /// Collect the losses of a deck.
     pub(super) fn of(entries: &[Entry]) -> Self {
         let mut losses = Self::default();
         let lost = entries
             .iter()
             .filter(|entry| entry.fate == Fate::LeftOut && entry.note != UNUSED_DAMAGE);
         for entry in lost {
-            // A fix of a script: its name, group and style.
+            // The arguments of a LAMMPS fix are its name, group and style.
             let style = entry.value.split_whitespace().nth(2).unwrap_or("");
             if entry.key == "fix" && LOADS_OF_SCRIPTS.contains(&style) {
                 losses.conditions.push(entry.line);
@@ -119,7 +119,7 @@ impl Losses {
         losses
     }
 
-    /// Test whether nothing is lost.
+    /// Test whether no key is lost.
     pub fn is_empty(&self) -> bool {
         self.conditions.is_empty() && self.damages.is_empty() && self.bonds.is_empty()
     }
@@ -165,16 +165,16 @@ impl fmt::Display for Losses {
     }
 }
 
-/// The fates of the nodes of a tree, by their ids.
+/// Outcomes of the nodes of a tree, by node id.
 #[derive(Debug, Default)]
 pub(super) struct Log {
     fates: RefCell<HashMap<usize, (Fate, String)>>,
-    /// Tables whose fate is that of all their keys.
+    /// Tables whose outcome holds for all their keys.
     whole: RefCell<HashSet<usize>>,
 }
 
 impl Log {
-    /// Note what became of a node. Notes about the same node are joined; a loss outweighs `Taken`.
+    /// Log the outcome of a node. Notes for the same node are joined; the worse outcome holds.
     pub(super) fn note(&self, node: &Node, fate: Fate, note: impl Into<String>) {
         let mut fates = self.fates.borrow_mut();
         match fates.get_mut(&node.id) {
@@ -193,33 +193,33 @@ impl Log {
         }
     }
 
-    /// Note what became of a node in place of what was noted before.
+    /// Log the outcome of a node and discard earlier notes.
     pub(super) fn replace(&self, node: &Node, fate: Fate, note: impl Into<String>) {
         self.fates.borrow_mut().insert(node.id, (fate, note.into()));
     }
 
-    /// Note what became of a table with all its keys, which are not listed one by one.
+    /// Log the outcome of a table and all its keys; the keys are not listed separately.
     pub(super) fn whole(&self, table: &Node, fate: Fate, note: impl Into<String>) {
         self.note(table, fate, note);
         self.whole.borrow_mut().insert(table.id);
     }
 
-    /// Note that the new deck says the same as a node.
+    /// Log that the new deck has the same meaning as a node.
     pub(super) fn taken(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Taken, note);
     }
 
-    /// Note that the new deck says something similar.
+    /// Log that the new deck has a similar meaning.
     pub(super) fn approximated(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Approximated, note);
     }
 
-    /// Note that the new deck does not say what a node says.
+    /// Log that the new deck lacks the meaning of a node.
     pub(super) fn left_out(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// The fates of all keys of a tree in the order of the text. A key that nothing was noted about is left out.
+    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note is left out.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);
@@ -250,7 +250,7 @@ impl Log {
             fate,
             note,
         });
-        // A table that is left out as a whole is one line.
+        // A table that is left out completely is one entry.
         if fate != Fate::LeftOut && !self.whole.borrow().contains(&node.id) {
             for (name, child) in children {
                 self.collect(child, &format!("{key} > {name}"), entries);
@@ -259,7 +259,7 @@ impl Log {
     }
 }
 
-/// Why keys that no translator reads are left out: a word of their keys, and the reason.
+/// Reasons for leaving out keys that no translator reads: a word in the key, and the reason.
 const REASONS: [(&str, &str); 11] = [
     ("verbose", "concerns what the code prints"),
     ("pre calculation", "what a law needs is computed"),
@@ -274,14 +274,14 @@ const REASONS: [(&str, &str); 11] = [
     ("preconditioner", "concerns a solver of linear systems"),
 ];
 
-/// Why a key that no translator reads is left out.
+/// Return the reason for leaving out a key that no translator reads.
 fn reason(key: &str) -> &'static str {
     let key = key.to_lowercase().replace('_', " ");
     let known = REASONS.iter().find(|(word, _)| key.contains(word));
     known.map_or("unknown, or without a counterpart", |(_, reason)| reason)
 }
 
-/// The value of a node for a list.
+/// Return the value of a node for the list of keys.
 fn value(node: &Node) -> String {
     match &node.content {
         Content::Text(text) => shown(text),
@@ -293,7 +293,7 @@ fn value(node: &Node) -> String {
     }
 }
 
-/// A value on one line, shortened.
+/// Return a value on one line, shortened.
 fn shown(text: &str) -> String {
     let text = text.trim();
     if text.is_empty() {

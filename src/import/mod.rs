@@ -1,8 +1,8 @@
-//! Decks of other codes, translated into decks of this one: `fissure import`.
+//! Translation of decks of other codes into Fissure decks: `fissure import`.
 //!
-//! A deck becomes a tree of parameters (`tree`), or a list of commands (`script`). A translator per code reads it,
-//! notes what becomes of every key in a [log], and fills a `draft`, which is written as TOML. A key that no translator
-//! knows is listed as left out.
+//! A source deck becomes a tree of parameters (`tree`) or a list of commands (`script`). One translator per
+//! code reads it. The translator logs the outcome of every key in a [log], and fills a `draft` of the new
+//! deck, which is written as TOML. Keys that no translator reads are logged as left out.
 
 mod bodies;
 mod bond_filters;
@@ -36,7 +36,7 @@ use log::{Entry, Fate, Losses};
 use translation::{Translation, line_error};
 use tree::Node;
 
-/// A code whose decks are read.
+/// A code whose decks can be imported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Code {
     /// Peridigm, in YAML or XML.
@@ -60,18 +60,18 @@ impl fmt::Display for Code {
 /// A translated deck.
 #[derive(Debug, Clone)]
 pub struct Import {
-    /// The code that the deck is of.
+    /// Code of the source deck.
     pub code: Code,
-    /// The text of the new deck.
+    /// Text of the new deck.
     pub text: String,
-    /// What became of each key.
+    /// Outcome of each key.
     pub entries: Vec<Entry>,
-    /// Why the new deck is not valid yet, if it is not.
+    /// Error of the new deck, if it is not valid yet.
     pub fault: Option<Error>,
 }
 
 impl Import {
-    /// Number of keys with a fate.
+    /// Number of keys with an outcome.
     pub fn count(&self, fate: Fate) -> usize {
         self.entries
             .iter()
@@ -79,25 +79,26 @@ impl Import {
             .count()
     }
 
-    /// What is left out and changes the results.
+    /// Keys that are left out and change the results.
     pub fn losses(&self) -> Losses {
         Losses::of(&self.entries)
     }
 }
 
-/// Translate a deck; `target` is the path of the new one, from which its files are named. The code is found from the
-/// text if it is not given.
+/// Translate the deck at `path`. `target` is the path of the new deck, to which file names are relative.
+/// Without `code` the code is detected from the text.
 ///
 /// # Errors
-/// If the file cannot be read, is of no known code, or lacks what a run needs; the message gives file and line.
+/// If the file cannot be read, the code is unknown, or the deck lacks data that a run needs. The message
+/// gives file and line.
 pub fn import(path: &Path, code: Option<Code>, target: &Path) -> Result<Import> {
     translate(&Source::read(path)?, code, target)
 }
 
-/// As [`import`], of a text.
+/// Same as [`import`], for a text.
 ///
 /// # Errors
-/// As [`import`].
+/// Same as [`import`].
 pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<Import> {
     if code.map_or_else(
         || script::is_script(&source.text),
@@ -123,7 +124,7 @@ pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<I
     let parsed = if is_xml {
         xml::parse(text)
     } else {
-        // Braces of statements are escaped in decks of Peridigm, which is no escape of YAML.
+        // Decks of Peridigm escape the braces of statements, which YAML does not allow.
         yaml::parse(&text.replace("\\{", "{").replace("\\}", "}"))
     };
     let root = parsed.map_err(|(line, message)| line_error(source, line, message))?;
@@ -148,7 +149,7 @@ pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<I
     Ok(finish(translation, &root, code, target))
 }
 
-/// Write the new deck and look whether it is valid.
+/// Write the new deck and check whether it is valid.
 fn finish(translation: Translation, root: &Node, code: Code, target: &Path) -> Import {
     let entries = translation.log.entries(root);
     let name = translation.source.path.file_name().unwrap_or_default();

@@ -8,7 +8,7 @@ use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::Result;
 
-/// Output variables: their names, the field, and how the field differs.
+/// Output variables: name, name of the field, and how the field differs from the variable.
 const FIELDS: [(&str, &str, &str); 33] = [
     ("Displacement", "displacement", ""),
     ("Displacements", "displacement", ""),
@@ -65,7 +65,7 @@ const FIELDS: [(&str, &str, &str); 33] = [
     ),
 ];
 
-/// Output variables that need no field.
+/// Output variables that need no field, and the reason.
 const ALWAYS: [(&str, &str); 8] = [
     ("Element Id", "`id` is always there"),
     ("Block Id", "`block` is always there"),
@@ -77,7 +77,7 @@ const ALWAYS: [(&str, &str); 8] = [
     ("Deformed Coordinates", "coordinates and displacement"),
 ];
 
-/// Variables of the whole run that the history always has.
+/// Global variables that the history always contains.
 const GLOBALS: [(&str, &str); 3] = [
     (
         "Global Kinetic Energy",
@@ -93,29 +93,29 @@ const GLOBALS: [(&str, &str); 3] = [
     ),
 ];
 
-/// Why temperatures are left out.
+/// Reason for leaving out temperatures.
 pub(super) const NO_TEMPERATURE: &str = "no temperature acts on a material that expands";
 
-/// Words for the parts of tensors behind a name, such as `Cauchy_StressXX`.
+/// Suffixes for the components of tensors, such as `Cauchy_StressXX`.
 const TENSOR_PARTS: [&str; 9] = ["XX", "XY", "XZ", "YX", "YY", "YZ", "ZX", "ZY", "ZZ"];
 
-/// How often outputs are written.
+/// Interval of outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Interval {
-    /// Steps between outputs.
+    /// Number of steps between outputs.
     Steps(u64),
-    /// Outputs in the run.
+    /// Number of outputs in the run.
     Number(u64),
 }
 
-/// The field for an output variable, as the table of fields has it.
+/// The field of an output variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FieldOf {
-    /// Its name.
+    /// Name of the field.
     pub(super) name: &'static str,
-    /// How the variable differs from it; empty if it does not.
+    /// How the field differs from the variable; empty if both are equal.
     pub(super) difference: &'static str,
-    /// The component of a tensor that the variable names, in upper case.
+    /// Tensor component that the variable selects, in upper case.
     pub(super) part: Option<&'static str>,
 }
 
@@ -137,43 +137,43 @@ pub(super) fn field_of(variable: &str) -> Option<FieldOf> {
     })
 }
 
-/// What an output variable is.
+/// Kind of an output variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// A field of the result.
     Field,
     /// A column of the history.
     Global,
-    /// Neither.
+    /// Neither field nor column.
     Other,
 }
 
-/// An interval of the deck and its key.
+/// An interval of the source deck with its node.
 struct Frequency {
     interval: Interval,
     node: Node,
-    /// The output has fields.
+    /// Whether the output contains fields.
     has_fields: bool,
 }
 
-/// The outputs of a deck so far.
+/// The outputs that have been read.
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
-    /// The interval of each output with fields, or without variables.
+    /// Interval of each output with fields, or without variables.
     intervals: Vec<Frequency>,
-    /// The interval of each output with columns of the history only.
+    /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,
-    /// Materials expand by prescribed temperatures, so points have some.
+    /// Whether points have temperatures, because materials expand by prescribed temperatures.
     has_temperature: bool,
-    /// Names of computed quantities and what became of them.
+    /// Computed quantities: name, outcome and note.
     computed: Vec<(String, Fate, String)>,
     reactions: Vec<String>,
     angular_momentum: bool,
 }
 
 impl Outputs {
-    /// No outputs; `has_temperature` if points have temperatures.
+    /// Create an empty list; `has_temperature` if points have temperatures.
     pub fn new(has_temperature: bool) -> Self {
         Self {
             has_temperature,
@@ -181,10 +181,11 @@ impl Outputs {
         }
     }
 
-    /// Read a table of computed quantities. The key `Output Label` names a quantity, which else has the name of its table.
+    /// Read a table of computed quantities. The name of a quantity is its key `Output Label`, or else the
+    /// name of its table.
     ///
     /// # Errors
-    /// If a position is no number, or a set is unknown.
+    /// If a position is not a number, or a set is unknown.
     pub fn computed(
         &mut self,
         translation: &mut Translation,
@@ -210,10 +211,10 @@ impl Outputs {
         Ok(())
     }
 
-    /// Read an output: its variables and interval. Peridigm counts every step of an output without frequency.
+    /// Read an output: its variables and interval. Without a frequency, Peridigm writes every step.
     ///
     /// # Errors
-    /// If the frequency is no number.
+    /// If the frequency is not a number.
     pub fn output(&mut self, translation: &Translation, node: &Node) -> Result<()> {
         let log = &translation.log;
         let (mut has_fields, mut has_globals) = (false, false);
@@ -238,7 +239,7 @@ impl Outputs {
             let Some(interval) = node.get(key) else {
                 continue;
             };
-            // A step of PeriLab can have a number of its own; the first one counts.
+            // PeriLab allows one number per solver step; the first number is used.
             let text = translation.text(interval, key)?;
             let first = text
                 .split_whitespace()
@@ -291,7 +292,8 @@ impl Outputs {
         Ok(())
     }
 
-    /// The largest interval of the outputs, of those with fields if any has. The others are listed.
+    /// Return the largest interval of the outputs; outputs with fields take precedence. Other intervals are
+    /// logged.
     fn interval(&self, translation: &Translation) -> Option<Interval> {
         let with_fields = self.intervals.iter().any(|frequency| frequency.has_fields);
         let candidates = self.intervals.iter();
@@ -312,7 +314,8 @@ impl Outputs {
         Some(largest.interval)
     }
 
-    /// The smallest interval of the outputs with columns of the history only. The others are listed.
+    /// Return the smallest interval of the outputs that contain only columns of the history. Other intervals
+    /// are logged.
     fn history_interval(&self, translation: &Translation) -> Option<Interval> {
         let all = self.history_intervals.iter();
         let smallest = all.reduce(|a, b| if is_longer(a, b) { b } else { a })?;
@@ -325,7 +328,7 @@ impl Outputs {
         Some(smallest.interval)
     }
 
-    /// What an output variable is, and what becomes of it.
+    /// Return kind, outcome and note of an output variable.
     fn variable(&mut self, translation: &Translation, name: &str) -> (Kind, Fate, String) {
         let mut computed = self.computed.iter();
         if let Some((_, fate, note)) = computed.find(|(label, ..)| is_key(label, name)) {
@@ -363,7 +366,7 @@ impl Outputs {
         }
     }
 
-    /// Write the sections; `length` is that of the run, s.
+    /// Write the output sections; `length` is the duration of the run, s.
     pub fn finish(self, translation: &mut Translation, length: f64) {
         let interval = self.interval(translation);
         let history_interval = self.history_interval(translation);
@@ -389,7 +392,7 @@ impl Outputs {
     }
 }
 
-/// Test whether outputs are further apart than others; intervals of different kinds are not compared.
+/// Test whether the first interval is longer; intervals of different kinds are not compared.
 fn is_longer(one: &Frequency, other: &Frequency) -> bool {
     match (one.interval, other.interval) {
         (Interval::Steps(a), Interval::Steps(b)) => a > b,
@@ -398,7 +401,7 @@ fn is_longer(one: &Frequency, other: &Frequency) -> bool {
     }
 }
 
-/// Write an interval into a section of outputs.
+/// Write an interval to an output section.
 fn set_interval(section: &mut Section, interval: Option<Interval>, length: f64) {
     match interval {
         Some(Interval::Steps(steps)) => {

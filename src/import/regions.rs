@@ -3,29 +3,29 @@
 use super::draft::Value;
 use super::script::Variables;
 
-/// Fraction of the spacing by which a shape is larger than a region: LAMMPS counts atoms on the surface, which would
-/// be lost by round-off.
+/// Enlargement of a shape over its region, as a fraction of the spacing. LAMMPS includes atoms on the
+/// surface, which round-off could exclude.
 const MARGIN: f64 = 1e-6;
 
 /// A region with numbers in distance units.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Region {
-    /// Lower and upper corner; infinite where the region has no end.
+    /// Lower and upper corner; infinite where the region is unbounded.
     Block([f64; 3], [f64; 3]),
     /// Axis, the other two coordinates of the axis, radius, lower and upper end.
     Cylinder(usize, [f64; 2], f64, [f64; 2]),
     /// Centre and radius.
     Sphere([f64; 3], f64),
-    /// What lies in one of them.
+    /// Points in at least one of the regions.
     Union(Vec<Region>),
-    /// What lies in the first and in none of the others.
+    /// Points in the first region and in none of the others.
     Difference(Vec<Region>),
 }
 
-/// The region of the arguments behind its name; `spacing` is that of the lattice.
+/// Read a region from the arguments after its name; `spacing` is that of the lattice.
 ///
 /// # Errors
-/// If it is of another style, or a number is none.
+/// If the style is unknown, or an argument is not a number.
 pub fn region(
     variables: &Variables,
     arguments: &[&str],
@@ -49,7 +49,7 @@ pub fn region(
     let number = |k: usize| -> Result<f64, String> {
         match *rest.get(k).ok_or("a number is missing")? {
             "INF" | "EDGE" => {
-                // Lower ends stand at even places of a block, the last but one of a cylinder.
+                // Lower bounds are the even arguments of a block, and argument 4 of a cylinder.
                 let is_lower = match style {
                     "block" => k.is_multiple_of(2),
                     _ => k == 4,
@@ -104,7 +104,7 @@ pub fn region(
 }
 
 impl Region {
-    /// The corners of a box around it.
+    /// Return the corners of a bounding box.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         match self {
             Self::Block(lower, upper) => [*lower, *upper],
@@ -136,7 +136,7 @@ impl Region {
         }
     }
 
-    /// The region without infinite ends, cut to a box.
+    /// Replace infinite bounds by those of a box.
     pub fn within(&self, bounds: [[f64; 3]; 2]) -> Self {
         let clamp = |value: f64, k: usize| {
             if value.is_finite() {
@@ -160,7 +160,7 @@ impl Region {
         }
     }
 
-    /// Test whether all its numbers are finite.
+    /// Test whether all numbers of the region are finite.
     pub fn is_finite(&self) -> bool {
         match self {
             Self::Union(parts) | Self::Difference(parts) => parts.iter().all(Self::is_finite),
@@ -172,7 +172,7 @@ impl Region {
         }
     }
 
-    /// The shape as a table with one key.
+    /// Return the shape as a table with one key.
     pub fn shape(&self, spacing: f64) -> Value {
         let margin = MARGIN * spacing;
         let (name, value) = match self {
@@ -225,7 +225,7 @@ impl Region {
     }
 }
 
-/// The two directions beside an axis, in the order of LAMMPS.
+/// Return the two other directions of an axis, in the order of LAMMPS.
 pub fn others(axis: usize) -> [usize; 2] {
     match axis {
         0 => [1, 2],

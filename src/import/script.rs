@@ -6,50 +6,50 @@ use super::expression::{Dialect, rewrite};
 use super::tree::{Content, MOST_NODES, Mistake, Node};
 use crate::expression::{Expression, Variable};
 
-/// Maximum depth of variables that use others.
+/// Maximum depth of variables that refer to other variables.
 const DEEPEST: usize = 32;
 
 /// Maximum length of a command after substitution, bytes.
 const LONGEST: usize = 1 << 16;
 
-/// A command with its words.
+/// A command with its arguments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Its words, variables replaced, without quotes.
+    /// Words of the command, without quotes and with variables replaced.
     pub words: Vec<String>,
-    /// Its node, to note what becomes of it.
+    /// Node of the command in the log.
     pub node: Node,
 }
 
 impl Command {
-    /// The name of the command.
+    /// Name of the command.
     pub fn name(&self) -> &str {
         &self.words[0]
     }
 
-    /// Its arguments.
+    /// Arguments of the command.
     pub fn arguments(&self) -> Vec<&str> {
         self.words[1..].iter().map(String::as_str).collect()
     }
 }
 
-/// A script.
+/// A LAMMPS input script.
 #[derive(Debug, Default)]
 pub struct Script {
-    /// Its commands in order.
+    /// Commands in order.
     pub commands: Vec<Command>,
 }
 
-/// Variables and time step behind some of the commands of a script.
+/// State of variables and time step at a command of a script.
 #[derive(Debug, Default)]
 pub struct Variables {
     /// Formulas and values by name.
     values: HashMap<String, String>,
-    /// The time step, s, of the last `timestep`.
+    /// Time step of the last `timestep`, s.
     pub step: Option<f64>,
 }
 
-/// Test whether a text is a script of peridynamics.
+/// Test whether a text is a LAMMPS script with peridynamics.
 pub fn is_script(text: &str) -> bool {
     text.lines().any(|line| {
         let mut words = line.split_whitespace();
@@ -57,10 +57,10 @@ pub fn is_script(text: &str) -> bool {
     })
 }
 
-/// Split a script into commands and replace `$` by the values that variables have at each command.
+/// Split a script into commands, and replace each `$` by the value of the variable at this command.
 ///
 /// # Errors
-/// On a quote that is not closed, or a variable that is not defined.
+/// If a quote is not closed, or a variable is not defined.
 pub fn parse(text: &str) -> Result<Script, Mistake> {
     let mut script = Script::default();
     let mut variables = Variables::default();
@@ -81,7 +81,7 @@ pub fn parse(text: &str) -> Result<Script, Mistake> {
     Ok(script)
 }
 
-/// A line without its comment.
+/// Return a line without its comment.
 fn without_comment(row: &str) -> &str {
     let mut quote = None;
     for (index, c) in row.char_indices() {
@@ -95,7 +95,7 @@ fn without_comment(row: &str) -> &str {
     row
 }
 
-/// The words of a line; what stands in quotes is one word.
+/// Split a line into words; a quoted text is one word.
 fn words(text: &str) -> Result<Vec<String>, String> {
     let mut words = Vec::new();
     let mut rest = text.trim_start();
@@ -130,7 +130,7 @@ impl Script {
         if self.commands.len() >= MOST_NODES {
             return Err((line, "the commands are too many".to_owned()));
         }
-        // The command word is the key of its node.
+        // The key of the node is the name of the command.
         let node = Node {
             id: self.commands.len() + 1,
             line,
@@ -144,10 +144,10 @@ impl Script {
 }
 
 impl Variables {
-    /// Take over what a command defines: a variable or the time step.
+    /// Apply the definition of a variable or of the time step.
     ///
     /// # Errors
-    /// If the time step is no number.
+    /// If the time step is not a number.
     pub fn read(&mut self, command: &Command) -> Result<(), String> {
         let words = &command.words;
         match (command.name(), words.len()) {
@@ -159,7 +159,7 @@ impl Variables {
                     "index" | "string" | "getenv" | "loop" | "world" => Some(words[3].clone()),
                     _ => None,
                 };
-                // An index that has a value already keeps it.
+                // An `index` variable that is already defined keeps its value.
                 let keeps = style == "index" && self.values.contains_key(&words[1]);
                 if let (Some(value), false) = (value, keeps) {
                     self.values.insert(words[1].clone(), value);
@@ -170,7 +170,7 @@ impl Variables {
         Ok(())
     }
 
-    /// Replace `$x`, `${name}` and `$(formula)` outside of single quotes.
+    /// Replace `$x`, `${name}` and `$(formula)` outside single quotes.
     fn substitute(&self, text: &str) -> Result<String, String> {
         let mut result = String::new();
         let mut rest = text;
@@ -194,7 +194,7 @@ impl Variables {
                 let (end, _) = end.ok_or("`$(` is not closed")?;
                 let formula = &rest[1..end];
                 rest = &rest[end + 1..];
-                // A format may follow a colon.
+                // A number format may follow a colon.
                 let formula = formula.split(":%").next().unwrap_or(formula);
                 self.constant(formula)?
             } else {
@@ -213,7 +213,7 @@ impl Variables {
         Ok(result)
     }
 
-    /// The value of a variable as text: of a formula, its value.
+    /// Return the value of a variable as text; a formula is evaluated if it is constant.
     fn value(&self, name: &str) -> Result<String, String> {
         let text = self.values.get(name);
         let text = text.ok_or_else(|| format!("the variable `{name}` is not defined"))?;
@@ -223,7 +223,7 @@ impl Variables {
         })
     }
 
-    /// The value of a formula that does not change.
+    /// Evaluate a formula that is constant in time.
     fn constant(&self, formula: &str) -> Result<String, String> {
         if formula.trim().parse::<f64>().is_ok() {
             return Ok(formula.trim().to_owned());
@@ -235,10 +235,10 @@ impl Variables {
         Ok(format!("{value:?}"))
     }
 
-    /// A number: written, or the constant value of a variable `v_name`.
+    /// Return a number: a literal, or the constant value of a variable `v_name`.
     ///
     /// # Errors
-    /// If the word is none.
+    /// If the word is neither.
     pub fn number(&self, word: &str) -> Result<f64, String> {
         let number = word.parse::<f64>().ok().or_else(|| {
             let name = word.strip_prefix("v_")?;
@@ -253,10 +253,10 @@ impl Variables {
         })
     }
 
-    /// A number or the formula of a variable `v_name`, as an expression of time.
+    /// Return a number, or the formula of a variable `v_name` as an expression of time.
     ///
     /// # Errors
-    /// If the variable is unknown, or its formula has no counterpart.
+    /// If the variable is unknown, or its formula cannot be translated.
     pub fn of_time(&self, word: &str) -> Result<String, String> {
         let Some(name) = word.strip_prefix("v_") else {
             self.number(word)?;
@@ -268,7 +268,7 @@ impl Variables {
         self.formula(formula, step, 0)
     }
 
-    /// A formula as an expression of time.
+    /// Translate a formula to an expression of time.
     fn formula(&self, formula: &str, step: f64, depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the variables are too deep, or use themselves".to_owned());
@@ -310,7 +310,7 @@ impl Variables {
 mod tests {
     use super::*;
 
-    /// The variables behind all commands.
+    /// Apply all commands and return the variables.
     fn behind(script: &Script) -> Variables {
         let mut variables = Variables::default();
         for command in &script.commands {

@@ -1,4 +1,4 @@
-//! Sets of points of an imported deck: node sets in the deck, in files and in the mesh.
+//! Node sets of a source deck: in the deck, in files and in the mesh.
 
 use super::draft::{Section, Value};
 use super::expression::Dialect;
@@ -7,27 +7,27 @@ use super::translation::Translation;
 use super::tree::{Content, Node, is_key};
 use crate::error::{Result, excerpt};
 
-/// A node set that the deck defines.
+/// A node set that the source deck defines.
 struct Defined<'n> {
     name: String,
     node: &'n Node,
-    /// Its code reads it as a node set by its name or its place.
+    /// Whether Peridigm or PeriLab treats this entry as a node set, because of its name or position.
     is_declared: bool,
-    /// Name of the set in the new deck, once it is used.
+    /// Name of the set in the new deck; `None` until the first use.
     written: Option<String>,
 }
 
-/// The node sets of a deck.
+/// The node sets of a source deck.
 pub struct Sets<'n> {
     defined: Vec<Defined<'n>>,
-    /// Names in the mesh and in the new deck.
+    /// Sets of the mesh: name in the mesh and name in the new deck.
     of_mesh: Vec<(String, String)>,
-    /// The points come from a mesh, which has node sets too.
+    /// Whether the points come from a mesh, which may have node sets.
     has_mesh: bool,
 }
 
 impl<'n> Sets<'n> {
-    /// No sets; `has_mesh` if the mesh can have some.
+    /// Create an empty collection; `has_mesh` if the mesh may have node sets.
     pub fn new(has_mesh: bool) -> Self {
         Self {
             defined: Vec::new(),
@@ -36,7 +36,8 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Note a node set that the deck defines. One that is not declared is a node set only if something uses it.
+    /// Add a node set of the source deck. An entry that is not declared is a node set only if something uses
+    /// it.
     pub fn define(&mut self, name: &str, node: &'n Node, is_declared: bool) {
         self.defined.push(Defined {
             name: name.to_owned(),
@@ -46,10 +47,10 @@ impl<'n> Sets<'n> {
         });
     }
 
-    /// The set of the new deck for a node set; it is written where it is first used.
+    /// Return the set of the new deck for a node set; write the set at its first use.
     ///
     /// # Errors
-    /// If the deck defines no such set and the mesh cannot have it, or its definition is none.
+    /// If neither the source deck nor the mesh has this set, or its definition is invalid.
     pub fn find(
         &mut self,
         translation: &mut Translation,
@@ -92,7 +93,7 @@ impl<'n> Sets<'n> {
         Ok(written)
     }
 
-    /// Number of points of a set that the deck defines by their numbers.
+    /// Number of points of a set that is defined by point numbers.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
         let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
         let text = set_text(set.node)?;
@@ -105,7 +106,7 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Note the node sets that nothing uses.
+    /// Log the node sets that are unused.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
             if set.written.is_none() && set.is_declared {
@@ -158,7 +159,7 @@ fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<Stri
     Ok(written)
 }
 
-/// The text of a node set: a list of numbers as one text.
+/// Return the text of a node set; a list of numbers is joined to one text.
 fn set_text(node: &Node) -> Option<String> {
     match &node.content {
         Content::Text(text) => Some(text.trim().to_owned()),
@@ -170,9 +171,9 @@ fn set_text(node: &Node) -> Option<String> {
     }
 }
 
-/// The numbers of a list `1 2 3` or a range `1:27`.
+/// Read the numbers of a list `1 2 3` or a range `1:27`.
 fn numbers(text: &str) -> Option<Vec<u64>> {
-    /// Most numbers of a range, which a deck should not list.
+    /// Largest count of a range; longer lists would make the new deck unreadable.
     const MOST: u64 = 1_000_000;
     if let Some((first, last)) = text.split_once(':') {
         let (first, last) = (first.trim().parse().ok()?, last.trim().parse().ok()?);

@@ -5,10 +5,10 @@ use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::{Result, excerpt};
 
-/// Load steps of a deck that has none.
+/// Load steps of a deck that does not give their number.
 const LOAD_STEPS: u64 = 1;
 
-/// Solvers that find equilibria.
+/// Quasi-static solvers.
 const STATIC: [&str; 4] = [
     "QuasiStatic",
     "NOXQuasiStatic",
@@ -16,16 +16,16 @@ const STATIC: [&str; 4] = [
     "Linear Static Matrix Based",
 ];
 
-/// Solvers with explicit steps.
+/// Solvers with explicit time integration.
 const EXPLICIT: [&str; 2] = ["Verlet", "Verlet Matrix Based"];
 
-/// Solvers with implicit steps.
+/// Solvers with implicit time integration.
 const IMPLICIT: [&str; 2] = ["Implicit", "Newmark"];
 
-/// How a part of the run is solved.
+/// Solution method of a stage.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Method {
-    /// Explicit steps.
+    /// Explicit time integration.
     Explicit {
         /// Fixed step, s.
         step: Option<Value>,
@@ -36,25 +36,25 @@ pub enum Method {
     Equilibria(u64),
 }
 
-/// A part of the run.
+/// A stage of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Its end, s, in the time of the deck that is read.
+    /// End of the stage in the time of the source deck, s.
     pub end: f64,
-    /// How it is solved.
+    /// Solution method.
     pub method: Method,
-    /// Number of the step, by which conditions refer to it.
+    /// Number of the step, to which conditions refer.
     pub step_id: Option<u64>,
-    /// The solver's damping per step over the step, 1/s, where the step is known.
+    /// Damping of the solver per step, divided by the time step, 1/s; `None` if the time step is unknown.
     pub damping: Option<f64>,
-    /// Damage models act.
+    /// Whether damage models are active.
     pub breaks: bool,
 }
 
 /// Read the time at which the first solver starts.
 ///
 /// # Errors
-/// If it is no number.
+/// If the time is not a number.
 pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
     let Some(initial) = first.get("Initial Time") else {
         return Ok(());
@@ -70,10 +70,11 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Read a solver that starts at a time, s. A default is that damage models act unless the deck says otherwise.
+/// Read a solver that starts at a time, s. `damage_by_default` holds if the deck does not switch damage
+/// models on or off.
 ///
 /// # Errors
-/// If the end is missing or a key is no number.
+/// If the end is missing or a key is not a number.
 pub fn stage(
     translation: &Translation,
     node: &Node,
@@ -236,7 +237,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Note the keys of a static solver without a counterpart.
+/// Log the keys of a static solver that have no counterpart.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
@@ -255,8 +256,10 @@ fn tolerances(translation: &Translation, solver: &Node) {
     }
 }
 
-/// Write the stages of a run; `conditions` are the names of conditions with the numbers of the steps that they act in,
-/// none for all. Newton's method finds the equilibria of runs without contact, relaxation those of others.
+/// Write the stages of a run.
+///
+/// `conditions` holds the names of conditions and the numbers of their steps; no numbers mean all steps.
+/// Equilibria are found by Newton's method in runs without contact, and by relaxation in runs with contact.
 pub fn write(
     translation: &mut Translation,
     stages: &[Stage],

@@ -1,4 +1,4 @@
-//! An import under way: the deck that is read, what became of its keys, and the deck that is written.
+//! State of an import: the source deck, the log of its keys, and the new deck.
 
 use std::path::{Path, PathBuf};
 
@@ -11,33 +11,33 @@ use crate::deck::Source;
 use crate::error::{Error, Result, excerpt};
 use crate::expression::{POSITION, POSITION_AND_TIME};
 
-/// Longest name of a table; names of decks have at most 64 characters.
+/// Longest name of a table; names in decks have at most 64 characters.
 const LONGEST_NAME: usize = 56;
 
-/// An import under way.
+/// State of an import.
 pub struct Translation<'a> {
-    /// The deck that is read.
+    /// The source deck.
     pub source: &'a Source,
-    /// Folder of the deck that is written.
+    /// Folder of the new deck.
     target: PathBuf,
-    /// How expressions are written.
+    /// Language of the expressions.
     pub dialect: Dialect,
-    /// What became of the keys.
+    /// Outcomes of the keys.
     pub log: Log,
-    /// The deck that is written.
+    /// The new deck.
     pub draft: Draft,
     /// Number of dimensions.
     pub dimension: usize,
-    /// Time of the deck that is read at which the run starts, s.
+    /// Start of the run in the time of the source deck, s.
     pub start: f64,
-    /// Time of the run at which the step of the present condition starts, s.
+    /// Start of the current condition's step in the time of the run, s.
     pub step_start: f64,
-    /// Sections and names of tables: as they are read, and as they are written.
+    /// Names of tables: section, name in the source deck, and name in the new deck.
     names: Vec<(&'static str, String, String)>,
 }
 
 impl<'a> Translation<'a> {
-    /// An import in which nothing is read yet; `target` is the path of the deck that is written.
+    /// Start an import; `target` is the path of the new deck.
     pub fn new(source: &'a Source, target: &Path, dialect: Dialect) -> Self {
         Self {
             source,
@@ -52,33 +52,33 @@ impl<'a> Translation<'a> {
         }
     }
 
-    /// An error about a line of the deck.
+    /// Create an error for a line of the source deck.
     pub fn error(&self, line: usize, message: impl AsRef<str>) -> Error {
         line_error(self.source, line, message)
     }
 
-    /// The value of a required key.
+    /// Return the value of a required key.
     ///
     /// # Errors
-    /// If it is missing.
+    /// If the key is missing.
     pub fn required<'n>(&self, table: &'n Node, key: &str, name: &str) -> Result<&'n Node> {
         let missing = || self.error(table.line, format!("{name} has no `{key}`"));
         table.get(key).ok_or_else(missing)
     }
 
-    /// The text of a value.
+    /// Return the text of a value.
     ///
     /// # Errors
-    /// If it is a list or a table.
+    /// If the value is a list or a table.
     pub fn text<'n>(&self, node: &'n Node, key: &str) -> Result<&'n str> {
         let wrong = || self.error(node.line, format!("`{key}` must be a number or a text"));
         node.text().ok_or_else(wrong)
     }
 
-    /// A number, possibly given by an expression without variables.
+    /// Return a number, which may be given as an expression without variables.
     ///
     /// # Errors
-    /// If the value is none.
+    /// If the value is not a number.
     pub fn number(&self, node: &Node, key: &str) -> Result<f64> {
         let text = self.text(node, key)?;
         let number = text.parse::<f64>().ok().or_else(|| {
@@ -92,10 +92,10 @@ impl<'a> Translation<'a> {
         })
     }
 
-    /// A number as a value of the new deck.
+    /// Return a number as a value of the new deck.
     ///
     /// # Errors
-    /// As [`number`](Self::number).
+    /// Same as [`number`](Self::number).
     pub fn number_value(&self, node: &Node, key: &str) -> Result<Value> {
         let number = self.number(node, key)?;
         let text = self.text(node, key)?;
@@ -105,10 +105,10 @@ impl<'a> Translation<'a> {
         })
     }
 
-    /// A whole number.
+    /// Return a whole number.
     ///
     /// # Errors
-    /// If the value is none.
+    /// If the value is not a whole number.
     pub fn count(&self, node: &Node, key: &str) -> Result<u64> {
         let number = self.number(node, key)?;
         let is_whole = (0.0..1e15).contains(&number) && number.fract() == 0.0;
@@ -120,7 +120,7 @@ impl<'a> Translation<'a> {
         }
     }
 
-    /// `true` or `false`; anything else counts as `false`.
+    /// Read `true` or `false`; any other text is `false`.
     pub fn is_true(&self, node: &Node) -> bool {
         node.text().is_some_and(|text| {
             ["true", "yes", "on", "1"]
@@ -129,12 +129,12 @@ impl<'a> Translation<'a> {
         })
     }
 
-    /// An expression of position and time, or of position alone; `Err` says why it is none here.
+    /// Translate an expression of position and time, or of position only; `Err` holds a message.
     pub fn expression(&self, text: &str, of_time: bool) -> std::result::Result<Value, String> {
         let start = self.start;
         let names = |name: &str| match name {
             "t" if start != 0.0 => Some(format!("(t + {start:?})")),
-            // Time since the start of a step of PeriLab.
+            // In PeriLab `st` is the time since the start of a step.
             "st" if self.dialect == Dialect::PeriLab => Some(if self.step_start == 0.0 {
                 "t".to_owned()
             } else {
@@ -155,7 +155,8 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// An expression of position and time at the start of the run; `Err` says why it is none here.
+    /// Translate an expression of position and time, evaluated at the start of the run; the error is a
+    /// message.
     pub fn at_start(&self, text: &str) -> std::result::Result<Value, String> {
         let start = self.start;
         let names = |name: &str| (name == "t").then(|| format!("({start:?})"));
@@ -164,7 +165,7 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// The name of a table in the new deck, unique in its section.
+    /// Return the name of a table in the new deck, unique in its section.
     pub fn name(&mut self, section: &'static str, name: &str) -> String {
         let same = |(s, read, _): &&(&str, String, String)| *s == section && read == name;
         if let Some((.., written)) = self.names.iter().find(same) {
@@ -175,8 +176,8 @@ impl<'a> Translation<'a> {
         written
     }
 
-    /// As [`name`](Self::name), of a table that nothing else refers to by the same name. Bodies are sets too, so they
-    /// have their names in the section `set`.
+    /// Same as [`name`](Self::name), for a new table even if the source name is in use. Names of bodies are
+    /// unique in the section `set`, because bodies are also sets.
     pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
         let plain = slug(name);
         let taken = |written: &str| {
@@ -196,13 +197,13 @@ impl<'a> Translation<'a> {
         written
     }
 
-    /// The path of a file of the deck, from the working directory.
+    /// Return the path of a file of the source deck, relative to the working directory.
     pub fn path(&self, file: &str) -> PathBuf {
         let folder = self.source.path.parent().unwrap_or("".as_ref());
         folder.join(file)
     }
 
-    /// The path of a file of the deck as the new deck names it.
+    /// Return the path of a file of the source deck, relative to the new deck.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
         let path = if Path::new(file).is_absolute() {
@@ -213,7 +214,7 @@ impl<'a> Translation<'a> {
         Value::text(path.display().to_string().replace('\\', "/"))
     }
 
-    /// A vector with one component; the others have a default.
+    /// Create a vector with one given component; the other components are `others`.
     pub fn component(&self, component: usize, value: Value, others: &Value) -> Value {
         Value::list((0..self.dimension).map(|k| {
             if k == component {
@@ -224,7 +225,7 @@ impl<'a> Translation<'a> {
         }))
     }
 
-    /// Leave out an initial value, load or support; a comment stands in its place.
+    /// Leave out an initial value, load or support, and write a comment in its place.
     pub fn leave_out_load(&mut self, node: &Node, section: &str, name: &str, why: &str) {
         self.log.left_out(node, why);
         let header = format!("{section}.{}", slug(name));
@@ -237,7 +238,7 @@ impl<'a> Translation<'a> {
     }
 }
 
-/// An error about a line of a deck.
+/// Create an error for a line of a deck.
 pub fn line_error(source: &Source, line: usize, message: impl AsRef<str>) -> Error {
     let start = match line {
         0 | 1 => 0,
@@ -255,7 +256,7 @@ pub fn line_error(source: &Source, line: usize, message: impl AsRef<str>) -> Err
     )
 }
 
-/// A name in lower case, of letters, digits and underscores.
+/// Return a name in lower case, with letters, digits and underscores only.
 fn slug(name: &str) -> String {
     let mut slug = String::new();
     for c in name.trim().chars().take(LONGEST_NAME) {

@@ -1,6 +1,6 @@
-//! Parameter trees: what YAML decks and XML parameter lists have in common.
+//! Parameter trees, the common form of YAML decks and XML parameter lists.
 
-/// Maximum number of nodes of a tree, which bounds the memory of a deck.
+/// Maximum number of nodes of a tree; limits the memory that a deck can take.
 pub const MOST_NODES: usize = 1 << 20;
 
 /// Maximum depth of a tree.
@@ -9,18 +9,18 @@ pub const DEEPEST: usize = 64;
 /// A mistake in a deck: its line, from 1, and the message.
 pub type Mistake = (usize, String);
 
-/// A value of a deck with the line where it stands.
+/// A value of a deck with its line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
     /// Number of the node in its tree, in the order of the text.
     pub id: usize,
     /// Line, from 1.
     pub line: usize,
-    /// What it holds.
+    /// Content of the node.
     pub content: Content,
 }
 
-/// What a node holds.
+/// Content of a node.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
     /// A number, a word or a text.
@@ -32,13 +32,13 @@ pub enum Content {
 }
 
 impl Node {
-    /// The value of a key. Keys are compared without case, and `_` is a space.
+    /// Return the value of a key. Keys are compared without case, and `_` equals a space.
     pub fn get(&self, key: &str) -> Option<&Self> {
         let (_, node) = self.entries().iter().find(|(name, _)| is_key(name, key))?;
         Some(node)
     }
 
-    /// The names and values of a table; empty for others.
+    /// Names and values of a table; empty for other nodes.
     pub fn entries(&self) -> &[(String, Self)] {
         match &self.content {
             Content::Table(entries) => entries,
@@ -46,7 +46,7 @@ impl Node {
         }
     }
 
-    /// The tables among the values of a table.
+    /// Return the values of a table that are tables.
     pub fn tables(&self) -> impl Iterator<Item = (&str, &Self)> {
         let entries = self.entries().iter();
         entries
@@ -54,7 +54,7 @@ impl Node {
             .map(|(name, node)| (name.as_str(), node))
     }
 
-    /// The text of a value that is neither list nor table.
+    /// Return the text of a value that is neither list nor table.
     pub fn text(&self) -> Option<&str> {
         match &self.content {
             Content::Text(text) => Some(text.trim()),
@@ -63,7 +63,7 @@ impl Node {
     }
 }
 
-/// Test whether a name stands for a key.
+/// Test whether a name equals a key, without regard to case and to `_` or spaces.
 pub fn is_key(name: &str, key: &str) -> bool {
     let plain = |text: &str| {
         let words = text.split([' ', '_']).filter(|word| !word.is_empty());

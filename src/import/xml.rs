@@ -1,4 +1,4 @@
-//! Parameter trees from the parameter lists of Teuchos in XML.
+//! Parser of Teuchos parameter lists (XML) to parameter trees.
 
 use roxmltree::{Document, ParsingOptions};
 
@@ -7,7 +7,7 @@ use super::tree::{Content, DEEPEST, MOST_NODES, Mistake, Node};
 /// Parse the parameter list of an XML text.
 ///
 /// # Errors
-/// On text that is no XML, elements that are no parameters, parameters without name or value, and lists that occur
+/// If the text is not XML, an element is not a parameter, a parameter lacks name or value, or a list occurs
 /// twice.
 pub fn parse(text: &str) -> Result<Node, Mistake> {
     let options = ParsingOptions {
@@ -31,7 +31,7 @@ pub fn parse(text: &str) -> Result<Node, Mistake> {
     list(&document, root, &mut nodes, 0)
 }
 
-/// Line of an element.
+/// Return the line of an element.
 fn line_of(document: &Document, element: roxmltree::Node) -> usize {
     document.text_pos_at(element.range().start).row as usize
 }
@@ -59,7 +59,7 @@ fn list(
             if tag != "Parameter" || earlier.1.text().is_none() {
                 return Err((line, format!("the list `{name}` occurs twice")));
             }
-            // The last value counts; the earlier one is listed under a name that nothing reads.
+            // The last value is used; the earlier value is renamed so that the log lists it as unused.
             earlier.0 = format!("{name} (set again in line {line})");
         }
         let node = match tag {

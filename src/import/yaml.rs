@@ -1,4 +1,4 @@
-//! Parameter trees from YAML.
+//! Parser of YAML to parameter trees.
 
 use saphyr_parser::{Event, Parser, StrInput};
 
@@ -7,8 +7,8 @@ use super::tree::{Content, DEEPEST, MOST_NODES, Mistake, Node};
 /// Parse a YAML text of one document.
 ///
 /// # Errors
-/// On text that is no YAML, a key that occurs twice in a table, and what parameter lists do not have:
-/// references, keys that are no text, a second document.
+/// If the text is not YAML, or a key occurs twice in a table. References, keys that are not text, and a
+/// second document are also rejected.
 pub fn parse(text: &str) -> Result<Node, Mistake> {
     let mut builder = Builder {
         parser: Parser::new_from_str(text),
@@ -33,7 +33,7 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// The next event and its line.
+    /// Return the next event and its line.
     fn next(&mut self) -> Result<(Event<'a>, usize), Mistake> {
         match self.parser.next() {
             None => Ok((Event::StreamEnd, 1)),

@@ -1,4 +1,5 @@
-//! Dynamic dispatch over all laws: for work per point, for the set-up and outputs, and for bonds between different laws.
+//! Dynamic dispatch over all laws, for work per point, for set-up and outputs, and for bonds between
+//! different laws.
 
 use nalgebra::SMatrix;
 
@@ -7,7 +8,7 @@ use super::{
 };
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
-/// How many numbers of each kind the points and bonds of a law have.
+/// Sizes of the point data and bond data of a law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// [`Law::CONSTANTS`].
@@ -42,7 +43,7 @@ impl Counts {
         }
     }
 
-    /// The larger of each.
+    /// Return the larger of each size; `central` only if both are.
     const fn or_more(self, other: Self) -> Self {
         const fn more(a: usize, b: usize) -> usize {
             if a > b { a } else { b }
@@ -60,7 +61,7 @@ impl Counts {
     }
 }
 
-/// The most that any law has: in three dimensions.
+/// Largest sizes of all laws, in three dimensions.
 pub const MOST: Counts = {
     let mut most = COUNTS[0];
     let mut k = 1;
@@ -71,19 +72,19 @@ pub const MOST: Counts = {
     most
 };
 
-/// The numbers of a point of any law.
+/// The numbers of a point, with room for any law.
 pub type AnyPoint = UpTo<{ MOST.point }>;
 
-/// The history that a bond keeps for an end of any law.
+/// The bond history of one end of a bond, with room for any law.
 pub type AnyHistory = UpTo<{ MOST.bond_history }>;
 
-/// Keep the first entries.
+/// Keep the first entries of a longer tuple.
 #[inline(always)]
 fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))
 }
 
-/// Pad with zeros.
+/// Pad a shorter tuple with zeros.
 #[inline(always)]
 fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
     B::each(|k| {
@@ -96,12 +97,12 @@ fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
 }
 
 impl AnyLaw {
-    /// [`Described::described`] of the law that it is.
+    /// Call [`Described::described`] of the law in this enum.
     pub fn described(&self) -> Vec<(&'static str, Property)> {
         with_law!(self, law => law.described())
     }
 
-    /// Whether bonds are those of a [linear law](Law::LINEAR).
+    /// Whether the law is [linear](Law::LINEAR).
     pub fn is_linear<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::LINEAR
@@ -109,7 +110,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Whether the law has [`Law::bond_stress_across`].
+    /// Whether the law defines [`Law::bond_stress_across`].
     pub fn has_bond_stress_across<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::HAS_BOND_STRESS_ACROSS
@@ -117,7 +118,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Whether the law has [`Law::lost_stiffness`].
+    /// Whether the law defines [`Law::lost_stiffness`].
     pub fn softens<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::SOFTENS
@@ -125,7 +126,8 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Entries of T⊗Y of eight bonds (see [`ForceState::dyad`]) times two factors; 0 beyond the dimension.
+    /// Entries of T⊗Y of eight bonds (see [`ForceState::dyad`]) times two factors; entries beyond `D`
+    /// dimensions are 0.
     #[inline(never)]
     pub fn stress_contribution<const D: usize>(
         &self,
@@ -160,13 +162,13 @@ impl AnyLaw {
     }
 }
 
-/// Bonds between different laws are never linear: linear laws are not paired with others. Nothing is inlined, or every loop
-/// would contain all laws.
+/// Bonds between different laws are never linear: a linear law is paired only with itself.
+/// No function is inlined; otherwise every loop would contain the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;
     type ReferenceSum = [Lanes; MOST.reference_sum];
-    // Passes run over the law of point i, not over this one.
+    // Passes use the law of point i, not this pair of laws.
     type Sum = [Lanes; 0];
     type Force = [Lanes; D];
     const ISA_SET: IsaSet = IsaSet::Avx2;

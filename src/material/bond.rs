@@ -1,20 +1,24 @@
-//! Eight bonds as laws see them: the geometry between their ends, without a root and without a
-//! division wherever strains are small.
+//! Geometry of eight deformed bonds, without square roots and divisions at small strains.
 //!
-//! With γ = η·(2ξ + η) and x = γ/|ξ|², |Y|² = |ξ|² (1 + x), and what laws need are functions of x
-//! alone: the stretch Q(x) = √(1 + x) − 1, and the extension as a share of the deformed length,
-//! P(x) = 1 − (1 + x)^(−½), with which a force c s Y/|Y| is (c/|ξ|) P(x) Y. For |x| ≤ [`NEAR`] both are
-//! taken from their Taylor series, whose first term left out is below 6·10⁻¹⁸ of the value; lanes
-//! beyond take the closed forms x/((1 + x) + √(1 + x)) and x/(1 + √(1 + x)), which lose no digits
-//! either. All of that is the same to the bit from both ends of a bond: x is.
+//! With γ = η·(2ξ + η) and x = γ/|ξ|², the deformed length is |Y|² = |ξ|² (1 + x).
+//! Laws need two functions of x:
+//!
+//! - the stretch Q(x) = √(1 + x) − 1;
+//! - the extension over the deformed length, P(x) = 1 − (1 + x)^(−½). A force c s Y/|Y| is (c/|ξ|) P(x) Y.
+//!
+//! For |x| ≤ [`NEAR`] both functions are Taylor series. The first omitted term is below 6·10⁻¹⁸ of the
+//! result.
+//! Larger |x| use the closed forms P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)), which avoid
+//! cancellation.
+//! Both ends of a bond compute the same bits of x, and therefore of P and Q.
 
 use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
 
-/// The largest |x| for which the series are used.
+/// Largest |x| for which the Taylor series are used.
 pub const NEAR: f64 = 1.0 / 256.0;
 
-/// P(x)/x.
+/// Coefficients of the series of P(x)/x.
 const EXTENSION_OVER_DEFORMED: [f64; 7] = [
     0.5,
     -0.375,
@@ -25,7 +29,7 @@ const EXTENSION_OVER_DEFORMED: [f64; 7] = [
     0.209_472_656_25,
 ];
 
-/// Q(x)/x.
+/// Coefficients of the series of Q(x)/x.
 const STRETCH: [f64; 7] = [
     0.5,
     -0.125,
@@ -36,7 +40,7 @@ const STRETCH: [f64; 7] = [
     0.016_113_281_25,
 ];
 
-/// Eight bonds.
+/// Geometry of eight bonds.
 #[derive(Debug, Clone, Copy)]
 pub struct Bond<const D: usize> {
     /// ξ by component, m.
@@ -47,22 +51,23 @@ pub struct Bond<const D: usize> {
     pub inverse: Lanes,
     /// x = (|Y|² − |ξ|²)/|ξ|²; for linear laws ξ·η/|ξ|².
     pub relative_square_extension: Lanes,
-    /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|². Of intact bonds, where it is asked for.
+    /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|². Set for intact bonds, if [`Wanted::stretch`].
     pub stretch: Lanes,
-    /// (|Y| − |ξ|)/|Y|; means nothing for linear laws. Of intact bonds, where it is asked for.
+    /// (|Y| − |ξ|)/|Y|; undefined for linear laws. Set for intact bonds, if
+    /// [`Wanted::extension_over_deformed`].
     pub extension_over_deformed: Lanes,
     /// η by component, m.
     pub eta: [Lanes; D],
     /// Y by component, m; for linear laws ξ.
     pub deformed: [Lanes; D],
-    /// A bit for each intact bond with a large |x|.
+    /// One bit per intact bond whose |x| exceeds the limit of the series.
     pub beyond_series: u8,
 }
 
 /// Weights of a bond in the sums of its two ends: influence times volume correction.
 #[derive(Debug, Clone, Copy)]
 pub enum Weights {
-    /// 1.
+    /// Both weights are 1.
     One,
     /// The same weight at both ends.
     Same(Lanes),
@@ -71,8 +76,8 @@ pub enum Weights {
 }
 
 impl Weights {
-    /// One bit per bond, intact or not, that is within the horizon of point i, and of point j. The force state of an
-    /// end acts only on these bonds.
+    /// Return two masks, for points i and j: one bit per bond within the horizon of the point. Broken bonds
+    /// are included. The force state of an end acts only on the bonds of its mask.
     #[inline(always)]
     pub fn acting(self) -> [u8; 2] {
         match self {
@@ -81,7 +86,7 @@ impl Weights {
         }
     }
 
-    /// The weight at point i.
+    /// Weight at point i.
     #[inline(always)]
     pub fn own(self) -> Lanes {
         match self {
@@ -90,7 +95,7 @@ impl Weights {
         }
     }
 
-    /// The weight at neighbour j.
+    /// Weight at neighbour j.
     #[inline(always)]
     pub fn far(self) -> Lanes {
         match self {
@@ -99,7 +104,7 @@ impl Weights {
         }
     }
 
-    /// The weighted sum of the contributions of i and j. Both ends compute the same bits.
+    /// Return the weighted sum of the contributions of i and j. Both ends compute the same bits.
     #[inline(always)]
     pub fn sum(self, here: Lanes, there: Lanes) -> Lanes {
         match self {
@@ -110,7 +115,7 @@ impl Weights {
     }
 }
 
-/// The elastic part of the motion of eight bonds at temperature.
+/// The elastic part of the relative displacement of eight bonds at a temperature.
 #[derive(Debug, Clone, Copy)]
 pub struct Elastic<const D: usize> {
     /// η of Y/(1 + a), m.
@@ -119,15 +124,17 @@ pub struct Elastic<const D: usize> {
     pub slope: Lanes,
 }
 
-/// Separate the thermal stretch a of bonds from their motion η (m): laws are given Y/(1 + a) for Y, and forces are
-/// multiplied by the slope 1/(1 + a), so that they stay the derivative of the energy. `stretches` are those of both points; a is
-/// their mean. A bond of length (1 + a)|ξ| is free of force.
+/// Separation of the thermal stretch a of bonds from their relative displacement η (m).
+///
+/// Laws receive Y/(1 + a) instead of Y. Forces are multiplied by the slope 1/(1 + a), so that they remain the
+/// derivative of the energy.
+/// A bond of length (1 + a)|ξ| is free of force.
 pub struct SeparateThermal<const D: usize> {
     /// ξ by component, m.
     pub xi: [Lanes; D],
     /// η by component, m.
     pub eta: [Lanes; D],
-    /// Thermal stretch of points i and j.
+    /// Thermal stretches of points i and j; a is their mean.
     pub stretches: [Lanes; 2],
 }
 
@@ -145,10 +152,10 @@ impl<const D: usize> Task for SeparateThermal<D> {
     }
 }
 
-/// ξ of eight bonds.
+/// Reference geometry of eight bonds.
 #[derive(Debug, Clone, Copy)]
 pub struct Reference<const D: usize> {
-    /// By component, m.
+    /// ξ by component, m.
     pub xi: [Lanes; D],
     /// |ξ|, m.
     pub length: Lanes,
@@ -161,17 +168,19 @@ pub struct Reference<const D: usize> {
 /// The quantities of deformed bonds that a loop reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wanted {
-    /// What is linear in η.
+    /// The law is linear in η.
     pub linear: bool,
-    /// [`Bond::stretch`].
+    /// Compute [`Bond::stretch`].
     pub stretch: bool,
-    /// [`Bond::extension_over_deformed`].
+    /// Compute [`Bond::extension_over_deformed`].
     pub extension_over_deformed: bool,
 }
 
-/// Bonds whose far ends have moved by η (m) relative to the own ones; stretches are those of the bonds
-/// whose bit is set. `limit`, at most [`NEAR`], is the |x| beyond which bonds leave the series; with `ONLY_NEAR` the
-/// stretches of such bonds are undefined.
+/// Compute the geometry of bonds with the relative displacement η (m).
+///
+/// Stretches are computed for the bonds whose bit in `intact` is set.
+/// `limit`, at most [`NEAR`], is the largest |x| for which the series are used.
+/// With `ONLY_NEAR`, the stretches of bonds beyond the limit are undefined.
 #[inline(always)]
 pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     simd: S,
@@ -208,7 +217,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
             beyond_series: intact,
         };
     }
-    // Beyond the limit, or not a number.
+    // True for NaN, too.
     let beyond_series =
         intact & !simd.at_least(Lanes::splat(limit), relative_square_extension.abs());
     let (mut stretch, mut extension_over_deformed) =
@@ -251,7 +260,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 }
 
 impl<const D: usize> Bond<D> {
-    /// Add the stretches, for loops that do not need them for all bonds.
+    /// Compute the stretches. Loops call this only for the groups of bonds that need stretches.
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);
@@ -262,7 +271,7 @@ impl<const D: usize> Bond<D> {
     }
 }
 
-/// a + b, and what rounding has taken from it.
+/// Return a + b and its rounding error (two-sum).
 #[inline(always)]
 fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     let sum = a + b;
@@ -270,7 +279,7 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// `near`; in lanes beyond the series x over the sum of √(1 + x) and `other`, which may depend on 1 + x.
+/// Return `near`; in lanes beyond the series x/(√(1 + x) + o), where `other` computes o from 1 + x.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,
@@ -290,7 +299,7 @@ fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     }))
 }
 
-/// The lanes of [`with_far`] beyond the series. Numbers go in pairs with what rounding has taken.
+/// Task of [`with_far`] for the lanes beyond the series. Pairs are a number and its rounding error.
 struct ClosedForm<O> {
     relative_square_extension: Lanes,
     beyond_series: u8,
@@ -308,7 +317,7 @@ impl<O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)> Task for ClosedForm<O> {
         let (square, lost) = sum_with_rest(Lanes::splat(1.0), x);
         let root = square.sqrt();
         let rest = simd.multiply_add(root * -1.0, root, square) + lost;
-        // Where ends meet there is no root to correct.
+        // If the ends of the bond coincide, the root is 0 and needs no correction.
         let root_lost = simd.keep(rest / (root + root), root.above(0.0));
         let (other, other_lost) = (self.other)((square, lost));
         let (divisor, sum_lost) = sum_with_rest(other, root);
@@ -326,13 +335,13 @@ fn series<S: Simd>(simd: S, x: Lanes, coefficients: &[f64; 7]) -> Lanes {
     sum * x
 }
 
-/// x of a stretch s: (1 + s)² − 1. It grows with s, so that stretches can be compared by it.
+/// Return x = (1 + s)² − 1 of a stretch s. x grows with s, so comparing x compares stretches.
 #[inline(always)]
 pub fn relative_square_extension_of(stretch: f64) -> f64 {
     stretch * (2.0 + stretch)
 }
 
-/// The stretch √(1 + x) − 1.
+/// Return the stretch √(1 + x) − 1.
 pub fn stretch_of(relative_square_extension: f64) -> f64 {
     relative_square_extension / (1.0 + (1.0 + relative_square_extension).sqrt())
 }
@@ -348,7 +357,7 @@ mod tests {
         extension_over_deformed: true,
     };
 
-    /// With ξ along x, |ξ| = 1 and γ = x exactly.
+    /// Bonds with ξ along x, |ξ| = 1 and exactly this x.
     fn of_growth(simd: impl Simd, relative_square_extension: [f64; 8]) -> Bond<1> {
         let one = Lanes::splat(1.0);
         let reference = Reference {
@@ -357,7 +366,7 @@ mod tests {
             inverse: one,
             inverse_square: Lanes(relative_square_extension),
         };
-        // γ = η (0 + η) = 1, and 1/|ξ|² stands for x.
+        // γ = η (0 + η) = 1, and the field 1/|ξ|² holds x.
         deform::<_, false, 1>(simd, &reference, [one], u8::MAX, NEAR, ALL)
     }
 
@@ -405,7 +414,7 @@ mod tests {
         assert_eq!(bond(xi, eta).stretch, opposite.stretch);
     }
 
-    /// A number as the sum of two, to about 10⁻³².
+    /// A number as the sum of two `f64`, accurate to about 10⁻³².
     #[derive(Clone, Copy)]
     struct Double(f64, f64);
 
@@ -427,7 +436,7 @@ mod tests {
             Self::sum(first, rest / (2.0 * first))
         }
 
-        /// A number divided by this one.
+        /// Return `number`/`self`.
         fn under(self, number: f64) -> Self {
             let first = number / self.0;
             let rest = (-first).mul_add(self.0, number) - first * self.1;
@@ -435,7 +444,7 @@ mod tests {
         }
     }
 
-    /// How many units in the last place a number is off.
+    /// Return the error of a number in units in the last place.
     fn error(found: f64, exact: Double) -> f64 {
         let unit = exact.0.abs().next_up() - exact.0.abs();
         ((found - exact.0) - exact.1).abs() / unit
@@ -506,7 +515,7 @@ mod tests {
             (zero.stretch, zero.extension_over_deformed),
             (Lanes::splat(0.0), Lanes::splat(0.0))
         );
-        // Ten million numbers: over all sizes, near the border, and where bodies strain.
+        // Ten million numbers: of all sizes, near the limit of the series, and at usual strains.
         let mut state = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = || {
             state ^= state << 13;

@@ -1,5 +1,5 @@
-//! Declarations of laws, as data. The deck's grammar, the table of laws in the book, and the tests of all laws use
-//! them.
+//! Declarations of laws, as data. The deck's grammar, the table of laws in the book, and the tests of all
+//! laws use these declarations.
 
 use std::fmt;
 use std::ops::Range;
@@ -10,39 +10,39 @@ use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
-/// A law under its name in decks.
+/// Declaration of a law under one name in decks.
 pub struct Declaration {
-    /// Its name in decks.
+    /// Name of the law in decks.
     pub name: &'static str,
-    /// Description of its forces, one line.
+    /// Description of the forces, one line.
     pub force: &'static str,
-    /// Its keys in addition to density, elastic constants and damping.
+    /// Keys of the law in addition to density, elastic constants and damping.
     pub keys: &'static [Key],
-    /// Whether Poisson's ratio is free, so that it takes two elastic constants; else the ratio is
+    /// Whether Poisson's ratio is free, so that the deck gives two elastic constants. Otherwise the ratio is
     /// that of [bond-based laws](Dimension::bond_based_poisson_ratio).
     pub any_poisson_ratio: bool,
-    /// Why there is no 1-D form, and the alternative; `None` if there is one.
+    /// Reason for the lack of a 1-D form, and the alternative; `None` if the law has a 1-D form.
     pub no_line: Option<&'static str>,
     /// Whether forces act along ξ and are linear in the displacements, so that they ignore rotation.
     pub linear: bool,
-    /// The invariants of the law with these values of its keys.
+    /// Return the invariants of the law with these values of its keys.
     pub invariants: fn(&Values) -> Invariants,
-    /// The error in the combination of its keys' values, if there is one.
+    /// Return the error in the combination of the keys' values, if there is one.
     pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
-    /// The elastic constants that follow from its own keys, if these are given; a deck must then give no other
-    /// constants.
+    /// Return the elastic constants that follow from the law's own keys, if the deck gives these keys. Such a
+    /// deck must give no other elastic constants.
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
-    /// Whether bonds can break by the work done on them.
+    /// Whether the energy criterion can break bonds of this law.
     pub breaks_by_energy: bool,
-    /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break by
-    /// their stretch.
+    /// Return the critical stretch of a fracture energy (J/m²); `None` if no stretch criterion can break the
+    /// bonds.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
-    /// The stretch at which bonds of the law break by themselves; its bodies have no damage law. `None` if a damage law
-    /// says when they break.
+    /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
+    /// `None` if a damage law breaks the bonds.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
-    /// Check of the law at a horizon, which returns an error; `None` if no horizon is wrong.
+    /// Check the horizon, and return an error message if it is wrong; `None` if every horizon is allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
-    /// Whether the law scales the critical stretch of each bond itself, with these values of its keys.
+    /// Whether the law scales the critical stretch of each bond, with these values of its keys.
     pub scales_thresholds: fn(&Values) -> bool,
     /// Create the law.
     pub build: fn(&Given) -> Built,
@@ -51,8 +51,8 @@ pub struct Declaration {
 }
 
 impl Declaration {
-    /// A law without keys, in every dimension, with the Poisson ratio of bond-based laws and forces
-    /// along Y, the slope of an energy, whose bonds never break.
+    /// A law with default properties. It has no keys, exists in every dimension and has the Poisson ratio of
+    /// bond-based laws. Its forces act along Y and derive from an energy. Its bonds never break.
     pub const fn new(name: &'static str, force: &'static str, build: fn(&Given) -> Built) -> Self {
         Self {
             name,
@@ -74,17 +74,17 @@ impl Declaration {
         }
     }
 
-    /// Whether bonds can break without a damage law.
+    /// Whether the law breaks bonds without a damage law.
     pub fn breaks_by_itself(&self) -> bool {
         self.own_critical_stretch.is_some()
     }
 
-    /// Whether the law exists in this setting, with the defaults of its keys.
+    /// Whether the law exists in this dimension, with the defaults of its keys.
     pub fn is_for(&self, dimension: Dimension) -> bool {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }
 
-    /// The key of this name, if the law has it.
+    /// Find the key of this name.
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys.iter().find(|key| key.name == name)
     }
@@ -101,14 +101,14 @@ impl fmt::Debug for Declaration {
 pub struct Invariants {
     /// Forces are the gradient of the strain energy; this does not hold for bonds that yield.
     pub conservative: bool,
-    /// A rotated motion has the same forces, rotated.
+    /// Rotating a motion rotates the forces.
     pub objective: bool,
     /// The internal forces of a body have no resultant moment.
     pub angular_momentum: bool,
 }
 
 impl Invariants {
-    /// All of them.
+    /// All invariants hold.
     pub const ALL: Self = Self {
         conservative: true,
         objective: true,
@@ -119,24 +119,24 @@ impl Invariants {
 /// An error in the values of a law's keys.
 #[derive(Debug, Clone)]
 pub struct LawFault {
-    /// The wrong key, if it is a single one.
+    /// The wrong key; `None` if several keys are involved.
     pub key: Option<&'static str>,
     /// Message: what is wrong, and what is allowed.
     pub message: String,
 }
 
-/// A law that decks can name, perhaps under several names.
+/// A law with one or several names in decks.
 pub trait Declared {
-    /// One for each name.
+    /// One declaration per name.
     const DECLARATIONS: &'static [Declaration];
 }
 
 /// A key of a law's table in decks.
 #[derive(Debug)]
 pub struct Key {
-    /// Its name.
+    /// Name of the key.
     pub name: &'static str,
-    /// Its meaning, with unit.
+    /// Meaning of the key's value, with unit.
     pub meaning: &'static str,
     /// The allowed values.
     pub kind: Kind,
@@ -151,7 +151,7 @@ pub enum Kind {
         range: Range<f64>,
         /// The range in words that follow "must be".
         words: &'static str,
-        /// Its default; `None` if the key is required.
+        /// Default; `None` if the key is required.
         default: Option<f64>,
     },
     /// An optional number.
@@ -161,7 +161,7 @@ pub enum Kind {
         /// The range in words that follow "must be".
         words: &'static str,
     },
-    /// One of these words; the default is the first.
+    /// One of these words; the default is the first word.
     Word(&'static [Word]),
     /// An optional expression of the bond's length r (m).
     OfLength,
@@ -181,12 +181,12 @@ impl Kind {
 pub struct Word {
     /// The word as written in decks.
     pub word: &'static str,
-    /// Why there is no 1-D form with this word, and the alternative; `None` if there is one.
+    /// Reason for the lack of a 1-D form with this word, and the alternative; `None` if a 1-D form exists.
     pub no_line: Option<&'static str>,
 }
 
 impl Word {
-    /// A word for every dimension.
+    /// A word that every dimension supports.
     pub const fn new(word: &'static str) -> Self {
         let no_line = None;
         Self { word, no_line }
@@ -206,7 +206,7 @@ pub enum Value {
 
 /// A function of a bond's length.
 pub trait OfLength: fmt::Debug + Send + Sync {
-    /// Its value for a length (m).
+    /// Evaluate the function at a length (m).
     fn at(&self, length: f64) -> f64;
 }
 
@@ -222,7 +222,7 @@ impl From<&str> for Value {
     }
 }
 
-/// The values of a law's own keys, in the order in which it declares them.
+/// Values of the law's own keys, in the order of their declaration.
 #[derive(Debug, Clone)]
 pub struct Values(Vec<(&'static str, Option<Value>)>);
 
@@ -244,16 +244,16 @@ impl Values {
         }
     }
 
-    /// The value of a key, if it has one.
+    /// Return the value of a key, if it has one.
     pub fn get(&self, key: &str) -> Option<&Value> {
         let (_, value) = self.0.iter().find(|(name, _)| *name == key)?;
         value.as_ref()
     }
 
-    /// The number of a key.
+    /// Return the number of a key.
     ///
     /// # Panics
-    /// When the key has none: it is not declared as a number, or was not given.
+    /// If the key has no number: it is not declared as a number, or the deck does not give it.
     pub fn number(&self, key: &str) -> f64 {
         match self.get(key) {
             Some(Value::Number(number)) => *number,
@@ -261,10 +261,10 @@ impl Values {
         }
     }
 
-    /// The word of a key.
+    /// Return the word of a key.
     ///
     /// # Panics
-    /// When the key has none.
+    /// If the key has no word.
     pub fn word(&self, key: &str) -> &str {
         match self.get(key) {
             Some(Value::Word(word)) => word,
@@ -272,7 +272,7 @@ impl Values {
         }
     }
 
-    /// The function of a key, if it was given.
+    /// Return the function of a key, if the deck gives it.
     pub fn of_length(&self, key: &str) -> Option<&Arc<dyn OfLength>> {
         match self.get(key) {
             Some(Value::OfLength(function)) => Some(function),
@@ -281,36 +281,36 @@ impl Values {
     }
 }
 
-/// The input from which a law is created: constants of one end of bonds.
+/// Input for the creation of a law: the constants of one body.
 pub struct Given<'a> {
-    /// The setting.
+    /// Dimension of the problem.
     pub dimension: Dimension,
     /// Elastic constants.
     pub elastic: Isotropic,
-    /// δ, m.
+    /// Horizon δ, m.
     pub horizon: f64,
-    /// Values of the law's own keys; all required keys have one.
+    /// Values of the law's own keys; all required keys have a value.
     pub values: &'a Values,
-    /// Whether the critical stretch follows from a fracture energy, which a law may then hold bond by
-    /// bond; else it was given itself and holds for all bonds alike.
+    /// Whether the critical stretch follows from a fracture energy, so that the law may scale it bond by
+    /// bond. Otherwise the deck gives the critical stretch, and it holds for all bonds.
     pub from_fracture_energy: bool,
 }
 
-/// The critical stretch of the prototype law with these constants and this fracture energy (J/m²).
+/// Return the critical stretch of `pmb` for a fracture energy (J/m²).
 pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy(given.dimension, given.elastic, energy, given.horizon)
 }
 
-/// A law, and its data that the loops over bonds do not read.
+/// A law with the data that the loops over bonds do not read.
 pub struct Built {
     /// The law.
     pub law: AnyLaw,
-    /// Factor on bonds of a length (m) in all sums of a point; `None` for 1.
+    /// Influence function: factor on a bond of a length (m) in all sums of a point; `None` for 1.
     pub influence: Option<Box<dyn Fn(f64) -> f64 + Sync>>,
 }
 
 impl Built {
-    /// Create it without an influence function.
+    /// A law without influence function.
     pub fn plain(law: impl Into<AnyLaw>) -> Self {
         Self {
             law: law.into(),
@@ -318,7 +318,7 @@ impl Built {
         }
     }
 
-    /// Create it with an influence function of the bond's length (m).
+    /// A law with an influence function of the bond's length (m).
     pub fn with_influence(
         law: impl Into<AnyLaw>,
         influence: impl Fn(f64) -> f64 + Sync + 'static,

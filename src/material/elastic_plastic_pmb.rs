@@ -1,9 +1,9 @@
-//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) e, where the plastic stretch s_p
-//! of a bond follows so that |s − s_p| never exceeds the yield stretch s_y.
+//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) e. The plastic stretch s_p of a bond
+//! changes so that |s − s_p| never exceeds the yield stretch s_y.
 //!
-//! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005), to
-//! which unloading returns on a line of the same slope. The bond's elastic energy is c (s − s_p)² |ξ|/2;
-//! to let s_p grow by Δs_p takes c s_y |Δs_p| |ξ|, which is dissipated.
+//! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005). Unloading has
+//! the same slope c.
+//! The elastic energy of a bond is c (s − s_p)² |ξ|/2. Plastic flow by Δs_p dissipates c s_y |Δs_p| |ξ|.
 
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
@@ -13,12 +13,12 @@ use super::{
 };
 use crate::lanes::{IsaSet, Lanes, Simd};
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElasticPlasticPmb {
     /// The elastic part.
     pub elastic: Pmb,
-    /// s_y.
+    /// Yield stretch s_y.
     pub yield_stretch: f64,
 }
 
@@ -53,8 +53,10 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// To pull a bond to s0 > s_y takes c s_y (s0 − s_y/2) |ξ|, with s0 = s_e²/(2 s_y) + s_y/2 as much as
-/// the c s_e² |ξ|/2 of an elastic bond that breaks at s_e.
+/// Critical stretch s0 from the critical stretch s_e of the elastic bond, by equal energy of breaking.
+///
+/// Breaking takes c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore s0 =
+/// s_e²/(2 s_y) + s_y/2.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let elastic = bond_based_critical_stretch(given, energy);
     let limit = given.values.number(YIELD_STRETCH.name);
@@ -75,7 +77,7 @@ impl Described for ElasticPlasticPmb {
 
 impl<const D: usize> Law<D> for ElasticPlasticPmb {
     type Point = [Lanes; 0];
-    /// s_p, and the sum of all its changes, counted positive.
+    /// s_p, and the sum of |Δs_p| over all steps.
     type BondHistory = [Lanes; 2];
     type ReferenceSum = [Lanes; 0];
     type Sum = [Lanes; 0];
@@ -93,7 +95,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     ) -> [Lanes; 2] {
         let [plastic, path] = *before;
         let limit = Lanes::splat(self.yield_stretch);
-        // s_p stays where s − s_y ≤ s_p ≤ s + s_y, else it takes the nearer of the two.
+        // s_p is clamped to the range from s − s_y to s + s_y.
         let now = plastic.max(bond.stretch - limit).min(bond.stretch + limit);
         [now, path + (now - plastic).abs()]
     }

@@ -1,31 +1,31 @@
-//! Force states T⟨ξ⟩ of eight bonds: vectors in general, a number for laws whose forces act along the
-//! bond.
+//! Force states T⟨ξ⟩ of eight bonds: vectors in general, one number per bond for forces along the bond.
 
 use super::{Bond, rotation};
 use crate::lanes::{LaneTuple, Lanes, Simd};
 
 /// The force state of one end of eight bonds.
 pub trait ForceState<const D: usize>: Copy {
-    /// Whether it always acts along the bond.
+    /// Whether the force always acts along the bond.
     const CENTRAL: bool;
 
-    /// The [`Rotation`](super::Rotation) of the family that the work depends on; nothing for central forces.
+    /// Type of the family's [`Rotation`](super::Rotation), on which the work depends; empty for central
+    /// forces.
     type Rotation: LaneTuple;
 
-    /// Multiply by a number for each bond.
+    /// Multiply by one factor per bond.
     fn times(self, factor: Lanes) -> Self;
 
     /// Add the force state of the other end, −T_j⟨−ξ⟩.
     fn plus(self, other: Self) -> Self;
 
-    /// Adds the force density (N/m³) of the bonds whose bit is set to the sums.
+    /// Add the force density (N/m³) of the bonds whose bit is set to the sums.
     fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]);
 
-    /// A component of T⊗Y, of the part that does not turn the bond.
+    /// Component of the symmetric part of T⊗Y, J/m⁶.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
-    /// The work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family; the same to the bit
-    /// from both ends. A central force works on the extension, whatever the rotation.
+    /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. Both
+    /// ends compute the same bits. A central force works on the extension, so R does not matter.
     fn work<S: Simd>(
         self,
         simd: S,
@@ -34,11 +34,11 @@ pub trait ForceState<const D: usize>: Copy {
         rotation: &Self::Rotation,
     ) -> Lanes;
 
-    /// By component.
+    /// Return the force state by component, N/m⁶.
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
 }
 
-/// T = t Y with t in N/m⁷, or t ξ for linear laws; positive pulls the ends together.
+/// Force state along the bond: T = t Y with t in N/m⁷, or t ξ for linear laws. Positive t attracts the ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Along(pub Lanes);
 
@@ -86,7 +86,7 @@ impl<const D: usize> ForceState<D> for Along {
     }
 }
 
-/// In any direction, N/m⁶.
+/// Force state in any direction, by component, N/m⁶.
 impl<const D: usize> ForceState<D> for [Lanes; D] {
     const CENTRAL: bool = false;
     type Rotation = [Lanes; 4];

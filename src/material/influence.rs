@@ -1,6 +1,6 @@
 //! Influence functions ω(|ξ|): the weight of a bond as a function of its length.
 //!
-//! Silling et al. 2007; the forms are those in common use (Peridigm, Peridynamics.jl).
+//! The forms are in common use (Silling et al. 2007; Peridigm; Peridynamics.jl).
 
 use std::f64::consts::PI;
 
@@ -9,18 +9,18 @@ use crate::dimension::Dimension;
 /// An influence function of |ξ|/δ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Influence {
-    /// 1.
+    /// ω = 1.
     Constant,
-    /// 1 − |ξ|/δ.
+    /// ω = 1 − |ξ|/δ.
     Linear,
-    /// exp(−(2|ξ|/δ)²).
+    /// ω = exp(−(2|ξ|/δ)²).
     Gaussian,
-    /// δ/|ξ|.
+    /// ω = δ/|ξ|.
     Inverse,
 }
 
 impl Influence {
-    /// The weighted volume ∫ ω |ξ|² dV (m⁵) of a whole family with this horizon (m).
+    /// Return the weighted volume ∫ ω |ξ|² dV (m⁵) of an untruncated family with this horizon (m).
     pub fn weighted_volume(self, dimension: Dimension, horizon: f64) -> f64 {
         match dimension {
             Dimension::Space => 4.0 * PI * horizon.powi(5) * self.moment(4),
@@ -33,7 +33,7 @@ impl Influence {
         }
     }
 
-    /// ω of a length and a horizon, both in m; never negative.
+    /// Return ω for a length and a horizon, both in m; never negative.
     pub fn at(self, length: f64, horizon: f64) -> f64 {
         let ratio = length / horizon;
         match self {
@@ -44,12 +44,12 @@ impl Influence {
         }
     }
 
-    /// ∫₀¹ ω(r) rⁿ dr for a horizon of 1, by Simpson's rule on a fine grid; exact to 10⁻¹² for
-    /// n ≥ 2.
+    /// Return ∫₀¹ ω(r) rⁿ dr for a horizon of 1. Simpson's rule on 2000 cells has an error below 10⁻¹² for n
+    /// ≥ 2.
     pub fn moment(self, power: i32) -> f64 {
         let cells = 2000;
         let at = |k: i32| match f64::from(k) / f64::from(cells) {
-            // Inverse: the power takes away the pole.
+            // For `Inverse`, the power of r cancels the pole.
             0.0 => 0.0,
             r => self.at(r, 1.0) * r.powi(power),
         };

@@ -1,9 +1,9 @@
 //! Linear microelastic material: f = C η with C = λ(|ξ|) ξ⊗ξ.
 //!
-//! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ has the micromodulus c of the proportional
-//! material, to which it is the linearisation. Any other λ(|ξ|) is the default for c = 1 with the
-//! influence λ |ξ|³. Forces act along ξ, also after large motions, so a rotated body is not free of
-//! forces.
+//! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ is the linearisation of the prototype microelastic
+//! material with the micromodulus c.
+//! Any other λ(|ξ|) is the default law with c = 1 and the influence function λ |ξ|³.
+//! Forces act along ξ, also after large motions. Therefore a rigid rotation causes forces.
 
 use std::sync::Arc;
 
@@ -13,13 +13,13 @@ use super::{
 };
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearMicroelastic {
     /// c, N/m⁶.
     pub micromodulus: f64,
-    /// Classical energy density at unit isotropic stretch W₁ (J/m³) that the sum over each point's
-    /// own family is scaled to; `None` to scale nothing.
+    /// Classical energy density at unit isotropic stretch W₁ (J/m³), to which the energy sum of each point is
+    /// scaled; `None` for no scaling.
     pub corrected_to: Option<f64>,
 }
 
@@ -74,7 +74,7 @@ impl Described for LinearMicroelastic {
 }
 
 impl<const D: usize> Law<D> for LinearMicroelastic {
-    /// What the micromodulus is multiplied by.
+    /// Factor on the micromodulus.
     type Point = [Lanes; 1];
     type BondHistory = [Lanes; 0];
     /// Σ |ξ| Ṽ, m⁴.
@@ -92,7 +92,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
         [length]
     }
 
-    /// 1, or the surface correction 4 W₁ / (c Σ |ξ| Ṽ).
+    /// Set the factor to 1, or to the surface correction 4 W₁ / (c Σ |ξ| Ṽ).
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         numbers[0] = match self.corrected_to {
             Some(energy) if sums[0] > 0.0 => 4.0 * energy / (self.micromodulus * sums[0]),

@@ -1,9 +1,17 @@
-//! Material laws, one per file. A law computes single bonds, eight at a time. It is independent of decks, points, ranks
-//! and fields.
+//! Material laws, one per file. A law evaluates bonds, eight at a time. Laws are independent of decks,
+//! points, ranks and fields.
 //!
-//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007). The force state T_i
-//! of an end depends on the bond, on numbers of the end's whole family (such as a dilatation) and on the bond history
-//! (such as a plastic stretch). The law declares the number of both and how they are computed.
+//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007).
+//! The force state T_i depends on three inputs:
+//!
+//! - the bond;
+//! - the *numbers* of point i, which the law stores per point, such as the dilatation of its family;
+//! - the *bond history*, which the law stores per bond and end, such as a plastic stretch.
+//!
+//! A law declares the count of the numbers and of the history, and computes both.
+//! An *end* of a bond is point i or point j.
+//! An *untruncated* family is a full ball of neighbours, without surfaces or cracks. The *initial* family of
+//! a point has all its bonds before any bond breaks.
 
 mod any;
 pub mod bond;
@@ -38,7 +46,7 @@ pub use influence::Influence;
 pub use plastic_state::PlasticState;
 pub use rotation::Rotation;
 
-// Every law, by its file and type, in the order of the table of laws.
+// All laws by file and type, in the order of the table of laws in the book.
 registration::register! {
     $
     pmb::Pmb,
@@ -62,12 +70,12 @@ use nalgebra::SMatrix;
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use bond::Weights;
 
-/// A property of a law, for reports.
+/// A property of a law for the reports of the command line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Property {
-    /// A number and its unit; the unit is empty if there is none.
+    /// A number and its unit; the unit is empty for dimensionless numbers.
     Number(f64, &'static str),
-    /// Words.
+    /// A text.
     Text(&'static str),
 }
 
@@ -81,89 +89,92 @@ impl fmt::Display for Property {
     }
 }
 
-/// What can be told of a law without bonds.
+/// Description of a law for reports.
 pub trait Described {
-    /// Names and values of what it was given or has found, for people to read.
+    /// Return names and values of given and derived properties, for display.
     fn described(&self) -> Vec<(&'static str, Property)>;
 }
 
 /// A material law: the contributions of bonds to the numbers of a point, and the resulting force state.
 ///
-/// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
-/// run over bonds in these steps:
+/// The loops multiply each contribution by Ṽ and by the influence function; the law contains neither.
+/// The loops over the bonds call a law in these steps:
 ///
-/// 1. once, over the family without the bonds that pre-cracks cut (see [`Self::needs_shape`]): [`Self::reference_contribution`] → sums → [`Self::constants`], and [`Self::truncation_factor`] where a
-///    criterion reads it;
-/// 2. before each sum of forces, over the intact bonds, [`Self::PASSES`] times:
-///    [`Self::pass_contribution`] → sums → [`Self::update_point`]; then the numbers are sent to the ghosts;
-/// 3. [`Self::bond_history`] and [`Self::force`] of both ends.
+/// 1. Once, over the bonds that pre-cracks do not cut (over all bonds if [`Self::needs_shape`]):
+///    [`Self::reference_contribution`] → sums → [`Self::constants`], and [`Self::truncation_factor`] if a
+///    damage criterion reads it.
+/// 2. Before each force evaluation, over the intact bonds, [`Self::PASSES`] times:
+///    [`Self::pass_contribution`] → sums → [`Self::update_point`]. Then the numbers are sent to the ghosts.
+/// 3. In the force evaluation: [`Self::bond_history`] and [`Self::force`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
-    /// The numbers of a point that bonds read at both ends: first the constants, then the numbers that are recomputed
-    /// before each sum of forces.
+    /// The numbers of a point that bonds read at both ends. The constants come first; the others are
+    /// recomputed before each force evaluation.
     type Point: LaneTuple;
 
     /// The bond history: numbers stored per bond for each of its ends; initially 0.
     type BondHistory: LaneTuple;
 
-    /// The sums over the whole family, which are computed once.
+    /// Sums over the initial family, computed once.
     type ReferenceSum: LaneTuple;
 
-    /// The sums of a pass over the intact bonds. Passes with fewer sums set the rest to 0.
+    /// Sums of a pass over the intact bonds. A pass with fewer sums sets the rest to 0.
     type Sum: LaneTuple;
 
-    /// The force state's form.
+    /// Type of the force state.
     type Force: ForceState<D>;
 
     /// Number of constants among the numbers of a point.
     const CONSTANTS: usize = 0;
 
-    /// Number of passes over the bonds before the sum of the forces.
+    /// Number of passes over the bonds before the force evaluation.
     const PASSES: usize = 0;
 
-    /// Count of numbers of a point that only its own law reads; they follow those of [`Self::Point`].
+    /// Count of numbers of a point that only its own law reads. These follow the numbers of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
-    /// Whether [`Self::force`] or [`Self::bond_history`] read the stretch of bonds.
+    /// Whether [`Self::force`] or [`Self::bond_history`] reads [`Bond::stretch`].
     const FORCE_READS_STRETCH: bool = false;
 
-    /// Whether [`Self::force`] reads the shortening of bonds.
+    /// Whether [`Self::force`] reads [`Bond::extension_over_deformed`].
     const FORCE_READS_EXTENSION: bool = true;
 
     /// Smallest dimension that the law supports.
     const LEAST_DIMENSION: usize = 1;
 
-    /// Whether [`Self::pass_contribution`] reads the stretch of bonds.
+    /// Whether [`Self::pass_contribution`] reads [`Bond::stretch`].
     const SUM_READS_STRETCH: bool = true;
 
-    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds. Padding bonds of a lane group
-    /// have neither.
+    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds. Padding bonds of a
+    /// lane group have no direction and no length.
     const SUM_READS_DIRECTION: bool = false;
 
-    /// Whether forces act along ξ and are linear in η. Otherwise they depend on the deformed bonds.
+    /// Whether forces act along ξ and are linear in η. Otherwise forces depend on the deformed bonds.
     const LINEAR: bool = false;
 
-    /// Instruction sets for which the loops of its forces, sums and energies are compiled.
+    /// Instruction sets for which the loops over forces, sums and energies are compiled.
     const ISA_SET: IsaSet = IsaSet::Each;
 
-    /// Whether [`Self::toughness_scale`] is not 1.
+    /// Whether the law overrides [`Self::toughness_scale`].
     const SCALED: bool = false;
 
-    /// Whether [`Self::lost_stiffness`] is not 0.
+    /// Whether the law overrides [`Self::lost_stiffness`].
     const SOFTENS: bool = false;
 
-    /// Whether the stress of a point, and with it [`Self::stress_across`], is the mean of the stresses of its bonds.
+    /// Whether the stress of a point, including [`Self::stress_across`], is the mean of the stresses of its
+    /// bonds.
     const HAS_BOND_STRESS_ACROSS: bool = false;
 
-    /// Contribution of a bond of the undeformed body to the sums over the whole family.
+    /// Contribution of an undeformed bond to the sums over the initial family.
     #[inline(always)]
     fn reference_contribution(&self, _bond: &Bond<D>) -> Self::ReferenceSum {
         Self::ReferenceSum::splat(0.0)
     }
 
-    /// The constants of a point from the sums over its whole family.
+    /// Compute the constants of a point from the sums over its initial family.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
-    /// Contribution of an intact bond to the sums of pass `S`. It may use the numbers of earlier passes.
+    /// Contribution of an intact bond to the sums of pass `S`. It may read the numbers that earlier passes
+    /// computed.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -174,8 +185,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// Compute the numbers of a point from the sums of a pass: those of [`Self::Point`], then the law's own. Plastic
-    /// flow changes the stored plastic state only in a step.
+    /// Compute the numbers of a point from the sums of a pass: those of [`Self::Point`], then the law's own.
+    /// The plastic state that flow leaves is stored only at the end of a step.
     fn update_point(
         &self,
         _pass: usize,
@@ -185,22 +196,24 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) {
     }
 
-    /// Count of the numbers of points and bonds. A law may need fewer passes and own numbers than its type declares.
+    /// Count of the numbers of points and bonds. Some instances need fewer passes and own numbers than the
+    /// type declares.
     fn counts(&self) -> Counts {
         Counts::of::<Self, D>()
     }
 
-    /// Whether points keep a [`PlasticState`].
+    /// Whether points store a [`PlasticState`].
     fn has_plasticity(&self) -> bool {
         false
     }
 
-    /// Whether a pass sums the bond history at the end of the step; otherwise the history at its beginning.
+    /// Whether a pass reads the bond history after the step. Otherwise the pass reads the history before the
+    /// step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
 
-    /// The bond history of one end after a step (s) to this deformation.
+    /// Return the bond history of one end after a step (s) that ends at this deformation.
     #[inline(always)]
     fn bond_history(
         &self,
@@ -212,11 +225,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         *before
     }
 
-    /// The force state T of one end, N/m⁶; along the bond T/|Y|, or T/|ξ| for linear laws, N/m⁷.
+    /// Force state T of one end, N/m⁶. A force along the bond is returned as T/|Y|, or T/|ξ| for linear laws,
+    /// N/m⁷.
     fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
-    /// The force density of bonds per volume, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of the ends. Both ends compute the
-    /// same bits, up to the sign. Laws may override it with fewer operations.
+    /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. Both ends
+    /// compute the same bits, up to the sign. Laws may override this function to save operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -235,7 +249,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         }
     }
 
-    /// The [work](ForceState::work) of the force state of one end, J/m⁶, with the [`Self::rotation`] of its family.
+    /// [Work](ForceState::work) of the force state of one end, J/m⁶, with the [`Self::rotation`] of its
+    /// family.
     #[inline(always)]
     fn end_work<S: Simd>(
         &self,
@@ -249,7 +264,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         force.work(simd, bond, Self::LINEAR, rotation)
     }
 
-    /// Rotation of a family from the sums of the first pass, for laws whose forces do not act along the bonds.
+    /// Rotation of a family from the sums of the first pass, for laws whose forces do not act along the
+    /// bonds.
     fn rotation(&self, _sums: &[f64]) -> Rotation {
         rotation::IDENTITY
     }
@@ -257,23 +273,23 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Contribution of a bond to the strain energy density of one end, J/m⁶.
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Lanes;
 
-    /// The part of a point's strain energy density (J/m³) that belongs to no single bond.
+    /// Part of a point's strain energy density (J/m³) that is not a sum over bonds.
     fn point_energy(&self, _numbers: &[f64]) -> f64 {
         0.0
     }
 
-    /// The weighted volume m (m⁵) of a point from its numbers, for laws that store it.
+    /// Weighted volume m (m⁵) of a point from its numbers, for laws that store it.
     fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
-    /// The dilatation θ of a point from its numbers, for laws that do not find it with the weighted volume m alone.
+    /// Dilatation θ of a point from its numbers. `None` for the default θ = (d/m) Σ ω|ξ|εṼ.
     fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
-    /// Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the plane. `None` for
-    /// ν (τ_xx + τ_yy), which holds for laws that are linear in the strain.
+    /// Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the plane.
+    /// `None` for ν (τ_xx + τ_yy), which holds for laws that are linear in the strain.
     fn stress_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -282,14 +298,14 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Contribution of a bond to the stress of [`Self::stress_across`] if [`Self::HAS_BOND_STRESS_ACROSS`], Pa/m³.
+    /// Contribution of a bond to [`Self::stress_across`] if [`Self::HAS_BOND_STRESS_ACROSS`], Pa/m³.
     #[inline(always)]
     fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// Stretch F_zz across the plane in plane stress, at a displacement gradient of the plane. `None` for Hooke's
-    /// law with logarithmic strains.
+    /// Stretch F_zz across the plane in plane stress, at a displacement gradient of the plane. `None` for
+    /// Hooke's law with logarithmic strains.
     fn stretch_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -298,7 +314,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Whether points need enough bonds in all directions, compared with a family that pre-cracks do not cut.
+    /// Whether points need enough bonds in all directions, compared with their family before pre-cracks.
     fn needs_shape(&self) -> bool {
         false
     }
@@ -308,37 +324,40 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Energy that a bond has dissipated at one end without the energy of breaking, J/m⁶; also for broken bonds.
+    /// Energy that a bond has dissipated at one end, without the energy of breaking, J/m⁶. Broken bonds
+    /// count, too.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// Fraction of its stiffness that an intact bond has lost at one end, from 0 to 1. The damage of the point counts
-    /// this fraction of the bond as broken.
+    /// Fraction of its stiffness that an intact bond has lost at one end, from 0 to 1. The damage of the
+    /// point counts this fraction of the bond as broken.
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// A spring constant (N/m⁷) that the bond's and point's energy at one end nowhere exceed:
-    /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For bond-based laws |∂T/∂η|.
+    /// A spring constant k (N/m⁷) per bond that bounds the energy of one end: W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For
+    /// bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
 
-    /// Whether the springs of [`Self::stiffness`] resist motions across the bonds as well:
-    /// W ≤ ½ Σ k |η|² Ṽ.
+    /// Whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k |η|²
+    /// Ṽ.
     fn resists_across(&self) -> bool {
         false
     }
 
-    /// Energy per bond of a point over that of an interior point at the same strain, from the sums of
-    /// [`Self::reference_contribution`]. Above 1 for a truncated family of a law whose points hold the energy; else 1.
+    /// Energy per bond of a point, divided by that of an interior point at the same strain, from the sums of
+    /// [`Self::reference_contribution`].
+    ///
+    /// The factor exceeds 1 in truncated families if the law keeps the energy of a point; otherwise it is 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }
 
-    /// Factor on the critical stretch of a bond, from the numbers of points i and j and the law of point j. Both ends
-    /// compute the same factor.
+    /// Factor on the critical stretch of a bond, from the numbers of points i and j and the law of point j.
+    /// Both ends compute the same factor.
     #[inline(always)]
     fn toughness_scale(&self, _bond: &Bond<D>, _points: [&Self::Point; 2], _other: &Self) -> Lanes {
         Lanes::splat(1.0)

@@ -1,12 +1,14 @@
-//! Prototype microelastic material with a micromodulus for each point, from its own neighbours.
+//! Prototype microelastic material with one micromodulus per point, computed from the point's own family.
 //!
-//! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3. A point's constant makes the sum
-//! over its own discrete family hold the classical energy density W₁ at unit isotropic stretch:
-//! w = c_i s²|ξ|/2 gives ½ Σ w Ṽ = W₁ for c_i = 4 W₁ / Σ |ξ| Ṽ, so that stiffness is right at
-//! surfaces and on any lattice. A bond has the mean of its ends', c_ij = (c_i + c_j)/2, and the
-//! critical stretch s_c √(c/c_ij), which keeps the energy that it takes to break it.
+//! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3.
+//! The micromodulus c_i scales the energy of the discrete family at unit isotropic stretch to the classical
+//! energy density W₁.
+//! With w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ.
+//! The stiffness is therefore correct at surfaces and on any lattice.
+//! A bond has the mean of both micromoduli, c_ij = (c_i + c_j)/2. Its critical stretch s_c √(c/c_ij) keeps
+//! the energy of breaking the bond.
 //!
-//! With the influence 1/|ξ| it is Diehl & Schweitzer's eq. 15: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
+//! With the influence function 1/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
 
 use std::f64::consts::PI;
 
@@ -18,12 +20,12 @@ use super::{
 use crate::dimension::Dimension;
 use crate::lanes::Lanes;
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalised {
     /// Classical energy density at unit isotropic stretch W₁, J/m³.
     pub energy: f64,
-    /// The micromodulus that the damage law's critical stretch belongs to, N/m⁶; `None` if that
+    /// Micromodulus to which the critical stretch of the damage law belongs, N/m⁶; `None` if the critical
     /// stretch holds for all bonds.
     pub reference: Option<f64>,
 }
@@ -75,8 +77,8 @@ fn as_printed(given: &Given) -> bool {
     given.values.word(FORM.name) == "diehl2016"
 }
 
-/// The constant of Diehl & Schweitzer 2016, eq. 15, for a family of the whole horizon: 9K/Σ V, divided
-/// by the horizon, which stands in the influence.
+/// Micromodulus of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/Σ V, divided by the horizon
+/// because the influence function is δ/|ξ|.
 fn printed_micromodulus(given: &Given) -> f64 {
     let volume = match given.dimension {
         Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),
@@ -85,7 +87,8 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// As printed: eq. 16–17 in the plane; in space the sum over the bonds across a plane.
+/// Critical stretch of the printed law: eq. 16–17 in the plane; in space from the sum over the bonds that
+/// cross a plane.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     if !as_printed(given) {
         return bond_based_critical_stretch(given, energy);
@@ -101,7 +104,7 @@ fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 impl Normalised {
-    /// To the classical energy density of the solid that bond-based laws can be.
+    /// Normalise to the classical energy density of the solid with the Poisson ratio of bond-based laws.
     pub(super) fn classical(given: &Given) -> Self {
         Self {
             energy: Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus),

@@ -1,20 +1,20 @@
-//! Ordinary state-based linear peridynamic solid: any Poisson ratio.
+//! Ordinary state-based linear peridynamic solid, for any Poisson ratio.
 //!
-//! Silling, Epton, Weckner, Xu & Askari 2007; the plane forms after Le, Chan & Schwartz 2014. With the
-//! weighted volume m = Σ ω|ξ|²Ṽ, the extension ε = |Y| − |ξ|, the dilatation θ = (d/m) Σ ω|ξ|εṼ and
-//! its deviatoric part ε_d = ε − θ|ξ|/d,
+//! Silling, Epton, Weckner, Xu & Askari 2007; the plane forms follow Le, Chan & Schwartz 2014.
+//! The law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension ε = |Y| − |ξ|, the dilatation θ = (d/m) Σ
+//! ω|ξ|εṼ and the deviatoric extension ε_d = ε − θ|ξ|/d:
 //!
-//! t = (d k′θ/m) ω|ξ| + (A/m) ω ε_d,  W = ½ k′θ² + ½ (A/m) Σ ω ε_d² Ṽ.
+//! t = (d k′θ/m) ω|ξ| + (A/m) ω ε_d, W = ½ k′θ² + ½ (A/m) Σ ω ε_d² Ṽ.
 //!
-//! | setting | k′ | A |
+//! | dimension | k′ | A |
 //! |---|---|---|
 //! | 3-D | K | 15G |
 //! | plane strain | K + G/3 | 8G |
 //! | plane stress | E/(2(1−ν)) | 8G |
 //!
-//! Written with κ = k′ − A/d² this is t = (d κ θ/m) ω|ξ| + (A/m) ω ε and
-//! W = ½ κθ² + ½ (A/m) Σ ω ε² Ṽ, of which t is the derivative with bonds broken as well: m is that of
-//! the whole family, θ sums over intact bonds.
+//! With κ = k′ − A/d² the same law is t = (d κ θ/m) ω|ξ| + (A/m) ω ε and W = ½ κθ² + ½ (A/m) Σ ω ε² Ṽ.
+//! Here m sums over the initial family, and θ sums over the intact bonds. Then t is the derivative of W with
+//! broken bonds as well.
 
 use super::bond::Weights;
 use super::{
@@ -26,22 +26,22 @@ use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::lanes::{Lanes, Simd};
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ordinary {
-    /// d.
+    /// Number of dimensions d.
     dimension: f64,
     /// κ = k′ − A/d², Pa.
     volumetric: f64,
     /// A, Pa.
     extensional: f64,
-    /// m of a whole family, m⁵.
+    /// m of an untruncated family, m⁵.
     whole: f64,
 }
 
 impl Ordinary {
-    /// From the elastic constants and the weighted volume (m⁵) of a whole family; `None` in 1-D, where the Poisson
-    /// ratio has no meaning.
+    /// Create the law from the elastic constants and the weighted volume (m⁵) of an untruncated family.
+    /// `None` in 1-D, where the Poisson ratio has no meaning.
     pub fn new(dimension: Dimension, elastic: Isotropic, whole: f64) -> Option<Self> {
         let (modulus, shear) = (bulk_modulus(dimension, elastic)?, elastic.shear_modulus());
         let (count, extensional) = match dimension {
@@ -56,14 +56,14 @@ impl Ordinary {
         })
     }
 
-    /// From what a body has, in the plane or in space, and the influence of its bonds.
+    /// Create the law of a body with this influence function, in the plane or in space.
     pub(super) fn of(given: &Given, influence: Influence) -> Self {
         let whole = influence.weighted_volume(given.dimension, given.horizon);
         Self::new(given.dimension, given.elastic, whole)
             .expect("the law declares that it has no 1-D form")
     }
 
-    /// d κ θ/m (N/m⁷) and θ from A/m and Σ ω|ξ|εṼ.
+    /// Return d κ θ/m (N/m⁷) and θ, from A/m and Σ ω|ξ|εṼ.
     #[inline(always)]
     pub(super) fn dilated(&self, extension_factor: f64, sum: f64) -> [f64; 2] {
         let share = self.dimension * extension_factor / self.extensional;
@@ -71,12 +71,12 @@ impl Ordinary {
         [share * self.volumetric * dilatation, dilatation]
     }
 
-    /// ½ κθ², J/m³.
+    /// Energy density of the dilatation, ½ κθ², J/m³.
     pub(super) fn dilatation_energy(&self, dilatation: f64) -> f64 {
         0.5 * self.volumetric * dilatation.powi(2)
     }
 
-    /// d.
+    /// Number of dimensions d.
     pub fn dimension(&self) -> f64 {
         self.dimension
     }
@@ -91,23 +91,24 @@ impl Ordinary {
         self.extensional
     }
 
-    /// m of a whole family, m⁵.
+    /// m of an untruncated family, m⁵.
     pub(super) fn whole(&self) -> f64 {
         self.whole
     }
 
-    /// m (m⁵) from A/m; `None` where there are no bonds.
+    /// Return m (m⁵) from A/m; `None` if the point has no bonds.
     pub(super) fn weighted_volume_of(&self, extension_factor: f64) -> Option<f64> {
         (extension_factor > 0.0).then(|| self.extensional / extension_factor)
     }
 
-    /// What a bond holds over what it would if the family were whole, from m.
+    /// Energy of a bond divided by its energy in an untruncated family, from the weighted volume m of its
+    /// point.
     pub(super) fn truncation_factor_of(&self, sum: f64) -> f64 {
         if sum > 0.0 { self.whole / sum } else { 1.0 }
     }
 }
 
-/// k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion θ in the setting's dimensions.
+/// Return k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion θ in this dimension.
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
     match dimension {
         Dimension::Line { .. } => None,
@@ -171,7 +172,7 @@ fn build(given: &Given) -> Built {
     }
 }
 
-/// A law with the influence that is asked for.
+/// Add the influence function of the deck to a law.
 pub(super) fn with_influence(law: impl Into<AnyLaw>, given: &Given) -> Built {
     let horizon = given.horizon;
     match influence(given) {
@@ -194,8 +195,8 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
 
-/// The force state of a bond of stiffness A/m and d κ θ/m (N/m⁷) that has taken a part e of its deviatoric
-/// extension by itself, given as e/|ξ|.
+/// Return the force state of bonds with an inelastic deviatoric extension. `extension_factor` is A/m and
+/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension over |ξ|.
 #[inline(always)]
 pub(super) fn eased_force<const D: usize>(
     bond: &Bond<D>,
@@ -313,7 +314,7 @@ impl<const D: usize> Law<D> for Ordinary {
         self.truncation_factor_of(sums[0])
     }
 
-    /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.
+    /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω ε² Ṽ. Therefore (A + max(κ, 0) d²)/m is a bound.
     #[inline(always)]
     fn stiffness(&self, _: Lanes, [extension_factor, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;

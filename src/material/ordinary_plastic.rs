@@ -1,22 +1,28 @@
-//! Ordinary state-based elastic–perfectly plastic solid: the norm of the deviatoric force state cannot
-//! exceed a yield value.
+//! Ordinary state-based elastic–perfectly plastic solid: the norm of the deviatoric force state cannot exceed
+//! a yield value.
 //!
-//! Mitchell 2011, SAND2011-3166. Each bond keeps a plastic extension e_p. The energy and the force are those of
+//! Mitchell 2011, SAND2011-3166. Each bond has a plastic extension e_p. Energy and force are those of
 //! [`Ordinary`] at the elastic extensions ε − e_p:
 //!
-//! W = ½ κθ² + ½ (A/m) Σ ω (ε − e_p)² Ṽ,  θ = (d/m) Σ ω|ξ| (ε − e_p) Ṽ.
+//! W = ½ κθ² + ½ (A/m) Σ ω (ε − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (ε − e_p) Ṽ.
 //!
-//! The deviatoric force is t_d = (A/m) ω ε_d, where ε_d is ε − e_p without its mean over the intact bonds,
-//! ε_d = ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ. The yield function of a point is ½‖t_d‖² − ψ₀ ≤ 0 with
-//! ‖t_d‖² = Σ t_d² Ṽ, and the return is radial: t_d shrinks by r = √(2ψ₀)/‖t_d‖ and e_p grows by (1 − r) ε_d. Flow
-//! changes no volume, so that Σ ω|ξ| e_p Ṽ = 0 and all of this is Mitchell's law until bonds of the family break. In a
-//! broken family it keeps the force the slope of the energy: with Mitchell's θ of the whole extension the plastic
-//! extensions that are left would expand the family, and breaking bonds would add energy.
+//! The deviatoric force is t_d = (A/m) ω ε_d. Here ε_d is ε − e_p minus its mean over the intact bonds: ε_d =
+//! ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
-//! ψ₀ follows from the yield stress σ_y in pure shear: a deviatoric strain e has
-//! ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane, and yields at e:e = σ_y²/(6G²), so that
-//! ψ₀ = (5/2) σ_y²/m and (4/3) σ_y²/m. With the m of a whole ball the first is Mitchell's
-//! 25σ_y²/(8πδ⁵); his plane value 75σ_y²/(8πhδ⁴) belongs to A = 15G, which the plane law does not have.
+//! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ.
+//! The return is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by (1 − r) ε_d.
+//!
+//! Plastic flow preserves volume, Σ ω|ξ| e_p Ṽ = 0. Therefore this is Mitchell's law until bonds of the
+//! family break.
+//! After that, Mitchell's θ of the total extension ε would not give a force that derives from the energy. The
+//! remaining plastic extensions would expand the family, and breaking bonds would add energy.
+//!
+//! ψ₀ follows from the yield stress σ_y in pure shear.
+//! A deviatoric strain e has ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane. It yields at e:e =
+//! σ_y²/(6G²).
+//! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
+//! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
+//! Mitchell's plane value 75σ_y²/(8πhδ⁴) belongs to A = 15G, whereas the plane law here has A = 8G.
 
 use super::ordinary::{Ordinary, eased_force};
 use super::{
@@ -26,13 +32,14 @@ use super::{
 use crate::dimension::Dimension;
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrdinaryPlastic {
     elastic: Ordinary,
-    /// ψ₀ m, J²/m⁶·m⁵: that of a point over its weighted volume is its yield value.
+    /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by its weighted volume.
     strength: f64,
-    /// m of a whole ball (m⁵), where yielding is not that of each point's own family.
+    /// m of an untruncated family (m⁵), if it determines the yield value of all points; `None` for the m of
+    /// each point.
     whole: Option<f64>,
 }
 
@@ -101,7 +108,7 @@ impl Described for OrdinaryPlastic {
 impl<const D: usize> Law<D> for OrdinaryPlastic {
     /// A/m and d κ θ/m (N/m⁷), the mean elastic stretch Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
     type Point = [Lanes; 4];
-    /// e_p/|ξ|, and the energy that is dissipated, J/m⁶.
+    /// e_p/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 2];
     type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 2];
@@ -123,7 +130,8 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
-    /// Σ ω|ξ| (ε − e_p) Ṽ and Σ ω|ξ|² Ṽ; then Σ ω ε_d² Ṽ; then the first again, after the flow; all m⁵.
+    /// Pass 0: Σ ω|ξ| (ε − e_p) Ṽ and Σ ω|ξ|² Ṽ. Pass 1: Σ ω ε_d² Ṽ. Pass 2: the sums of pass 0 after the
+    /// flow. All in m⁵.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -155,7 +163,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
                     .unwrap_or(self.elastic.extensional() / extension_factor);
                 let limit = 2.0 * self.strength / mass;
                 let square = extension_factor * extension_factor * sums[0];
-                // A point without bonds has no m, and nothing that could yield.
+                // Without bonds A/m is 0, so the square is 0 and the point does not yield.
                 numbers[3] = if square > limit {
                     1.0 - (limit / square).sqrt()
                 } else {

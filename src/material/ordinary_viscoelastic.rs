@@ -1,16 +1,17 @@
 //! Ordinary state-based standard linear solid: the deviatoric part of the force relaxes.
 //!
-//! Mitchell 2011, SAND2011-8064. Of the deviatoric extension ε_d each bond keeps a back extension e_b that
-//! follows it with a relaxation time τ; a share λ of the deviatoric force acts on ε_d − e_b:
+//! Mitchell 2011, SAND2011-8064. Each bond has a back extension e_b that follows the deviatoric extension ε_d
+//! with the relaxation time τ. The fraction λ of the deviatoric force acts on ε_d − e_b:
 //!
-//! t = (d k′θ/m) ω|ξ| + (A/m) ω (ε_d − λ e_b),  ė_b = (ε_d − e_b)/τ.
+//! t = (d k′θ/m) ω|ξ| + (A/m) ω (ε_d − λ e_b), ė_b = (ε_d − e_b)/τ.
 //!
-//! The energy W = ½ κθ² + ½ (A/m) Σ ω (ε² + λ (e_b² − 2 ε_d e_b)) Ṽ depends on θ through ε_d as well. Its slope, the
-//! force, has the further part λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ, which is 0 until bonds of the family break.
+//! The energy W = ½ κθ² + ½ (A/m) Σ ω (ε² + λ (e_b² − 2 ε_d e_b)) Ṽ also depends on θ through ε_d.
+//! Its derivative, the force, therefore has the additional term λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ. This term is 0
+//! until bonds of the family break.
 //!
-//! In a step in which ε_d changes evenly, e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a = exp(−Δt/τ) and
-//! β = 1 − (τ/Δt)(1 − a). The constants are those of the instantaneous response; in the end the shear
-//! modulus is (1 − λ) of it.
+//! ε_d is assumed to change linearly during a step. Then e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a =
+//! exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
+//! The elastic constants are those of the instantaneous response. The long-term shear modulus is (1 − λ) G.
 
 use super::ordinary::{INFLUENCE, Ordinary, eased_force, influence};
 use super::{
@@ -19,13 +20,13 @@ use super::{
 };
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrdinaryViscoelastic {
     elastic: Ordinary,
-    /// τ, s.
+    /// Relaxation time τ, s.
     relaxation_time: f64,
-    /// λ.
+    /// Relaxing fraction λ.
     relaxing_share: f64,
 }
 
@@ -86,12 +87,12 @@ impl Described for OrdinaryViscoelastic {
 }
 
 impl OrdinaryViscoelastic {
-    /// 1 − a and β of a step (s).
+    /// Return 1 − a and β of a step (s).
     fn relaxed(&self, step: f64) -> [f64; 2] {
         let x = step / self.relaxation_time;
         let gone = -libm::expm1(-x);
         let beta = if x < 1e-3 {
-            // 1 − (1 − e^−x)/x without the difference.
+            // Series of 1 − (1 − e^−x)/x, which avoids cancellation.
             x * (0.5 - x * (1.0 / 6.0 - x / 24.0))
         } else {
             1.0 - gone / x
@@ -101,9 +102,9 @@ impl OrdinaryViscoelastic {
 }
 
 impl<const D: usize> Law<D> for OrdinaryViscoelastic {
-    /// A/m and the part of the force per |ξ| that all bonds have (N/m⁷), and θ/d.
+    /// A/m, the force per |ξ| that all bonds of the point share (both N/m⁷), and θ/d.
     type Point = [Lanes; 3];
-    /// e_b/|ξ|, ε_d/|ξ|, and the energy that is dissipated, J/m⁶.
+    /// e_b/|ξ|, ε_d/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];
     type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 1];
@@ -125,7 +126,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
-    /// Σ ω|ξ|εṼ, then Σ ω|ξ| e_b Ṽ, m⁵.
+    /// Pass 0: Σ ω|ξ|εṼ. Pass 1: Σ ω|ξ| e_b Ṽ. Both in m⁵.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -168,7 +169,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         let deviatoric = bond.stretch - *even;
         let change = (*before - *back) * gone + (deviatoric - *before) * beta;
         let now = *back + change;
-        // What the dashpot takes, with its force in the middle of the step.
+        // Energy that the dashpot dissipates, with its force at the middle of the step.
         let force = (*before - *back + deviatoric - now) * (0.5 * self.relaxing_share);
         let taken = *extension_factor * (bond.length * bond.length) * force * change;
         [now, deviatoric, *loss + taken]

@@ -1,24 +1,29 @@
-//! Position-aware linear solid (PALS): an ordinary state-based solid whose influence functions are those of each point's own
-//! family.
+//! Position-aware linear solid (PALS): an ordinary state-based solid with influence functions fitted to each
+//! point's own family.
 //!
 //! Mitchell, Silling & Littlewood 2015. With the extension e = |Y| − |ξ|,
 //!
-//! θ = Σ ω|ξ| e Ṽ,  ε = e − θ|ξ|/d,  W = ½ k′θ² + ½ Σ σ ε² Ṽ,
+//! θ = Σ ω|ξ| e Ṽ, ε = e − θ|ξ|/d, W = ½ k′θ² + ½ Σ σ ε² Ṽ,
 //!
 //! t = (k′θ − (1/d) Σ σ|ξ| ε Ṽ) ω|ξ| + σ ε.
 //!
-//! At small homogeneous strains H a bond has e = |ξ| n·H n. ω and σ are the functions nearest to those of
-//! [`Ordinary`](super::Ordinary), ω₀ = d/m and σ₀ = A/m, for which probe strains, along the axes and in shear between them, have
+//! At a small homogeneous strain H, a bond of direction n has e = |ξ| n·H n.
+//! The functions ω and σ must satisfy, for probe strains H along the axes and in shear between the axes,
 //!
-//! Σ ω|ξ| e Ṽ = tr H,  Σ σ ε² Ṽ = 2G dev H : dev H.
+//! Σ ω|ξ| e Ṽ = tr H, Σ σ ε² Ṽ = 2G dev H : dev H.
 //!
-//! Distances are Σ |ξ|² (ω − ω₀)² Ṽ, so that the Lagrange multipliers give ω = n·Λ n and σ = N·S N with N_a = n_a² and
-//! symmetric Λ and S: all are functions of the direction n of the bond. ω makes the dilatation of every strain exact, not of the probes
-//! alone. An influence of the bonds multiplies both, as the loops do with all sums. Without the multipliers this is
-//! [`Ordinary`](super::Ordinary), for unbroken families.
+//! Among all such functions, ω and σ are nearest to those of [`Ordinary`](super::Ordinary), ω₀ = d/m and σ₀ =
+//! A/m.
+//! The distance is Σ |ξ|² (ω − ω₀)² Ṽ, and the same for σ.
+//! Lagrange multipliers then give ω = n·Λ n and σ = N·S N, with N_a = n_a² and symmetric matrices Λ and S.
+//! Because ω is quadratic in n, the dilatation is exact for every homogeneous strain, not only for the probe
+//! strains.
 //!
-//! A critical stretch that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)) with the σ_w of a whole family,
-//! which keeps the energy of the bond.
+//! The loops multiply ω and σ by the influence function of the deck, as in all sums. Without the multipliers
+//! this is [`Ordinary`](super::Ordinary), for unbroken families.
+//!
+//! A critical stretch that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)), with σ_w of
+//! an untruncated family. This keeps the energy of breaking the bond.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 
@@ -29,33 +34,35 @@ use super::{
 };
 use crate::lanes::Lanes;
 
-/// Smallest σ over σ₀: bonds with σ ≤ 0 would push when they are pulled. At a corner of a block σ is 0.42 σ₀.
+/// Smallest σ/σ₀; bonds with σ ≤ 0 would repel when stretched. At a corner of a block σ/σ₀ is 0.42.
 const SMALLEST: f64 = 0.1;
 
-/// Largest σ over σ₀: 1.8 at edges of a block, 12 in bars of three points, 30 in sheets of two.
+/// Largest σ/σ₀. It is 1.8 at edges of a block, 12 in bars of three points, and 30 in sheets of two.
 const LARGEST: f64 = 30.0;
 
-/// Share of the largest singular value below which multipliers are left at 0: 0.08 at a corner of a block, 0.007 in a sheet of
-/// two points, 0 in one of a single layer.
+/// Singular values below this fraction of the largest are dropped; their multipliers stay 0.
+///
+/// The smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two points, and 0 in a single
+/// layer.
 const RANK: f64 = 5e-3;
 
 /// Number of monomials of degree 4 in three variables.
 const MONOMIALS: usize = 15;
 
-/// Constants of a point beside the two tensors.
+/// Number of constants of a point in addition to Λ and S.
 const OTHERS: usize = 1;
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pals {
-    /// The law without multipliers.
+    /// The linear solid without multipliers.
     ordinary: Ordinary,
-    /// The critical stretch of the damage law follows from a fracture energy, and is scaled with σ.
+    /// Whether the critical stretch is scaled with σ, because it follows from a fracture energy.
     is_scaled: bool,
 }
 
 impl Pals {
-    /// From what a body has, in the plane or in space, and the influence of its bonds.
+    /// Create the law of a body with this influence function, in the plane or in space.
     pub(super) fn of(given: &Given, influence: Influence) -> Self {
         Self {
             ordinary: Ordinary::of(given, influence),
@@ -69,13 +76,13 @@ impl Pals {
         self.ordinary.volumetric() + self.ordinary.extensional() / (d * d)
     }
 
-    /// σ of a whole family, N/m⁷.
+    /// σ of an untruncated family, N/m⁷.
     fn whole(&self) -> f64 {
         self.ordinary.extensional() / self.ordinary.whole()
     }
 }
 
-/// It has no name of its own: `ordinary` is this law with `surface_correction = "pals"`.
+/// No deck name: decks write `ordinary` with `surface_correction = "pals"`.
 impl Declared for Pals {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
@@ -87,14 +94,14 @@ impl Described for Pals {
     }
 }
 
-/// N of eight bonds.
+/// Return N_a = n_a² of eight bonds.
 #[inline(always)]
 fn squares<const D: usize>(bond: &Bond<D>) -> [Lanes; D] {
     let inverse = bond.inverse * bond.inverse;
     bond.reference.map(|xi| xi * xi * inverse)
 }
 
-/// ω, 1/m⁵.
+/// Return ω of eight bonds, 1/m⁵.
 #[inline(always)]
 fn dilatational<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
     let xi = &bond.reference;
@@ -108,7 +115,7 @@ fn dilatational<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D
     sum * (bond.inverse * bond.inverse)
 }
 
-/// σ, N/m⁷.
+/// Return σ of eight bonds, N/m⁷.
 #[inline(always)]
 fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
     let square = squares(bond);
@@ -129,7 +136,8 @@ type Monomial = ([usize; 3], f64);
 /// A polynomial of degree 2 in the components of n or N.
 type Quadratic = [Monomial];
 
-/// The sum of the product of two polynomials over a family, from those of the monomials of degree 4.
+/// Return the sum over a family of the product of two polynomials, from the sums of the monomials of degree
+/// 4.
 fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
     let mut total = 0.0;
     for (a, of_a) in first {
@@ -142,7 +150,7 @@ fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
     total
 }
 
-/// Exponents of the product of two components.
+/// Return the exponents of the product of two components.
 fn of_product(a: usize, b: usize) -> [usize; 3] {
     let mut exponents = [0; 3];
     exponents[a] += 1;
@@ -150,18 +158,21 @@ fn of_product(a: usize, b: usize) -> [usize; 3] {
     exponents
 }
 
-/// A function of the direction that is nearest to a constant and has given sums with some polynomials.
+/// Result of a fit: the function of the direction nearest to a constant that satisfies given sums.
 struct Fit<const D: usize> {
-    /// The function n·T n, or N·T N.
+    /// Matrix of the function: T in n·T n or N·T N.
     tensor: SMatrix<f64, D, D>,
-    /// Its square, summed over the family.
+    /// Sum over the family of the squared function.
     square: f64,
-    /// Itself, summed over the family.
+    /// Sum over the family of the function.
     sum: f64,
 }
 
-/// The function c + Σ τ_k p_k with Σ p_l (c + Σ τ_k p_k) = wanted_l, as far as the family allows; of sums over monomials of
-/// degree 4 in the components of n or N, the squares of which or themselves add up to 1: `one` is the polynomial 1.
+/// Fit the function c + Σ τ_k p_k to the conditions Σ p_l (c + Σ τ_k p_k) = wanted_l, as far as the family
+/// allows.
+///
+/// `sums` are the sums over the family of the monomials of degree 4, in the components of n or N.
+/// `one` is the polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².
 fn nearest<const D: usize>(
     sums: &[f64],
     constant: f64,
@@ -176,7 +187,7 @@ fn nearest<const D: usize>(
         let (polynomial, wanted) = &conditions[r];
         wanted - constant * product(sums, polynomial, one)
     });
-    // The decomposition of numbers that are not finite would not end.
+    // The decomposition of a matrix with NaN or infinity would not terminate.
     let multipliers = if matrix.iter().chain(missing.iter()).all(|x| x.is_finite()) {
         let decomposition = matrix.svd(true, true);
         let limit = RANK * decomposition.singular_values.max();
@@ -207,19 +218,21 @@ fn nearest<const D: usize>(
     }
 }
 
-/// n·n as a polynomial in n, of which Λ = c I is the constant c.
+/// Return the polynomial n·n = 1; with the factor c its matrix is Λ = c I.
 fn one_in_directions<const D: usize>() -> Vec<([usize; 3], f64)> {
     (0..D).map(|a| (of_product(a, a), 1.0)).collect()
 }
 
-/// (Σ N_a)² as a polynomial in N, of which S_ab = c is the constant c.
+/// Return the polynomial (Σ N_a)² = 1; with the factor c its matrix is S_ab = c.
 fn one_in_squares<const D: usize>() -> Vec<([usize; 3], f64)> {
     let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
     pairs.map(|(a, b)| (of_product(a, b), 1.0)).collect()
 }
 
-/// ω: of the sums of |ξ|² Ṽ times the monomials of n, with Σ |ξ|² ω n_a n_b Ṽ = δ_ab. Mixed conditions are weighted by the two
-/// components that they stand for, so that the function turns with the family.
+/// Fit ω with the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab, from the sums of |ξ|² Ṽ times the monomials of n.
+///
+/// Mixed conditions have the weight √2, because each represents two components. Therefore the fitted function
+/// rotates with the family.
 fn dilatational_fit<const D: usize>(sums: &[f64], weighted_volume: f64) -> Fit<D> {
     let axes = (0..D).map(|a| (vec![(of_product(a, a), 1.0)], 1.0));
     let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2_f64.sqrt())], 0.0));
@@ -228,8 +241,10 @@ fn dilatational_fit<const D: usize>(sums: &[f64], weighted_volume: f64) -> Fit<D
     nearest(sums, D as f64 / weighted_volume, &one, &conditions)
 }
 
-/// σ/σ₀: of the sums of |ξ|² Ṽ times the monomials of N, from Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H for unit strains H along
-/// the axes and pure shears 1/√2 between them.
+/// Fit σ/σ₀ with the conditions Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H, from the sums of |ξ|² Ṽ times the
+/// monomials of N.
+///
+/// The probe strains H are unit strains along the axes and pure shears 1/√2 between the axes.
 fn deviatoric_fit<const D: usize>(sums: &[f64], weighted_volume: f64) -> Fit<D> {
     let count = D as f64;
     let axes = (0..D).map(|k| {
@@ -245,7 +260,7 @@ fn deviatoric_fit<const D: usize>(sums: &[f64], weighted_volume: f64) -> Fit<D> 
         (square.collect(), 1.0 - 1.0 / count)
     });
     let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2.0)], 1.0));
-    // 2G over σ₀ = A/m.
+    // The ratio 2G/σ₀ with σ₀ = A/m.
     let modulus = 2.0 / (count * (count + 2.0)) * weighted_volume;
     let conditions: Vec<_> = axes
         .chain(shears)
@@ -254,12 +269,12 @@ fn deviatoric_fit<const D: usize>(sums: &[f64], weighted_volume: f64) -> Fit<D> 
     nearest(sums, 1.0, &one_in_squares::<D>(), &conditions)
 }
 
-/// The smallest and the largest N·S N of all N with N_a ≥ 0 and Σ N_a = 1: at a corner of this triangle, on one of its edges or
-/// inside.
+/// Return the smallest and the largest N·S N over all N with N_a ≥ 0 and Σ N_a = 1. The extremes lie at a
+/// corner of this triangle, on an edge or inside.
 fn extremes<const D: usize>(tensor: &SMatrix<f64, D, D>) -> [f64; 2] {
     let mut values: Vec<f64> = tensor.diagonal().iter().copied().collect();
     for (a, b) in mixed::<D>() {
-        // On an edge N = (t, 1 − t): a parabola in t.
+        // On an edge N = (t, 1 − t), so N·S N is a parabola in t.
         let [first, second, both] = [tensor[(a, a)], tensor[(b, b)], tensor[(a, b)]];
         let t = (second - both) / (first + second - 2.0 * both);
         if (0.0..=1.0).contains(&t) {
@@ -267,7 +282,7 @@ fn extremes<const D: usize>(tensor: &SMatrix<f64, D, D>) -> [f64; 2] {
             values.push(first * t * t + 2.0 * both * t * u + second * u * u);
         }
     }
-    // Inside S N is the same in all directions, and N·S N with it.
+    // At an extreme inside the triangle all components of S N are equal, and N·S N equals this component.
     if D == 3
         && let Some(inverse) = DMatrix::from_fn(D, D, |a, b| tensor[(a, b)]).try_inverse()
     {
@@ -284,7 +299,7 @@ fn extremes<const D: usize>(tensor: &SMatrix<f64, D, D>) -> [f64; 2] {
     )
 }
 
-/// σ/σ₀ with values from [`SMALLEST`] to [`LARGEST`]: nearer to 1 where it would leave them.
+/// Limit σ/σ₀ to the range from [`SMALLEST`] to [`LARGEST`], by a factor on its difference from 1.
 fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let [least, most] = extremes(&tensor);
     let share = |value: f64, limit: f64| {
@@ -299,11 +314,13 @@ fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     tensor.map(|entry| 1.0 + share * (entry - 1.0))
 }
 
-/// The largest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ, in `d` dimensions.
+/// Return the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ, in `d` dimensions.
 ///
-/// In the scalar product Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ and ε = e − (θ/d)|ξ|. Of R ≥ ⟨r, r⟩, Q = ⟨|ξ|, |ξ|⟩ and
-/// τ = ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ follow the components of ε along r and across it; λ is the larger eigenvalue of
-/// [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². It grows with R.
+/// In the scalar product ⟨a, b⟩ = Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|.
+/// The inputs are R ≥ ⟨r, r⟩, Q = ⟨|ξ|, |ξ|⟩ and τ = ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. These give the components of ε
+/// along r and normal to r.
+/// λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². λ grows with
+/// R.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
     let determinant = bulk_modulus * r + (1.0 - tau / d).powi(2);
@@ -312,10 +329,11 @@ fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
 }
 
 impl<const D: usize> Law<D> for Pals {
-    /// Λ (1/m⁵), S and a spring constant that the energy nowhere exceeds (N/m⁷); then k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
+    /// Constants: Λ (1/m⁵), S, and a spring constant that bounds the energy (N/m⁷). Then k′θ − (1/d) Σ σ|ξ| ε
+    /// Ṽ (Pa) and θ/d.
     type Point = ((Symmetric<D>, Symmetric<D>), [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
-    /// Σ |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
+    /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
     type ReferenceSum = [Lanes; 2 * MONOMIALS];
     /// θ, Σ σ|ξ| e Ṽ and Σ σ|ξ|² Ṽ (Pa) over the intact bonds.
     type Sum = [Lanes; 3];
@@ -352,7 +370,7 @@ impl<const D: usize> Law<D> for Pals {
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         let (of_directions, of_squares) = sums.split_at(MONOMIALS);
         let weighted_volume = weighted_volume::<D>(sums);
-        // A point without bonds.
+        // The point has no bonds.
         if weighted_volume <= 0.0 {
             return;
         }
@@ -362,7 +380,7 @@ impl<const D: usize> Law<D> for Pals {
         to_entries(&omega.tensor, numbers);
         to_entries(&(sigma * reference), &mut numbers[2 * D..]);
         let [least, most] = extremes(&sigma).map(|value| value * reference);
-        // Σ σ|ξ|² Ṽ.
+        // The sum Σ σ|ξ|² Ṽ.
         let square = {
             let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
             let polynomial: Vec<_> = pairs
@@ -461,7 +479,7 @@ impl<const D: usize> Law<D> for Pals {
     }
 }
 
-/// Σ |ξ|² Ṽ, m⁵.
+/// Weighted volume Σ |ξ|² Ṽ, m⁵.
 fn weighted_volume<const D: usize>(sums: &[f64]) -> f64 {
     let one = one_in_directions::<D>();
     product(&sums[..MONOMIALS], &one, &one)
@@ -472,7 +490,7 @@ mod tests {
     use super::*;
     use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-    /// Neighbours of unit volume on a cubic lattice, at most 3 away, that a condition keeps.
+    /// Neighbours of unit volume on a cubic lattice, within a distance of 3, that fulfil a condition.
     fn family(kept: impl Fn([i32; 3]) -> bool) -> Vec<Vector3<f64>> {
         let all =
             (-3..=3).flat_map(|x| (-3..=3).flat_map(move |y| (-3..=3).map(move |z| [x, y, z])));
@@ -510,7 +528,7 @@ mod tests {
         }
     }
 
-    /// ω and σ of bonds, and the spring constant.
+    /// Return ω and σ of the bonds, and the spring constant.
     fn functions(family: &[Vector3<f64>]) -> (Vec<[f64; 2]>, f64) {
         let mut numbers = [0.0; 16];
         Law::<3>::constants(&law(), &sums(family), &mut numbers);
@@ -571,8 +589,8 @@ mod tests {
         }
     }
 
-    /// It takes the extremes of σ for all bonds: with volumes that are not corrected, those of a whole family differ by a factor
-    /// of two.
+    /// The spring constant uses the extremes of σ over all bonds. Without volume correction, σ varies by a
+    /// factor of two even in an untruncated family.
     #[test]
     fn the_spring_constant_bounds_the_energy() {
         let law = law();
@@ -592,7 +610,7 @@ mod tests {
             ("sheet", family(|[.., z]| z == 0), 1.7),
         ] {
             let (functions, bound) = functions(&family);
-            // 2W = e·A e.
+            // Matrix A of 2W = e·A e.
             let count = family.len();
             let mut matrix = DMatrix::zeros(count, count);
             let lengths = DVector::from_iterator(count, family.iter().map(|xi| xi.norm()));

@@ -1,23 +1,23 @@
-//! What plastic flow leaves at a point, from step to step.
+//! Plastic state of a point, stored from step to step.
 
-/// Plastic strain and what came of it; 0 at the start.
+/// Plastic strain, equivalent plastic strain and dissipated energy; initially 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlasticState {
-    /// E_p, or C_p⁻¹ − I where the strain is logarithmic: xx, yy, zz, yz, xz, xy.
+    /// E_p, or C_p⁻¹ − I for logarithmic strains, in the order xx, yy, zz, yz, xz, xy.
     pub strain: [f64; 6],
-    /// ∫ √(⅔ Ė_p:Ė_p) dt.
+    /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,
-    /// Energy of the zero-energy control of the elastic body, J/m³.
+    /// Energy that the zero-energy control would have in an elastic body, J/m³.
     pub control: f64,
-    /// What flow has dissipated, J/m³.
+    /// Energy that plastic flow has dissipated, J/m³.
     pub work: f64,
 }
 
 impl PlasticState {
-    /// How many numbers it has.
+    /// Count of the numbers in a state.
     pub const COUNT: usize = 9;
 
-    /// From its numbers, in the order in which they are declared.
+    /// Create a state from its numbers, in the order of the fields.
     pub fn of(numbers: [f64; Self::COUNT]) -> Self {
         let [strain @ .., equivalent, control, work] = numbers;
         Self {
@@ -28,7 +28,7 @@ impl PlasticState {
         }
     }
 
-    /// Its numbers, in the order in which they are declared.
+    /// Return the numbers of the state, in the order of the fields.
     pub fn numbers(&self) -> [f64; Self::COUNT] {
         let Self {
             strain: [xx, yy, zz, yz, xz, xy],

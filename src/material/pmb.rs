@@ -1,8 +1,8 @@
 //! Prototype microelastic material: f = c s e, w = c s² |ξ| / 2; each end exerts half of the force.
 //!
-//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6. The
-//! micromodulus c follows from equal strain energy under isotropic expansion. Without failure this is
-//! the proportional microelastic material of Emmrich & Weckner 2006, eq. 9.
+//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6.
+//! The micromodulus c follows from equal strain energy under isotropic expansion. Without failure this is the
+//! proportional microelastic material of Emmrich & Weckner 2006, eq. 9.
 
 use std::f64::consts::PI;
 
@@ -18,16 +18,20 @@ use crate::lanes::{Lanes, Simd};
 /// The law with its only constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pmb {
-    /// c, N/m⁶.
+    /// Micromodulus c, N/m⁶.
     pub micromodulus: f64,
 }
 
 impl Pmb {
-    /// From Young's modulus E (Pa) and the horizon δ (m).
+    /// Create the law from Young's modulus E (Pa) and the horizon δ (m).
     ///
-    /// 3-D: 12E/(πδ⁴) = 18K/(πδ⁴). Plane stress, ν = 1/3: 6E/(πδ³(1−ν)h) = 9E/(πδ³h), Dipasquale
-    /// et al. eq. 4. Plane strain: 48E/(5πδ³h), Emmrich & Weckner 2006, eq. 10. 1-D: 2E/(δ²A) under uniaxial stress,
-    /// 2(λ + 2G)/(δ²A) = 12E/(5δ²A) under uniaxial strain.
+    /// | dimension | c | source |
+    /// |---|---|---|
+    /// | 3-D | 12E/(πδ⁴) = 18K/(πδ⁴) | |
+    /// | plane stress, ν = 1/3 | 6E/(πδ³(1−ν)h) = 9E/(πδ³h) | Dipasquale et al., eq. 4 |
+    /// | plane strain | 48E/(5πδ³h) | Emmrich & Weckner 2006, eq. 10 |
+    /// | 1-D, uniaxial stress | 2E/(δ²A) | |
+    /// | 1-D, uniaxial strain | 2(λ + 2G)/(δ²A) = 12E/(5δ²A) | |
     pub fn new(dimension: Dimension, youngs_modulus: f64, horizon: f64) -> Self {
         let factor = match dimension {
             Dimension::Space => 12.0 / (PI * horizon.powi(4)),
@@ -46,14 +50,16 @@ impl Pmb {
         }
     }
 
-    /// From what a body has.
+    /// Create the law of a body.
     pub fn of(given: &Given) -> Self {
         Self::new(given.dimension, given.elastic.youngs_modulus, given.horizon)
     }
 
-    /// Classical energy density at unit isotropic stretch W₁ (J/m³) of the solid that the law can be:
-    /// 3-D 9K/2 = 3E, plane stress E/(1−ν), plane strain E/((1+ν)(1−2ν)), uniaxial stress E/2, uniaxial strain
-    /// (λ + 2G)/2.
+    /// Classical energy density W₁ at unit isotropic stretch (J/m³), with the Poisson ratio of bond-based
+    /// laws.
+    ///
+    /// It is 9K/2 = 3E in 3-D, E/(1−ν) in plane stress and E/((1+ν)(1−2ν)) in plane strain. In 1-D it is E/2
+    /// in uniaxial stress and (λ + 2G)/2 in uniaxial strain.
     pub fn isotropic_energy(dimension: Dimension, youngs_modulus: f64) -> f64 {
         youngs_modulus
             * match dimension {
@@ -150,7 +156,7 @@ impl<const D: usize> Law<D> for Pmb {
 mod tests {
     use super::*;
 
-    /// ½ ∫ w dV over the full horizon at isotropic strain ε: c ε² times ∫ |ξ| dV / 4.
+    /// ½ ∫ w dV over an untruncated family at isotropic strain ε: c ε² times ∫ |ξ| dV / 4.
     fn energy_density(dimension: Dimension, horizon: f64, strain: f64) -> f64 {
         let c = Pmb::new(dimension, 1.0, horizon).micromodulus;
         let moment = match dimension {

@@ -1,12 +1,13 @@
-//! Code generated from the list of laws: their enums, the dispatch to each law, and all declarations.
+//! Macro that generates code from the list of laws: the enums, the dispatch to each law, and all
+//! declarations.
 
-/// Makes the enums of laws, and the macros that run code for whichever law it is, from the list of
-/// laws. `$` stands first because the macros that are made need it.
+/// Generate, from the list of laws, the enums of laws and the macros that dispatch to a law. The first
+/// argument is `$`, because the generated macros need it.
 macro_rules! register {
     ($d:tt $($file:ident :: $law:ident),+ $(,)?) => {
         $(pub use $file::$law;)+
 
-        /// One of the laws.
+        /// Any of the laws.
         #[derive(Debug, Clone, Copy, PartialEq)]
         #[expect(clippy::large_enum_variant, reason = "there is one a body, not one a point")]
         pub enum AnyLaw {
@@ -21,16 +22,16 @@ macro_rules! register {
             }
         )+
 
-        /// The laws of the own and of the far end of bonds.
+        /// The laws of both ends of bonds.
         #[derive(Debug, Clone, Copy)]
         pub enum PairLaw {
             $($law([$law; 2]),)+
-            /// Different laws at the two ends.
+            /// Points i and j have different laws.
             Mixed([AnyLaw; 2]),
         }
 
         impl PairLaw {
-            /// From the laws of the own and of the far end.
+            /// Create the pair from the laws of points i and j.
             pub fn new(here: AnyLaw, there: AnyLaw) -> Self {
                 match (here, there) {
                     $((AnyLaw::$law(here), AnyLaw::$law(there)) => Self::$law([here, there]),)+
@@ -47,7 +48,7 @@ macro_rules! register {
             }
         }
 
-        /// Runs code for whichever law an [`AnyLaw`] is; compiled for each.
+        /// Run code for the law in an [`AnyLaw`]. The code is compiled once per law.
         macro_rules! with_law {
             ($d any:expr, $d law_name:ident => $d body:expr) => {
                 match $d any {
@@ -57,7 +58,7 @@ macro_rules! register {
         }
         pub(crate) use with_law;
 
-        /// Runs code for whichever laws a [`PairLaw`] has; compiled for each.
+        /// Run code for the laws in a [`PairLaw`]. The code is compiled once per law.
         macro_rules! with_pair {
             ($d pair:expr, $d laws:ident => $d body:expr) => {
                 match $d pair {
@@ -68,17 +69,17 @@ macro_rules! register {
         }
         pub(crate) use with_pair;
 
-        /// Counts of the numbers of each law in three dimensions.
+        /// Sizes of the data of each law in three dimensions.
         const COUNTS: &[Counts] = &[$(Counts::of::<$law, 3>()),+];
 
         const DECLARATIONS: &[&[Declaration]] = &[$(<$law as Declared>::DECLARATIONS),+];
 
-        /// The declarations of all laws.
+        /// Return the declarations of all laws.
         pub fn declarations() -> impl Iterator<Item = &'static Declaration> + Clone {
             DECLARATIONS.iter().copied().flatten()
         }
 
-        // The declarations of a law must agree with its loops.
+        // `Declaration::linear` must agree with `Law::LINEAR`.
         $(
             const _: () = {
                 let mut k = 0;

@@ -1,11 +1,13 @@
 //! Rotation of a family: the orthogonal factor R of its deformation gradient F = R U.
 //!
-//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ, |φ| ≤ π:
+//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ, |φ| ≤
+//! π. The formula
 //!
 //! (R − I) ξ = q₀ t + q × t with t = 2 q × ξ
 //!
-//! keeps all digits at small angles and needs no division in the loops. In the plane only q_z and q₀ are not 0. R is
-//! found with additions, products, quotients and square roots alone, so that its bits are the same on every machine.
+//! is accurate at small angles and needs no division in the loops. In the plane only q_z and q₀ are nonzero.
+//! R is computed with additions, multiplications, divisions and square roots only. Its bits are therefore the
+//! same on every machine.
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -14,16 +16,18 @@ use crate::lanes::{Lanes, Simd};
 /// q by component, then q₀.
 pub type Rotation = [f64; 4];
 
-/// R = I.
+/// The identity, R = I.
 pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 
-/// Iterations of the polar decomposition at most; strains of a factor of a thousand take about fifteen.
+/// Largest number of iterations of the polar decomposition; stretches of a factor of a thousand need about
+/// fifteen.
 const MOST_ITERATIONS: usize = 40;
 
-/// The change of an entry of R in an iteration below which R has converged; the next change would be its square.
+/// R has converged if no entry changes by more than this in an iteration; the next change would be its
+/// square.
 const CONVERGED: f64 = 1e-9;
 
-/// R of a deformation gradient in the plane or in space; the identity if det F ≤ 0.
+/// Return R of a deformation gradient in the plane or in space; the identity if det F ≤ 0.
 pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     let mut f = Matrix3::identity();
     f.view_mut((0, 0), (D, D)).copy_from(gradient);
@@ -33,7 +37,7 @@ pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     }
 }
 
-/// R in the plane turns by the angle of the vector (F_xx + F_yy, F_yx − F_xy).
+/// Return R in the plane. Its angle is that of the vector (F_xx + F_yy, F_yx − F_xy).
 fn in_plane(f: &Matrix3<f64>) -> Rotation {
     let (cosine, sine) = (f[(0, 0)] + f[(1, 1)], f[(1, 0)] - f[(0, 1)]);
     let length = (cosine * cosine + sine * sine).sqrt();
@@ -45,9 +49,9 @@ fn in_plane(f: &Matrix3<f64>) -> Rotation {
     }
 }
 
-/// cos(φ/2) and sin(φ/2) from cos φ and sin φ, |φ| ≤ π.
+/// Return cos(φ/2) and sin(φ/2) from cos φ and sin φ, |φ| ≤ π.
 fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
-    // The larger of both follows from a root, the other one from sin φ = 2 sin(φ/2) cos(φ/2).
+    // The larger one follows from a square root, the smaller one from sin φ = 2 sin(φ/2) cos(φ/2).
     if cosine > -0.5 {
         let half = (0.5 * (1.0 + cosine)).sqrt();
         [half, 0.5 * sine / half]
@@ -58,14 +62,14 @@ fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
     }
 }
 
-/// R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986), if det F > 0.
+/// Return R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986); `None` if det F ≤ 0.
 fn orthogonal_factor(f: Matrix3<f64>) -> Option<Matrix3<f64>> {
     let mut x = f;
     for _ in 0..MOST_ITERATIONS {
         let [a, b, c] = [0, 1, 2].map(|k| x.column(k).into_owned());
         let cofactors = Matrix3::from_columns(&[b.cross(&c), c.cross(&a), a.cross(&b)]);
         let determinant = a.dot(&cofactors.column(0));
-        // False for what is not a number, too.
+        // False for NaN, too.
         let is_proper = determinant > 0.0;
         if !is_proper {
             return None;
@@ -80,7 +84,8 @@ fn orthogonal_factor(f: Matrix3<f64>) -> Option<Matrix3<f64>> {
     None
 }
 
-/// The quaternion of a rotation matrix, q₀ ≥ 0. The largest of its entries is found first (Shepperd 1978).
+/// Return the quaternion of a rotation matrix, q₀ ≥ 0. Its largest component is computed first (Shepperd
+/// 1978).
 fn quaternion(r: &Matrix3<f64>) -> Rotation {
     let [x, y, z] = [r[(0, 0)], r[(1, 1)], r[(2, 2)]];
     let squares = [
@@ -109,7 +114,8 @@ fn quaternion(r: &Matrix3<f64>) -> Rotation {
     [x, y, z, q0].map(|entry| entry * sign)
 }
 
-/// (R − I) ξ of eight bonds, m. Written out by component: the compiler keeps what a loop indexes in memory.
+/// Return (R − I) ξ of eight bonds, m. The components are written out, because the compiler keeps indexed
+/// arrays in memory instead of registers.
 #[inline(always)]
 pub fn displacement<S: Simd, const D: usize>(
     simd: S,
@@ -145,7 +151,7 @@ mod tests {
     use super::*;
     use crate::lanes::simd::Portable;
 
-    /// R ξ.
+    /// Return R ξ.
     fn turned<const D: usize>(rotation: &Rotation, xi: [f64; D]) -> [f64; D] {
         let change = displacement(
             Portable::<true>,

@@ -1,23 +1,26 @@
-//! Softening microelastic material: f = c (1 − d) s e where the bond is pulled, with the damage variable d of its
-//! largest stretch κ so far; f = c s e where it is pushed.
+//! Softening microelastic material. In tension f = c (1 − d) s e, where the damage variable d depends on the
+//! largest past stretch κ. In compression f = c s e.
 //!
-//! On first loading f/c is F(κ): κ up to the strength stretch s0, then a curve that falls from s0 at s0 to 0 at the
-//! critical stretch sc, and 1 − d = F(κ)/κ. Unloading goes to the origin. Damage does not act under compression, as
-//! where the faces of a crack close.
+//! On first loading f/c is F(κ), and 1 − d = F(κ)/κ.
+//! F is κ up to the strength stretch s0, and then falls from s0 to 0 at the critical stretch sc. Unloading
+//! goes to the origin.
+//! Damage does not act in compression, because the faces of a crack close.
 //!
 //! | curve | F between s0 and sc |
 //! |---|---|
 //! | bilinear | s0 (sc − κ)/(sc − s0) |
-//! | trilinear | straight from s0 at s0 to β s0 at s0 + γ (sc − s0), and to 0 at sc |
+//! | trilinear | linear from s0 to β s0 at κ = s0 + γ (sc − s0), and from there to 0 at sc |
 //! | exponential | s0 (exp(−(κ − s0)/a) − r)/(1 − r), sc = s0 + a ln(1/r) |
 //!
-//! A body that is pulled along an axis, and free across, bears more than E s0: as the bonds along the axis soften, others
-//! come nearer to their strength. s0 follows from the tensile strength f_t so that f_t is the largest stress of that
-//! homogeneous motion, found by quadrature over the directions of the bonds.
+//! A body in uniaxial tension bears more than E s0. When the bonds along the axis soften, bonds in other
+//! directions approach their strength.
+//! Therefore s0 is chosen such that the tensile strength f_t is the largest stress in uniaxial tension. This
+//! stress is computed by quadrature over the directions of the bonds.
 //!
-//! A bond that is pulled to sc takes c |ξ| A with A = ∫ F dκ. One of the prototype law that breaks at s_e takes
-//! c |ξ| s_e²/2: with A = s_e²/2 all bonds across a unit area take the fracture energy for which s_e is the critical
-//! stretch of the prototype law, in every dimension.
+//! Stretching a bond to sc takes c |ξ| A with A = ∫ F dκ. Breaking a `pmb` bond at the stretch s_e takes c
+//! |ξ| s_e²/2.
+//! With A = s_e²/2 the bonds across a unit area take the fracture energy for which s_e is the critical
+//! stretch of `pmb`. This holds in every dimension.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -32,43 +35,45 @@ use crate::elastic::Isotropic;
 use crate::lanes::{IsaSet, Lanes, WIDTH};
 use crate::message::format_number;
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SofteningPmb {
     /// The elastic part.
     pub elastic: Pmb,
-    /// s0.
+    /// Strength stretch s0.
     pub strength_stretch: f64,
-    /// sc.
+    /// Critical stretch sc.
     pub critical_stretch: f64,
-    /// F between s0 and sc.
+    /// Curve F between s0 and sc.
     pub curve: SofteningCurve,
 }
 
-/// How the force of a bond falls.
+/// Decrease of a bond's force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SofteningCurve {
-    /// Two straight lines that meet at the stretch `kink`, where the force is the share `kink_force` of the strength.
+    /// Two straight lines that meet at the stretch `kink`, where the force is `kink_force` times the
+    /// strength.
     Lines {
-        /// s0 + γ (sc − s0).
+        /// The stretch s0 + γ (sc − s0).
         kink: f64,
-        /// β.
+        /// The factor β.
         kink_force: f64,
     },
-    /// With this decay stretch a.
+    /// Exponential decrease.
     Exponential {
-        /// a.
+        /// Decay stretch a.
         decay: f64,
     },
 }
 
-/// r: the share of the strength at which an exponential without end has come to sc.
+/// Residual r: fraction of the strength that an unshifted exponential has at sc.
 const RESIDUAL: f64 = 0.01;
 
-/// ln(1/r).
+/// Number of decay stretches from s0 to sc, ln(1/r).
 const DECAYS: f64 = 4.605_170_185_988_092;
 
-/// β and γ of a straight line, and of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t of 3.6 G_F/f_t.
+/// β and γ of a straight line; then β and γ of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t, 0 at 3.6
+/// G_F/f_t.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
 const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 
@@ -169,7 +174,7 @@ fn number(values: &Values, key: &Key) -> Option<f64> {
     values.get(key.name).map(|_| values.number(key.name))
 }
 
-/// Strength or end that is given twice or not at all, or a kink that the curve does not have.
+/// Check that strength and end are each given exactly once, and that only `trilinear` has kink keys.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     for [first, second] in [
         [&TENSILE_STRENGTH, &STRENGTH_STRETCH],
@@ -196,7 +201,7 @@ fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     })
 }
 
-/// β and γ of a curve of lines.
+/// Return β and γ of a curve of lines.
 fn kink(values: &Values) -> [f64; 2] {
     if values.word(CURVE.name) == "bilinear" {
         return STRAIGHT;
@@ -208,7 +213,7 @@ fn kink(values: &Values) -> [f64; 2] {
     ]
 }
 
-/// ∫ F dκ from s0 to sc over s0 (sc − s0).
+/// Return ∫ F dκ from s0 to sc, divided by s0 (sc − s0).
 fn fullness(values: &Values) -> f64 {
     if values.word(CURVE.name) == "exponential" {
         1.0 / DECAYS - RESIDUAL / (1.0 - RESIDUAL)
@@ -218,8 +223,8 @@ fn fullness(values: &Values) -> f64 {
     }
 }
 
-/// The modulus of a bar that is pulled along its axis in a setting, Pa. Bonds have ν = 1/4 under uniaxial strain, whatever is
-/// given there.
+/// Return the ratio of stress to strain in uniaxial tension, Pa. Under uniaxial strain the Poisson ratio is
+/// 1/4, which overrides the given ratio.
 fn tensile_modulus(given: &Given) -> f64 {
     let elastic = Isotropic {
         poisson_ratio: 0.25,
@@ -228,7 +233,7 @@ fn tensile_modulus(given: &Given) -> f64 {
     CriticalStretch::tensile_modulus(given.dimension, elastic)
 }
 
-/// sc for an s0.
+/// Return sc from s0.
 fn critical_stretch(given: &Given, strength: f64) -> f64 {
     let values = given.values;
     number(values, &CRITICAL_STRETCH).unwrap_or_else(|| {
@@ -239,10 +244,11 @@ fn critical_stretch(given: &Given, strength: f64) -> f64 {
     })
 }
 
-/// Iterations for s0 from f_t. The largest stress changes little with sc/s0: each gains more than half a digit.
+/// Iterations for s0 from f_t. The largest stress depends weakly on sc/s0; an iteration gains more than half
+/// a digit.
 const STRENGTH_ITERATIONS: u32 = 8;
 
-/// s0 and sc.
+/// Return s0 and sc.
 fn stretches(given: &Given) -> (f64, f64) {
     let values = given.values;
     if let Some(strength) = number(values, &STRENGTH_STRETCH) {
@@ -266,7 +272,7 @@ fn stretches(given: &Given) -> (f64, f64) {
     (strength, critical_stretch(given, strength))
 }
 
-/// F between these s0 and sc.
+/// Create the curve F between these s0 and sc.
 fn curve(values: &Values, strength: f64, critical: f64) -> SofteningCurve {
     let falls = critical - strength;
     if values.word(CURVE.name) == "exponential" {
@@ -281,14 +287,14 @@ fn curve(values: &Values, strength: f64, critical: f64) -> SofteningCurve {
     }
 }
 
-/// With four digits.
+/// Format a number with four digits.
 fn rounded(number: f64) -> String {
     let digits = format!("{number:.3e}");
     digits.parse().map_or(digits, format_number)
 }
 
-/// Bonds that would break before they soften: with a long horizon they hold more than the fracture energy at their
-/// strength.
+/// Return the error of a horizon at which bonds would break before they soften. With a long horizon, bonds at
+/// their strength store more than the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -326,35 +332,35 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Directions of the bonds between an axis and the plane normal to it, in the quadrature of the stress.
+/// Number of directions between the axis and the plane normal to the axis, in the quadrature of the stress.
 const DIRECTIONS: usize = 64;
 
-/// Growth of the strain from one motion to the next, the share of the largest stress below which no larger one is
-/// expected, and the most motions.
+/// Search for the largest stress: factor of the strain from one sample to the next; fraction of the largest
+/// stress at which the search ends; maximum number of samples.
 const STRAIN_GROWTH: f64 = 1.02;
 const PAST_LARGEST: f64 = 0.95;
 const MOST_STRAINS: usize = 400;
 
-/// Iterations for the strain across.
+/// Bisection steps for the transverse strain.
 const ACROSS_ITERATIONS: usize = 25;
 
 impl SofteningPmb {
-    /// F, on first loading.
+    /// Return F on first loading; linear in compression.
     fn first_loading(&self, stretch: Lanes) -> Lanes {
         let zero = Lanes::splat(0.0);
         let pulled = stretch.max(zero);
         pulled * self.secant(pulled) + stretch.min(zero)
     }
 
-    /// The largest stress of a homogeneous body that is pulled along an axis, and free across, over the stress at the
-    /// strength stretch without softening.
+    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by the elastic stress at
+    /// the strength stretch.
     pub fn largest_tension(&self, dimension: Dimension) -> f64 {
         let in_space = match dimension {
             Dimension::Line { .. } => return 1.0,
             Dimension::PlaneStress { .. } | Dimension::PlaneStrain { .. } => false,
             Dimension::Space => true,
         };
-        // Squares of the cosine and of the sine of the angle to the axis, and what a direction counts.
+        // cos² and sin² of the angle to the axis, and the weight of the direction.
         let directions: [[Lanes; 3]; DIRECTIONS / WIDTH] = std::array::from_fn(|group| {
             let angle = |lane: usize| {
                 let middle = (WIDTH * group + lane) as f64 + 0.5;
@@ -369,7 +375,7 @@ impl SofteningPmb {
             let (cos, sin) = (lanes(libm::cos), lanes(libm::sin));
             [cos * cos, sin * sin, weight]
         });
-        // Stress along and across.
+        // Axial and transverse stress.
         let stress = |along: f64, across: f64| {
             let mut sums = [Lanes::splat(0.0); 2];
             for [cos2, sin2, weight] in directions {
@@ -380,7 +386,7 @@ impl SofteningPmb {
             sums.map(Lanes::sum)
         };
         let free_across = |along: f64| {
-            // Pressed as much as it is pulled, it is pressed across.
+            // The transverse stress is compressive at the transverse strain −along, and tensile at 0.
             let (mut low, mut high) = (-along, 0.0);
             for _ in 0..ACROSS_ITERATIONS {
                 let middle = 0.5 * (low + high);
@@ -418,7 +424,7 @@ impl Described for SofteningPmb {
 }
 
 impl SofteningPmb {
-    /// Largest stretches from s0 to sc.
+    /// Clamp largest stretches to the range from s0 to sc.
     #[inline(always)]
     fn in_softening(&self, largest: Lanes) -> Lanes {
         largest
@@ -426,14 +432,14 @@ impl SofteningPmb {
             .min(Lanes::splat(self.critical_stretch))
     }
 
-    /// How far stretches have come from one to another, as a share.
+    /// Return the position of stretches between `from` and `to`, from 0 to 1.
     #[inline(always)]
     fn way(stretch: Lanes, from: f64, to: f64) -> Lanes {
         let way = (stretch - Lanes::splat(from)) * (1.0 / (to - from));
         way.max(Lanes::splat(0.0)).min(Lanes::splat(1.0))
     }
 
-    /// F over s0 for largest stretches from s0 to sc.
+    /// Return F/s0 for largest stretches from s0 to sc.
     #[inline(always)]
     fn relative_force(&self, largest: Lanes) -> Lanes {
         let one = Lanes::splat(1.0);
@@ -451,7 +457,7 @@ impl SofteningPmb {
         }
     }
 
-    /// ∫ F dκ from s0 over s0, for largest stretches from s0 to sc.
+    /// Return ∫ F dκ from s0 to the largest stretch, divided by s0, for largest stretches from s0 to sc.
     #[inline(always)]
     fn relative_area(&self, largest: Lanes) -> Lanes {
         let one = Lanes::splat(1.0);
@@ -472,7 +478,7 @@ impl SofteningPmb {
         }
     }
 
-    /// 1 − d of bonds with these largest stretches.
+    /// Return 1 − d of bonds with these largest stretches.
     #[inline(always)]
     fn secant(&self, largest: Lanes) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {
@@ -485,7 +491,7 @@ impl SofteningPmb {
 
 impl<const D: usize> Law<D> for SofteningPmb {
     type Point = [Lanes; 0];
-    /// κ.
+    /// Largest past stretch κ.
     type BondHistory = [Lanes; 1];
     type ReferenceSum = [Lanes; 0];
     type Sum = [Lanes; 0];
@@ -520,7 +526,7 @@ impl<const D: usize> Law<D> for SofteningPmb {
         squares * bond.length * (0.25 * self.elastic.micromodulus)
     }
 
-    /// What pulling to κ takes less what unloading from there gives back.
+    /// Work of loading to κ, minus the work that unloading returns.
     #[inline(always)]
     fn dissipated(&self, length: Lanes, [largest]: &[Lanes; 1]) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {

@@ -1,14 +1,19 @@
-//! Prototype microelastic material whose elastic tensor is that of the solid at every point, as far as its own family allows.
+//! Prototype microelastic material with a surface correction: the elastic tensor of every point is fitted to
+//! that of the solid.
 //!
-//! The micromodulus of an end is c n·H n with the direction n of the bond and a symmetric tensor H of its point. The
-//! elastic tensor of a family, ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ, is compared with that of bond-based solids,
-//! μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc), μ = 2 W₁/(d (d + 2)) with the energy density W₁ at unit isotropic stretch; H is the
-//! least-squares fit over all components. Nothing depends on the axes. In a whole family H is nearly I; near a surface it is
-//! larger across the surface than along it.
+//! The micromodulus of an end is c n·H n, with the direction n of the bond and a symmetric tensor H of the
+//! point.
+//! The elastic tensor of a family is ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ.
+//! That of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the
+//! energy density W₁ at unit isotropic stretch.
+//! H is the least-squares fit over all components, which is independent of the axes.
+//! In an untruncated family H is nearly I. Near a surface H is larger normal to the surface than along it.
 //!
-//! A bond has the mean of its ends' micromoduli, c_ij(n), and breaks at s_c √(c/c_ij), which keeps the energy that it takes.
-//! The surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4), which fit the energies along three axes with an
-//! ellipsoid, are the model; Le & Bobaru (2018) compare others.
+//! A bond has the mean of both micromoduli, c_ij(n). It breaks at s_c √(c/c_ij), which keeps the energy of
+//! breaking the bond.
+//! The method generalises the surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4),
+//! which fit energies along three axes with an ellipsoid.
+//! Le & Bobaru (2018) compare other corrections.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
@@ -16,32 +21,37 @@ use super::symmetric::{Symmetric, exponents, mixed, multiplicity, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
-/// Smallest eigenvalue of H: bodies of two or three points across would have bonds that push when they are pulled.
+/// Smallest eigenvalue of H. Without this limit, bonds in bodies of two or three points across would repel
+/// when stretched.
 const SMALLEST: f64 = 0.2;
 
-/// Largest eigenvalue of H: points with few neighbours, nearly in one plane, would have bonds of any stiffness.
+/// Largest eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly in one
+/// plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
-/// Share of the largest singular value below which a component of H is left at its smallest norm: 0.23 at a corner of a
-/// block, 0.1 in a strip of two points, below 1e-4 in a strip of one that is not quite straight.
+/// Singular values below this fraction of the largest are dropped; the solution of smallest norm is used.
+///
+/// The smallest ratio is 0.23 at a corner of a block, and 0.1 in a strip of two points. It is below 1e-4 in a
+/// slightly bent strip of one point.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
 const MONOMIALS: usize = 28;
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TensorPmb {
-    /// Micromodulus c of a whole family, N/m⁶.
+    /// Micromodulus c of an untruncated family, N/m⁶.
     micromodulus: f64,
     /// Shear modulus μ of the solid, Pa.
     shear_modulus: f64,
-    /// The critical stretch of the damage law belongs to the micromodulus, and is scaled with it.
+    /// Whether the critical stretch is scaled with the micromodulus, because it follows from a fracture
+    /// energy.
     is_scaled: bool,
 }
 
 impl TensorPmb {
-    /// From what a body has.
+    /// Create the law of a body.
     pub(super) fn of(given: &Given) -> Self {
         let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
         let d = given.dimension.count() as f64;
@@ -53,7 +63,7 @@ impl TensorPmb {
     }
 }
 
-/// It has no name of its own: `pmb` is this law with `surface_correction = "tensor"`.
+/// No deck name: decks write `pmb` with `surface_correction = "tensor"`.
 impl Declared for TensorPmb {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
@@ -70,7 +80,7 @@ impl Described for TensorPmb {
     }
 }
 
-/// n·H n.
+/// Return n·H n.
 #[inline(always)]
 fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
     let xi = &bond.reference;
@@ -84,7 +94,7 @@ fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> L
     sum * (bond.inverse * bond.inverse)
 }
 
-/// A component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc by its exponents.
+/// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc from its exponents.
 fn isotropic(exponents: [usize; 3]) -> f64 {
     let odd = exponents.iter().any(|exponent| exponent % 2 == 1);
     match exponents.iter().max() {
@@ -94,8 +104,8 @@ fn isotropic(exponents: [usize; 3]) -> f64 {
     }
 }
 
-/// H of a point in `D` dimensions: the least-squares solution of ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (…). `sums` are
-/// Σ |ξ| Ṽ times the monomials of degree 6 of n.
+/// Fit H of a point in `D` dimensions: the least-squares solution of ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (…).
+/// `sums` are the sums of |ξ| Ṽ times the monomials of degree 6 of n.
 fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> SMatrix<f64, D, D> {
     let place = |wanted: [usize; 3]| {
         exponents(6)
@@ -105,8 +115,9 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
-    // Rows are weighted by the number of components that they stand for, so that the fit does not depend on the axes; so are
-    // the columns, and the solution of the smallest norm does not either.
+    // A row stands for several equal tensor components. Its weight is the square root of their number, so
+    // that the fit does not depend on the axes. Columns have the same weights; then the solution of smallest
+    // norm is independent of the axes, too.
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
         let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
         let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();
@@ -115,7 +126,7 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let wanted = DVector::from_fn(rows.len(), |r, _| {
         shear_modulus * isotropic(rows[r]) * multiplicity(rows[r]).sqrt()
     });
-    // The decomposition of numbers that are not finite would not end.
+    // The decomposition of a matrix with NaN or infinity would not terminate.
     if matrix.iter().chain(wanted.iter()).any(|x| !x.is_finite()) {
         return SMatrix::zeros();
     }
@@ -134,7 +145,7 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     tensor
 }
 
-/// With eigenvalues from [`SMALLEST`] to [`LARGEST`].
+/// Clamp the eigenvalues to the range from [`SMALLEST`] to [`LARGEST`].
 fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let whole = DMatrix::from_fn(D, D, |a, b| tensor[(a, b)]);
     let SymmetricEigen {
@@ -155,10 +166,10 @@ fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
 }
 
 impl<const D: usize> Law<D> for TensorPmb {
-    /// ½ H.
+    /// The tensor ½ H.
     type Point = Symmetric<D>;
     type BondHistory = [Lanes; 0];
-    /// Σ |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
+    /// Sums of |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
     type ReferenceSum = [Lanes; MONOMIALS];
     type Sum = [Lanes; 0];
     type Force = Along;
@@ -198,7 +209,7 @@ impl<const D: usize> Law<D> for TensorPmb {
         bond.stretch * bond.stretch * bond.length * along(bond, end) * (0.5 * self.micromodulus)
     }
 
-    /// With the largest sum over a row of H, which no eigenvalue exceeds.
+    /// Spring constant with the largest absolute row sum of H, an upper bound on the eigenvalues.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;
@@ -233,7 +244,8 @@ impl<const D: usize> Law<D> for TensorPmb {
 mod tests {
     use super::*;
 
-    /// H of a point with neighbours at these offsets, all of the same volume, and a micromodulus that is right for a disc.
+    /// H of a point with neighbours at these offsets, all of the same volume, with a micromodulus that suits
+    /// a disc.
     fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
         let mut sums = [0.0; MONOMIALS];
         for [x, y] in offsets {
@@ -261,7 +273,7 @@ mod tests {
         let turn = nalgebra::Matrix2::new(cos, -sin, sin, cos);
         let wanted = turn * tensor(&half) * turn.transpose();
         assert!((tensor(&turned) - wanted).norm() < 1e-9 * wanted.norm());
-        // Stiffer across the surface than along it.
+        // The corrected family is stiffer normal to the surface than along it.
         let of_half = tensor(&half);
         assert!(of_half[(1, 1)] > of_half[(0, 0)], "{of_half}");
     }

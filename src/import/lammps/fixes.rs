@@ -1,4 +1,4 @@
-//! Fixes: loads, supports, damping, indenters.
+//! Fixes of LAMMPS: loads, supports, damping, indenters.
 
 use super::run::set;
 use super::{Model, wrong};
@@ -12,7 +12,7 @@ use crate::import::translation::Translation;
 /// Name of the rigid body of an indenter.
 const INDENTER: &str = "indenter";
 
-/// Read a fix.
+/// Translate a fix.
 pub(super) fn fix(
     translation: &mut Translation,
     variables: &Variables,
@@ -166,7 +166,7 @@ pub(super) fn fix(
     Ok(())
 }
 
-/// Read an indenter, which becomes a rigid body.
+/// Translate an indenter, which becomes a rigid body.
 fn indent(
     translation: &mut Translation,
     variables: &Variables,
@@ -183,7 +183,7 @@ fn indent(
         translation.leave_out_load(node, "rigid", INDENTER, note);
         return Ok(());
     }
-    // The value at the start, and the motion after it.
+    // Position at the start, and the expression of the motion if there is one.
     let position = |word: Option<&&str>| -> Result<(f64, Option<String>)> {
         let word = word.ok_or_else(|| fail("a number is missing".to_owned()))?;
         if !word.starts_with("v_") {
@@ -265,7 +265,7 @@ fn indent(
             return Ok(());
         }
     };
-    // An older form gives the velocity of the centre.
+    // An older form of the command gives the velocity of the centre.
     if let Some(at) = behind.iter().position(|word| *word == "vel") {
         for (k, component) in motion.iter_mut().enumerate() {
             let word = behind

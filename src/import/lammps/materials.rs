@@ -1,4 +1,4 @@
-//! Bodies and materials from the coefficients of the pair style.
+//! Bodies and materials, from the coefficients of the pair style.
 
 use super::Model;
 use crate::error::{Result, excerpt};
@@ -16,7 +16,7 @@ pub(super) struct Coefficients {
     pub(super) node: Node,
 }
 
-/// The values of a material's coefficients.
+/// Return the last coefficients that the script gives for a type.
 fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
     let fits = |of: u32| of == 0 || of == kind;
     let found = model.coefficients.iter().rev();
@@ -24,7 +24,7 @@ fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
     found.next()
 }
 
-/// Write materials, damage and bodies; return type, region and name of each body.
+/// Write materials, damage and bodies. Return type, region and name of each body.
 pub(super) fn write_bodies(
     translation: &mut Translation,
     model: &mut Model,
@@ -105,7 +105,7 @@ pub(super) fn write_bodies(
     Ok(names)
 }
 
-/// Write the material and the damage of a type; return them with its horizon.
+/// Write the material and the damage of a type; return both with the horizon.
 fn write_material(
     translation: &mut Translation,
     model: &Model,
@@ -146,7 +146,7 @@ fn write_material(
     section.set("density", Value::number(*density));
     let constants = match law {
         "pmb" => {
-            // c = 12 E/(π δ⁴) for a Poisson's ratio of 1/4.
+            // c = 12 E/(π δ⁴) for a Poisson ratio of 1/4.
             let young = values[0] * PI * horizon.powi(4) / 12.0;
             section.comment(format!(
                 "youngs_modulus = c π δ⁴/12 with c = {:e}.",

@@ -15,24 +15,24 @@ use run::{Run, follow, simulate};
 use setup::{Group, setup};
 use std::collections::HashMap;
 
-/// Atoms that a command creates.
+/// Atoms that one command creates.
 struct Atoms {
     kind: u32,
     region: Region,
-    /// Name of their region.
+    /// Name of the region.
     name: String,
 }
 
-/// The velocity that a command sets.
+/// Velocity that one command sets.
 struct Velocity {
-    /// Node of the command.
+    /// Node id of the command.
     node: usize,
     group: String,
-    /// Its components; `None` if neither the command nor an earlier one sets them.
+    /// Velocity components; `None` if neither this command nor an earlier command sets them.
     components: [Option<f64>; 3],
 }
 
-/// What a script says of its atoms, gathered before the deck is written.
+/// Data of the atoms, collected from the script before the new deck is written.
 #[derive(Default)]
 struct Model {
     spacing: Option<f64>,
@@ -43,11 +43,11 @@ struct Model {
     atoms: Vec<Atoms>,
     style: Option<(String, Node)>,
     coefficients: Vec<Coefficients>,
-    /// Type, or all, and density.
+    /// Type (`None` for all) and density.
     densities: Vec<(Option<u32>, f64)>,
-    /// Names of groups and their selections.
+    /// Groups: name, selection and node.
     groups: Vec<(String, Group, Node)>,
-    /// Damping of all atoms, force over velocity.
+    /// Damping of all atoms: force divided by velocity.
     drag: Option<f64>,
     /// Velocities of groups in the order of the commands.
     velocities: Vec<Velocity>,
@@ -55,7 +55,7 @@ struct Model {
     fields: Vec<&'static str>,
 }
 
-/// The tree of a script, whose keys are the commands.
+/// Return the tree of a script; its keys are the commands.
 pub fn tree(script: &Script) -> Node {
     let commands = script.commands.iter();
     let entries = commands.map(|command| (command.name().to_owned(), command.node.clone()));
@@ -69,7 +69,7 @@ pub fn tree(script: &Script) -> Node {
 /// Translate a script.
 ///
 /// # Errors
-/// If what a run needs is missing or wrong.
+/// If data that a run needs is missing or wrong.
 pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     let commands = &script.commands;
     let first = commands.iter().position(|command| command.name() == "run");
@@ -90,7 +90,8 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     }
     let bodies = write_bodies(translation, &mut model)?;
     let mut run = Run::default();
-    // Fixes and outputs look their variables up when a run starts.
+    // Fixes and outputs read their variables at the start of a run, so they are translated after all
+    // definitions.
     for command in before {
         if !without.contains_key(&command.node.id) {
             simulate(
@@ -110,7 +111,7 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     run.write(translation, &model)
 }
 
-/// Fixes in front of the first run that do not act in it, by their nodes, and why.
+/// Return the node ids of fixes that are defined before the first run but inactive in it, with the reason.
 fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
     let mut acting: HashMap<&str, usize> = HashMap::new();
     let mut without = HashMap::new();
@@ -135,7 +136,7 @@ fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
     without
 }
 
-/// An error about a command.
+/// Create an error for a command.
 fn wrong(
     translation: &Translation,
     command: &Command,

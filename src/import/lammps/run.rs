@@ -1,4 +1,4 @@
-//! Runs, their steps and outputs, and initial velocities.
+//! Runs of LAMMPS with time steps and outputs, and initial velocities.
 
 use super::fixes::fix;
 use super::setup::{Group, ignored};
@@ -8,7 +8,7 @@ use crate::import::draft::{Section, Value};
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
 
-/// Commands that concern the way LAMMPS works or what it prints.
+/// Commands that only concern the operation of LAMMPS or its messages.
 pub(super) const WORKINGS: [&str; 27] = [
     "atom_modify",
     "neighbor",
@@ -39,7 +39,7 @@ pub(super) const WORKINGS: [&str; 27] = [
     "undump",
 ];
 
-/// Fields of atoms in a dump, and of computes.
+/// Fields of atoms in dumps and computes, and their counterparts.
 const FIELDS: [(&str, &str); 21] = [
     ("x", "displacement"),
     ("y", "displacement"),
@@ -64,18 +64,18 @@ const FIELDS: [(&str, &str); 21] = [
     ("displace/atom", "displacement"),
 ];
 
-/// The parts of the runs.
+/// The runs and outputs of a script.
 #[derive(Default)]
 pub(super) struct Run {
-    /// Steps and time step, s, of the runs; those with the same step are joined.
+    /// Number of steps and time step (s) of each run; consecutive runs with the same time step are merged.
     runs: Vec<(u64, f64)>,
-    /// The number of the step at which the next run starts.
+    /// Step number at the start of the next run.
     at: u64,
     output: Option<u64>,
     history: Option<u64>,
 }
 
-/// The set of the new deck for a group; `None` if it has none.
+/// Return the set of the new deck for a group; `None` if it has no counterpart.
 pub(super) fn set(
     translation: &mut Translation,
     model: &Model,
@@ -120,7 +120,7 @@ pub(super) fn set(
     }
 }
 
-/// A number of steps, which is `least` or more.
+/// Read a number of steps; it must be at least `least`.
 fn steps(
     translation: &Translation,
     variables: &Variables,
@@ -138,7 +138,7 @@ fn steps(
     }
 }
 
-/// Read the number of the step at which the next run starts.
+/// Read `reset_timestep`: the step number at the start of the next run.
 fn reset(
     translation: &Translation,
     variables: &Variables,
@@ -151,7 +151,7 @@ fn reset(
     Ok(())
 }
 
-/// Read the first run or a later command. Later commands count only if they change the end of the runs.
+/// Read the first run or a later command. Later commands matter only if they change the end of the run.
 pub(super) fn follow(
     translation: &Translation,
     variables: &Variables,
@@ -198,7 +198,7 @@ pub(super) fn follow(
     Ok(())
 }
 
-/// Read a command that acts during the run.
+/// Translate a command that acts during the run.
 pub(super) fn simulate(
     translation: &mut Translation,
     variables: &Variables,
@@ -263,7 +263,7 @@ pub(super) fn simulate(
     Ok(())
 }
 
-/// Write the initial velocity of a command.
+/// Write the initial velocity that a command sets.
 fn initial(
     translation: &mut Translation,
     model: &Model,
@@ -300,7 +300,7 @@ fn initial(
 }
 
 impl Run {
-    /// Write time and outputs.
+    /// Write the time settings and outputs.
     pub(super) fn write(self, translation: &mut Translation, model: &Model) -> Result<()> {
         let Some((_, step)) = self.runs.first() else {
             return Err(translation.error(1, "the script has no `run`"));

@@ -8,7 +8,7 @@ use crate::import::regions::{Region, region};
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
 
-/// What a group selects.
+/// Selection of a group.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Group {
     All,
@@ -217,7 +217,7 @@ pub(super) fn setup(
     Ok(())
 }
 
-/// Why a command is left out wherever it stands.
+/// Return the reason for leaving out a command at any position; `None` for other commands.
 pub(super) fn ignored(name: &str) -> Option<&'static str> {
     match name {
         "if" | "jump" | "next" | "include" => Some("control flow is not followed"),

@@ -6,7 +6,7 @@ use crate::import::bodies::{self, Body, DamageModel, Material};
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write the bodies; return the names of the blocks and of their bodies.
+/// Write the bodies. Return the name of each block with the name of its body.
 pub(super) fn read_blocks(
     translation: &mut Translation,
     node: &Node,

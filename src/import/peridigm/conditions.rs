@@ -8,10 +8,10 @@ use crate::import::solver;
 use crate::import::translation::Translation;
 use crate::import::tree::{Content, Node, is_key};
 
-/// The type of a condition that prescribes temperatures.
+/// Type of a condition that prescribes temperatures.
 const PRESCRIBED_TEMPERATURE: &str = "Prescribed Temperature";
 
-/// Write the initial values, loads and supports, then the stages; return whether temperatures are among them.
+/// Write the initial values, loads and supports, then the stages. Return whether temperatures are prescribed.
 pub(super) fn conditions<'n>(
     translation: &mut Translation,
     root: &'n Node,
@@ -86,7 +86,7 @@ pub(super) fn conditions<'n>(
     Ok(conditions.has_temperature)
 }
 
-/// The prescribed temperatures at the start of the run, from which materials expand.
+/// Return the prescribed temperatures at the start of the run, which are the reference for thermal expansion.
 fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
     let tables = root.get("Boundary Conditions").into_iter();
     let tables = tables.flat_map(Node::tables).map(|(_, table)| table);
@@ -99,8 +99,10 @@ fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
         .collect()
 }
 
-/// Write a prescribed temperature. Materials expand from the temperature at the start, which is the reference
-/// temperature of all materials if it is `uniform`, and subtracted otherwise.
+/// Write a prescribed temperature.
+///
+/// The reference of thermal expansion is the temperature at the start. If `uniform`, it is the reference
+/// temperature of all materials; otherwise it is subtracted from the temperature.
 fn temperature<'n>(
     translation: &mut Translation,
     sets: &mut Sets<'n>,

@@ -6,7 +6,7 @@ use crate::import::log::OMITTED_BONDS;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write contact, and the bonds between blocks.
+/// Write contact, and whether bonds join blocks.
 pub(super) fn contact(
     translation: &mut Translation,
     root: &Node,
@@ -42,7 +42,7 @@ pub(super) fn contact(
         }
     }
     translation.add(section);
-    // Bodies with a rule for contact with themselves.
+    // Bodies that have a rule for self-contact.
     let mut with_rule = Vec::new();
     for (name, interaction) in interactions.tables() {
         if is_key(name, "General Contact") || is_key(name, "Self Contact") {
@@ -92,7 +92,7 @@ pub(super) fn contact(
     Ok(())
 }
 
-/// Test whether no bonds join blocks; Peridigm knows `All` and `None`.
+/// Test whether the deck omits all bonds between blocks; Peridigm allows `All` and `None`.
 fn omits_all(translation: &Translation, discretization: &Node, blocks: usize) -> bool {
     let Some(node) = discretization.get(OMITTED_BONDS) else {
         return false;

@@ -8,7 +8,7 @@ use crate::import::elastic::Constants;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: their names, the law, and how the law differs.
+/// Material models: name, the law, and how the law differs from the model.
 const MATERIALS: [(&str, &str, &str); 20] = [
     ("Elastic", "ordinary", ""),
     ("Elastic Bond Based", "pmb", ""),
@@ -72,13 +72,13 @@ const MATERIALS: [(&str, &str, &str); 20] = [
     ),
 ];
 
-/// The key of the thermal expansion of materials and damage models.
+/// Key of the thermal expansion in materials and damage models.
 const EXPANSION: &str = "Thermal Expansion Coefficient";
 
-/// Laws with a choice of the influence function; the others have ω = 1.
+/// Laws with a selectable influence function; other laws have ω = 1.
 const INFLUENCED: [&str; 2] = ["ordinary", "ordinary_viscoelastic"];
 
-/// Note what became of the influence function.
+/// Log the outcome of the influence function.
 pub(super) fn note_influence(
     translation: &Translation,
     influence: &Influence,
@@ -118,7 +118,7 @@ pub(super) fn note_influence(
     }
 }
 
-/// Write the materials; return them, and the headers of materials with thermal expansion.
+/// Write the materials. Return the materials, and the headers of those with thermal expansion.
 pub(super) fn read_materials(
     translation: &mut Translation,
     node: &Node,
@@ -153,8 +153,8 @@ pub(super) fn read_materials(
         let constants = Constants::read(translation, table)?;
         let enough = match *law {
             "pmb" => {
-                // In the plane, Peridigm's bulk modulus is that of the plane: k = E/(2(1 − ν)), with ν = 1/3 in plane
-                // stress, and E/(2(1 + ν)(1 − 2ν)) with ν = 1/4 in plane strain.
+                // In 2-D Peridigm's bulk modulus is that of the plane. It is k = E/(2(1 − ν)) with ν = 1/3 in
+                // plane stress, and E/(2(1 + ν)(1 − 2ν)) with ν = 1/4 in plane strain.
                 let factor = if table
                     .get("Plane Stress")
                     .is_some_and(|node| translation.is_true(node))
@@ -201,7 +201,7 @@ pub(super) fn read_materials(
     Ok((materials, expanding))
 }
 
-/// Write the keys that only some laws have.
+/// Write the keys of individual laws.
 fn law_keys(
     translation: &Translation,
     table: &Node,

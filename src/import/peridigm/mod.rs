@@ -24,7 +24,7 @@ use points::{Points, influence, points};
 /// Translate a deck.
 ///
 /// # Errors
-/// If what a run needs is missing or wrong.
+/// If data that a run needs is missing or wrong.
 pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let root = root.get("Peridigm").unwrap_or(root);
     let sections = ["Discretization", "Materials", "Blocks"];
@@ -75,7 +75,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     Ok(())
 }
 
-/// The `dimension` of the new deck: plane if a material says so.
+/// Return the `dimension` of the new deck, which is plane if a material requires it.
 fn setting(translation: &mut Translation, materials: &Node) -> Result<&'static str> {
     let mut setting = "3d";
     for (_, material) in materials.tables() {
@@ -114,7 +114,7 @@ fn setting(translation: &mut Translation, materials: &Node) -> Result<&'static s
     Ok(setting)
 }
 
-/// The stages of all solvers.
+/// Read the stages of all solvers.
 fn stages(
     translation: &mut Translation,
     root: &Node,

@@ -7,20 +7,20 @@ use crate::import::files::PointFile;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Columns of a text file.
+/// Columns of a text file without header.
 const COLUMNS: [&str; 5] = ["x", "y", "z", "block", "volume"];
 
-/// Where the points of the blocks come from.
+/// Source of the points of the blocks.
 pub(super) enum Points {
-    /// A text file, and what is known of it.
+    /// A text file, with its summary if it can be read.
     File(Value, Option<PointFile>),
     /// A mesh.
     Mesh(Value),
-    /// A box with a spacing.
+    /// A box that is filled with the given spacing.
     Box(Value),
 }
 
-/// Where the points come from, and the bonds that a discretization omits.
+/// Read the source of the points, and write the bond filters.
 pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Points> {
     let kind = translation.required(node, "Type", "the discretization")?;
     let name = translation.text(kind, "Type")?.to_owned();
@@ -70,7 +70,7 @@ pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Point
     Ok(Points::Mesh(value))
 }
 
-/// The box of a generated grid.
+/// Translate the box of a generated grid.
 fn quick_grid(translation: &mut Translation, node: &Node) -> Result<Points> {
     let Some(generator) = node.get("TensorProduct3DMeshGenerator") else {
         let message = "PdQuickGrid needs a TensorProduct3DMeshGenerator; cylinders are not read";
@@ -121,17 +121,17 @@ fn quick_grid(translation: &mut Translation, node: &Node) -> Result<Points> {
 
 /// The influence function of a deck.
 pub(super) struct Influence {
-    /// The key.
+    /// Node of the key.
     pub(super) node: Node,
-    /// The name of the function; `None` if there is none like it.
+    /// Name of the influence function; `None` if there is no counterpart.
     pub(super) known: Option<&'static str>,
-    /// The value of the key `influence`; `None` where that is the default.
+    /// Value of the new key `influence`; `None` for the default.
     pub(super) written: Option<&'static str>,
-    /// How the function differs; empty if it does not.
+    /// How the new function differs from Peridigm's; empty if both are equal.
     pub(super) difference: &'static str,
 }
 
-/// Read the influence function of all materials.
+/// Read the influence function, which holds for all materials.
 pub(super) fn influence(translation: &Translation, node: &Node) -> Result<Option<Influence>> {
     let Some(function) = node.get("Influence Function") else {
         return Ok(None);
@@ -157,12 +157,12 @@ pub(super) fn influence(translation: &Translation, node: &Node) -> Result<Option
     }))
 }
 
-/// The number of a block of a text file, `block_NUMBER`.
+/// Read the number of a block of a text file from `block_NUMBER`.
 pub(super) fn block_number(block: &str) -> Option<u32> {
     block.rsplit('_').next()?.parse().ok()
 }
 
-/// The points of a block: key and value.
+/// Return key and value for the points of a block.
 pub(super) fn source(
     translation: &Translation,
     points: &Points,

@@ -8,7 +8,7 @@ use crate::import::draft::Value;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write the materials and bodies; return the name, the number and the body of each block.
+/// Write the materials and bodies. Return name, number and body of each block.
 pub(super) fn read_blocks(
     translation: &mut Translation,
     node: &Node,
@@ -81,7 +81,8 @@ pub(super) fn read_blocks(
                     .left_out(node, "this thermal model is left out"),
             }
         }
-        // A material has one density, one angle and one expansion here.
+        // In the new deck, density, angle and expansion belong to the material, so each combination is a
+        // separate material.
         let variant = format!("{density:?} {angle:?} {expansion:?}");
         let known = written
             .iter()

@@ -7,7 +7,7 @@ use crate::import::solver;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write the initial values, loads and supports, then the stages; return whether temperatures are among them.
+/// Write the initial values, loads and supports, then the stages. Return whether temperatures are prescribed.
 pub(super) fn conditions(
     translation: &mut Translation,
     root: &Node,
@@ -95,7 +95,7 @@ pub(super) fn conditions(
     Ok(conditions.has_temperature)
 }
 
-/// The numbers of steps, with commas between them.
+/// Read the step numbers, which are separated by commas.
 fn step_ids(translation: &Translation, node: &Node) -> Result<Vec<u64>> {
     let text = translation.text(node, "Step ID")?;
     let ids = text.split(',').map(|word| word.trim().parse::<u64>().ok());

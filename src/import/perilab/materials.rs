@@ -7,7 +7,8 @@ use crate::import::elastic::Constants;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: a part of their names, the law, and how the law differs. The first that fits counts.
+/// Material models: a part of the name, the law, and how the law differs from the model. The first match is
+/// used.
 const MATERIALS: [(&str, &str, &str); 9] = [
     (
         "unified bond-based",
@@ -37,7 +38,7 @@ const ORTHOTROPIC: [(&str, &str, bool); 9] = [
     ("Shear Modulus XZ", "shear_modulus_xz", false),
 ];
 
-/// How a material expands.
+/// Thermal expansion of a material.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Expansion {
     /// Name of the thermal model.
@@ -46,7 +47,7 @@ pub(super) struct Expansion {
     pub(super) reference: Option<Value>,
 }
 
-/// A material as the deck has it; the density is that of a block.
+/// A material of the source deck; its density belongs to the blocks.
 pub(super) struct Model<'n> {
     pub(super) name: &'n str,
     pub(super) node: &'n Node,
@@ -54,7 +55,7 @@ pub(super) struct Model<'n> {
     pub(super) constants: Constants,
 }
 
-/// What the blocks of a deck refer to.
+/// Models to which the blocks refer.
 pub(super) struct Laws<'n> {
     pub(super) models: Vec<Model<'n>>,
     pub(super) damages: Vec<DamageModel>,
@@ -135,7 +136,7 @@ pub(super) fn write_material(
                     .log
                     .approximated(node, "the law has the Poisson's ratio of bonds");
             }
-            // PeriLab has a Poisson's ratio of 1/3 in plane strain too, so that E = K.
+            // PeriLab uses a Poisson ratio of 1/3 in plane strain, too. Therefore E = K.
             let factor = (translation.dimension == 2).then_some(1.0);
             model.constants.write_one(&mut section, factor)
         }
@@ -200,7 +201,7 @@ pub(super) fn write_material(
     Ok(())
 }
 
-/// Write the entries of Hooke's matrix or the constants of an orthotropic solid, if the material has them.
+/// Write the entries of Hooke's matrix or the constants of an orthotropic solid, if given.
 fn anisotropic(
     translation: &Translation,
     table: &Node,
@@ -249,7 +250,7 @@ fn anisotropic(
     Ok(found)
 }
 
-/// Read the thermal models with expansion; `acts` if the solver switches them on.
+/// Read the thermal models with expansion; `acts` if the solver enables thermal models.
 pub(super) fn expansions(
     translation: &Translation,
     models: &Node,
@@ -304,7 +305,7 @@ pub(super) fn expansions(
     Ok(expansions)
 }
 
-/// Read the damage models; `breaks` if the solver switches them on.
+/// Read the damage models; `breaks` if the solver enables damage.
 pub(super) fn damages(
     translation: &mut Translation,
     models: &Node,

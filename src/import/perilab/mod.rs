@@ -24,7 +24,7 @@ use points::{Points, points, setting};
 /// Translate a deck.
 ///
 /// # Errors
-/// If what a run needs is missing or wrong.
+/// If data that a run needs is missing or wrong.
 pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let root = root.get("PeriLab").unwrap_or(root);
     let discretization = translation.required(root, "Discretization", "the deck")?;
@@ -102,7 +102,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     Ok(())
 }
 
-/// The solver, or its steps.
+/// Return the solver, or the solver of each step.
 fn solvers(root: &Node) -> Vec<&Node> {
     match root.get("Multistep Solver") {
         Some(steps) => steps.tables().map(|(_, node)| node).collect(),
@@ -110,7 +110,7 @@ fn solvers(root: &Node) -> Vec<&Node> {
     }
 }
 
-/// The stages of the solver or of its steps.
+/// Read the stages of all solvers.
 fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stage>> {
     let solvers = solvers(root);
     let Some(first) = solvers.first() else {

@@ -1,4 +1,4 @@
-//! The discretization of PeriLab: point files and meshes, and the dimension.
+//! The discretization of PeriLab: point files, meshes and the dimension.
 
 use crate::error::{Result, excerpt};
 use crate::import::draft::Value;
@@ -7,13 +7,13 @@ use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 use crate::mesh::Format;
 
-/// Where the points of the blocks come from.
+/// Source of the points of the blocks.
 pub(super) enum Points {
     File(Value, Option<PointFile>),
     Mesh(Value),
 }
 
-/// Where the points come from.
+/// Read the source of the points.
 pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Points> {
     let file = translation.required(node, "Input Mesh File", "the discretization")?;
     let path = translation.text(file, "Input Mesh File")?.to_owned();
@@ -59,7 +59,8 @@ pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Point
     Err(translation.error(node.line, message))
 }
 
-/// The `dimension` of the new deck: by the header of the point file, else by the symmetry of the materials.
+/// Return the `dimension` of the new deck, from the header of the point file or else from the symmetry of the
+/// materials.
 pub(super) fn setting(
     translation: &mut Translation,
     discretization: &Node,

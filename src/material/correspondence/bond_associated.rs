@@ -1,24 +1,28 @@
-//! Bond-associated correspondence: a classical law for the stress of each bond, from a deformation gradient
-//! of its own. There is no motion that it does not see, and nothing to control.
+//! Bond-associated correspondence: a classical stress for each bond, from the bond's own deformation
+//! gradient. This law has no zero-energy modes and needs no control.
 //!
-//! Breitzman & Dayal 2018: the classical energy is taken of a gradient that has the bond's own motion along
-//! the bond and that of the family across it, and then the mean over the bonds, where correspondence takes
-//! the energy of the mean. With F = I + H of [`Correspondence`](super::Correspondence) and n = ξ/|ξ|,
+//! Breitzman & Dayal 2018. The gradient F_ξ of a bond has the bond's motion along the bond and the family's
+//! motion across the bond.
+//! The energy is the mean of the classical energies of the bonds, whereas
+//! [`Correspondence`](super::Correspondence) uses the energy of the mean gradient.
+//! With F = I + H of [`Correspondence`](super::Correspondence) and n = ξ/|ξ|,
 //!
-//! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|²,  W = Σ w Ψ(F_ξ),  w = ω Ṽ/Σ ω Ṽ,
+//! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|², W = Σ w Ψ(F_ξ), w = ω Ṽ/Σ ω Ṽ,
 //!
-//! over the intact bonds. The force state is its slope, with P_ξ = ∂Ψ/∂F at F_ξ:
+//! summed over the intact bonds. The force state is the derivative of W, with P_ξ = ∂Ψ/∂F at F_ξ:
 //!
-//! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ),  Z = Σ w P_ξ (I − n⊗n).
+//! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ), Z = Σ w P_ξ (I − n⊗n).
 //!
-//! F_ξ ξ = Y, so that W is 0 for those motions alone that leave the length of every bond as it is. F is
-//! that of the point, not the mean of both ends': a force state is then one of the point's own family, and
-//! Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point. The gradients of Chen 2018, of
-//! the neighbours that both ends of a bond share, want enough of these and a shape tensor for every bond.
+//! Because F_ξ ξ = Y, W is 0 only for motions that keep the length of every bond.
+//! F is the gradient of the point, not the mean gradient of both ends. Therefore the force state depends on
+//! the point's own family only, and Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point.
+//! The gradients of Chen 2018 sum over the neighbours that both ends share. They would need enough shared
+//! neighbours and a shape tensor per bond.
 //!
-//! W ≤ ½ c Σ w |H_ξ|² with |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|² and |H|² ≤ Σ ω |η|² Ṽ/λ, where c is the
-//! largest modulus and λ the smallest eigenvalue of K: a spring constant of c (1/λ + 1/(|ξ|² Σ ω Ṽ)) holds
-//! as much at least.
+//! A bound on the stiffness follows from W ≤ ½ c Σ w |H_ξ|², with |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|² and
+//! |H|² ≤ Σ ω |η|² Ṽ/λ.
+//! Here c is the largest modulus, and λ is the smallest eigenvalue of K. The spring constant c (1/λ + 1/(|ξ|²
+//! Σ ω Ṽ)) is therefore a bound.
 
 use nalgebra::SMatrix;
 
@@ -36,13 +40,13 @@ use super::tensor::{Tensor, tensor};
 use super::{STRESS, of_stress};
 use crate::lanes::{IsaSet, LaneTuple, Lanes};
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BondAssociated {
     stress: Stress,
     /// [`Stress::largest_modulus`], Pa.
     modulus: f64,
-    /// The trace of the shape tensor of a whole family, m⁵.
+    /// Trace of the shape tensor of an untruncated family, m⁵.
     whole: f64,
 }
 
@@ -88,10 +92,10 @@ impl Described for BondAssociated {
     }
 }
 
-/// Two constants, of which the stiffness is c/λ and c/(|ξ|² Σ ω Ṽ); 1/Σ ω Ṽ of the intact bonds; then H, and Z K⁻¹.
+/// Constants c/λ and c/Σ ω Ṽ of the stiffness; then 1/Σ ω Ṽ of the intact bonds, H, and Z K⁻¹.
 type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
-/// The places of a point's numbers.
+/// Indices of the numbers of a point.
 struct Places;
 
 impl Places {
@@ -102,26 +106,26 @@ impl Places {
         Self::GRADIENT + D * D
     }
 
-    /// K⁻¹, by diagonal and mixed entries.
+    /// First index of the diagonal and mixed entries of K⁻¹.
     const fn inverse<const D: usize>() -> usize {
         Self::direct::<D>() + D * D
     }
 
-    /// Whether there are too few bonds, or one without a stress.
+    /// Index of the flag for a point with too few bonds, or with a bond without stress.
     const fn singular<const D: usize>() -> usize {
         Self::inverse::<D>() + 2 * D
     }
 }
 
 impl BondAssociated {
-    /// What follows from the gradients H_ξ of the bonds.
+    /// Compute the stresses at the gradients H_ξ of the bonds.
     #[inline(always)]
     fn stresses<const D: usize>(&self, bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
         self.stress.of_bonds(&own_gradient(bond, gradient))
     }
 }
 
-/// H_ξ of the bonds.
+/// Return H_ξ of the bonds.
 #[inline(always)]
 fn own_gradient<const D: usize>(bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> Tensor<Lanes, D> {
     let xi = &bond.reference;
@@ -139,9 +143,10 @@ fn own_gradient<const D: usize>(bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> 
 impl<const D: usize> Law<D> for BondAssociated {
     type Point = Point<D>;
     type BondHistory = [Lanes; 0];
-    /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
+    /// Diagonal and mixed entries of K (m⁵), and Σ ω Ṽ (m³).
     type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
-    /// K as in the whole sum, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ; then Z Σ ω Ṽ (N m), and whether a bond has no stress.
+    /// Pass 0: K over the intact bonds, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ. Pass 1: Z Σ ω Ṽ (N m), and the number of
+    /// bonds without stress.
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;
@@ -152,7 +157,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_EXTENSION: bool = false;
     const HAS_BOND_STRESS_ACROSS: bool = true;
-    // The stresses, in a loop of their own, take most of the time.
+    // Most of the time goes into the stresses, which have a separate loop.
     const ISA_SET: IsaSet = IsaSet::Avx2;
 
     #[inline(always)]
@@ -168,7 +173,7 @@ impl<const D: usize> Law<D> for BondAssociated {
         }
     }
 
-    /// The trace of a whole family's shape tensor over its own.
+    /// Trace of the shape tensor of an untruncated family, divided by that of this family.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {

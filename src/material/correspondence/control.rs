@@ -1,4 +1,4 @@
-//! What works against motions that the deformation gradient does not see.
+//! Control of zero-energy modes: forces against motions that do not change the deformation gradient.
 
 use nalgebra::SMatrix;
 
@@ -8,7 +8,7 @@ use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
 use std::f64::consts::PI;
 
-/// The matrix B of the force state ω B z.
+/// The zero-energy control: the matrix B of the force state ω B z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
@@ -17,25 +17,27 @@ use std::f64::consts::PI;
 pub enum Control {
     /// B = 0.
     None,
-    /// B = (4/3) G/k I with the shear modulus G and the diagonal entry k of the shape tensor of a whole family:
-    /// the dispersion of long shear waves vanishes.
+    /// B = (4/3) G/k I, with the shear modulus G and a diagonal entry k of the shape tensor of an untruncated
+    /// family. The dispersion of long shear waves then vanishes.
     ///
-    /// For a wave of wavenumber κ along an axis, H loses the share κ²q/(6k), q = Σ ω ξ_x⁴ Ṽ, and the energy of a wave
-    /// of modulus M is ½ M κ² (1 − κ²q/(3k)) by |u|². z is −½ (κ·ξ)² u, and a control b/k I stores ½ b κ⁴q/(4k). The sum
-    /// of both is free of q for b = (4/3) M, whatever the dimension, the influence and the lattice.
+    /// Derivation: consider a wave of amplitude u, wavenumber κ along an axis, and modulus M; let q = Σ ω
+    /// ξ_x⁴ Ṽ.
+    /// H loses the fraction κ²q/(6k), so the energy of the wave is ½ M κ² (1 − κ²q/(3k)) |u|².
+    /// z is −½ (κ·ξ)² u, so a control b/k I stores ½ b κ⁴q/(4k) |u|².
+    /// The sum is independent of q for b = (4/3) M, for every dimension, influence function and lattice.
     Dispersion {
-        /// (4/3) G/k, N/m⁷.
+        /// Product (4/3) G/k, N/m⁷.
         strength: f64,
     },
-    /// B = C : K⁻¹, B_ij = C_ijkl K⁻¹_kl (Wan, Chen, Chu & Chen 2019; Willberg et al. 2022, eq. 15): of the same
-    /// stiffness as the solid, without a coefficient, and as anisotropic as it.
+    /// B = C : K⁻¹, B_ij = C_ijkl K⁻¹_kl (Wan, Chen, Chu & Chen 2019; Willberg et al. 2022, eq. 15). B has
+    /// the stiffness and the anisotropy of the solid, and no coefficient.
     Wan2019(Hooke),
-    /// B = G (c/δ) (V_δ/ω₀) I with the micromodulus c of a bond-based solid, the volume V_δ within a
-    /// horizon and ω₀ = Σ ω Ṽ (Silling 2017).
+    /// B = G (c/δ) (V_δ/ω₀) I (Silling 2017). Here G is a coefficient, c the micromodulus of a bond-based
+    /// solid, V_δ the volume within a horizon, and ω₀ = Σ ω Ṽ.
     Silling2017 {
-        /// G.
+        /// Coefficient G, dimensionless.
         coefficient: f64,
-        /// G c V_δ/δ, N/m⁴.
+        /// Product G c V_δ/δ, N/m⁴.
         strength: f64,
     },
 }
@@ -63,7 +65,7 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
-/// The control of Wan et al. with constants that make its matrix indefinite.
+/// Return the error of constants for which the matrix of `wan2019` is indefinite.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let least = hooke::least_under_dilation(values, dimension)?;
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
@@ -76,7 +78,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
 }
 
 impl Control {
-    /// That of a law.
+    /// Create the control of a law.
     pub fn of(given: &Given, hooke: Hooke) -> Self {
         match given.values.word(KIND.name) {
             "none" => Self::None,
@@ -107,7 +109,7 @@ impl Control {
         }
     }
 
-    /// What a point whose whole family has this weight ω₀ (m³) keeps for [`Self::matrix`], N/m⁷.
+    /// Return the constant of a point for [`Self::matrix`], N/m⁷, from ω₀ (m³) of its initial family.
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,
@@ -116,7 +118,7 @@ impl Control {
         }
     }
 
-    /// B (N/m⁷) of a point with this K⁻¹ (m⁻⁵) and constant.
+    /// Return B (N/m⁷) of a point from K⁻¹ (m⁻⁵) and its constant.
     pub fn matrix<const D: usize>(
         &self,
         inverse: &SMatrix<f64, D, D>,
@@ -131,7 +133,7 @@ impl Control {
         }
     }
 
-    /// For people to read.
+    /// Properties for display.
     pub fn described(&self) -> Vec<(&'static str, Property)> {
         let (words, number) = match *self {
             Self::None => ("none", None),
@@ -159,7 +161,7 @@ mod tests {
 
     const YOUNG: f64 = 3.0;
 
-    /// The control of a law with these words and numbers.
+    /// The control of a law with these values of its keys.
     fn control(
         dimension: Dimension,
         poisson_ratio: f64,
@@ -190,7 +192,7 @@ mod tests {
         Dimension::PlaneStrain { thickness: 0.5 },
     ];
 
-    /// λ (that of the sheet in plane stress) and G, Pa.
+    /// λ (in plane stress that of the sheet) and G, Pa.
     fn constants(dimension: Dimension, ratio: f64) -> [f64; 2] {
         let shear = YOUNG / (2.0 * (1.0 + ratio));
         let across = match dimension {
@@ -216,7 +218,8 @@ mod tests {
                 let found = of(dimension).matrix(&plane, 0.0);
                 assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
             }
-            // C_ijkl K⁻¹_jl of a whole family is λ + (D + 1) G, which is the same where λ = G.
+            // C_ijkl K⁻¹_jl of an untruncated family is λ + (D + 1) G. This equals the control's B only if λ
+            // = G.
             let other = lambda + 4.0 * shear;
             let found = of(Dimension::Space).matrix(&Matrix3::identity(), 0.0)[(0, 0)];
             let are_equal = (found / other - 1.0).abs() < 1e-14;
@@ -300,13 +303,13 @@ mod tests {
             control(Dimension::Space, 0.25, "dispersion", &all).constant(1.0)
         };
         let space = 4.0 * PI / 15.0 * 2.0_f64.powi(5);
-        // 15/(4 (S11 + S22 + S33 − S12 − S23 − S13) + 3 (S44 + S55 + S66)).
+        // Reuss shear modulus: 15/(4 (S11 + S22 + S33 − S12 − S23 − S13) + 3 (S44 + S55 + S66)).
         let normal = 1.0 / 140.0 + 2.0 / 10.0;
         let coupled = -2.0 * 0.3 / 140.0 - 0.4 / 10.0;
         let shear = 15.0 / (4.0 * (normal - coupled) + 3.0 * (2.0 / 5.0 + 1.0 / 3.5));
         let wanted = 4.0 / 3.0 * shear / space;
         assert!((of(&[]) / wanted - 1.0).abs() < 1e-11);
-        // Axes do not change it.
+        // The result is independent of the material axes.
         let turned = of(&[("angle_1", 20.0), ("angle_2", 50.0), ("angle_3", -70.0)]);
         assert!((turned / wanted - 1.0).abs() < 1e-11);
     }

@@ -1,4 +1,4 @@
-//! Tensors of a family: the shape tensor and what follows from it.
+//! Tensors of a family: the shape tensor, its inverse, and the rotation.
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -6,18 +6,21 @@ use super::super::symmetric::{from_entries, mixed};
 use super::super::{Bond, Rotation, rotation};
 use crate::lanes::{LaneTuple, Lanes};
 
-/// A shape tensor is singular where its determinant is below this share of that of a family of the same
-/// size that looks alike in all directions.
+/// A shape tensor is singular if its determinant is below this fraction of that of an isotropic family with
+/// the same trace.
 const SINGULAR: f64 = 1e-2;
 
-/// What is left of a family carries no force where it is so many times as stiff as the whole family: the time
-/// step is that of whole families. Torn plates ran away without a bound, and not with one of 16.
+/// Limit of the stiffness of a family's intact part, relative to the initial family. A stiffer part carries
+/// no force.
+///
+/// The time step is stable for initial families only. Without a limit, points of torn plates moved without
+/// bound; a limit of 16 prevented this.
 const STIFFEST: f64 = 8.0;
 
-/// What a bond adds to the shape tensor, by diagonal and mixed entries, and to Σ ω η⊗ξ Ṽ, row by row.
+/// Contribution of a bond to the shape tensor (diagonal and mixed entries) and to Σ ω η⊗ξ Ṽ (row by row).
 pub type FamilyShare<const D: usize> = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D]);
 
-/// See [`FamilyShare`]; m², by weight and volume.
+/// Return the [`FamilyShare`] of a bond without weight and volume, m².
 #[inline(always)]
 pub fn family_share<const D: usize>(bond: &Bond<D>) -> FamilyShare<D> {
     let xi = &bond.reference;
@@ -25,7 +28,7 @@ pub fn family_share<const D: usize>(bond: &Bond<D>) -> FamilyShare<D> {
     (shape_share(xi), motion)
 }
 
-/// ξ⊗ξ by diagonal and mixed entries.
+/// Return the diagonal and mixed entries of ξ⊗ξ.
 #[inline(always)]
 pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) {
     let mut others = [Lanes::splat(0.0); D];
@@ -35,12 +38,12 @@ pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) 
     (LaneTuple::each(|d| xi[d] * xi[d]), others)
 }
 
-/// A tensor from its entries, row by row.
+/// Create a tensor from its entries, row by row.
 pub fn from_rows<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
     SMatrix::from_fn(|a, b| entries[D * a + b])
 }
 
-/// Writes the entries of a tensor, row by row.
+/// Write the entries of a tensor to a slice, row by row.
 pub fn to_rows<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64]) {
     for a in 0..D {
         for b in 0..D {
@@ -49,20 +52,20 @@ pub fn to_rows<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64])
     }
 }
 
-/// K = Σ ω ξ⊗ξ Ṽ of a point.
+/// Shape tensor K = Σ ω ξ⊗ξ Ṽ of a point.
 #[derive(Debug, Clone, Copy)]
 pub struct ShapeTensor<const D: usize>(SMatrix<f64, D, D>);
 
 impl<const D: usize> ShapeTensor<D> {
-    /// From its diagonal and mixed entries, m⁵.
+    /// Create K from its diagonal and mixed entries, m⁵.
     pub fn new(entries: &[f64]) -> Self {
         Self(from_entries(entries))
     }
 
-    /// K⁻¹ (m⁻⁵), unless K is nearly singular.
+    /// Return K⁻¹ (m⁻⁵), unless K is nearly singular.
     pub fn inverse(&self) -> Option<SMatrix<f64, D, D>> {
         let mean = self.0.trace() / D as f64;
-        // The comparison is false for a family without bonds, too.
+        // False for a family without bonds, too.
         if determinant(&self.0) > SINGULAR * mean.powi(D as i32) {
             self.0.try_inverse()
         } else {
@@ -70,8 +73,11 @@ impl<const D: usize> ShapeTensor<D> {
         }
     }
 
-    /// K⁻¹ (m⁻⁵) of what is left of a family, unless K is nearly singular or the family too stiff, with the largest
-    /// modulus of its solid (Pa) and the spring constant of the whole family (N/m⁷).
+    /// Return K⁻¹ (m⁻⁵) of the intact part of a family; `None` if K is nearly singular or this part is too
+    /// stiff.
+    ///
+    /// `modulus` is the largest modulus of the solid (Pa), and `whole` the spring constant of the initial
+    /// family (N/m⁷).
     pub fn inverse_of_rest(&self, modulus: f64, whole: f64) -> Option<SMatrix<f64, D, D>> {
         let least = SMatrix::from_diagonal_element(modulus / (STIFFEST * whole));
         if is_positive_definite(&(self.0 - least)) {
@@ -81,18 +87,19 @@ impl<const D: usize> ShapeTensor<D> {
         }
     }
 
-    /// Σ ω |ξ|² Ṽ, m⁵.
+    /// Trace Σ ω |ξ|² Ṽ, m⁵.
     pub fn trace(&self) -> f64 {
         self.0.trace()
     }
 
-    /// The smallest eigenvalue, m⁵.
+    /// Smallest eigenvalue, m⁵.
     pub fn smallest(&self) -> f64 {
         extremes(&self.0)[0]
     }
 }
 
-/// Rotation of a family whose sums are a [`FamilyShare`]; none where its shape tensor is singular.
+/// Compute the rotation of a family from its [`FamilyShare`] sums; the identity if the shape tensor is
+/// singular.
 pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
     let inverse = ShapeTensor::<D>::new(sums).inverse();
     inverse.map_or(rotation::IDENTITY, |inverse| {
@@ -101,9 +108,9 @@ pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
     })
 }
 
-/// The smallest and the largest eigenvalue of a symmetric matrix of at most three rows.
+/// Return the smallest and the largest eigenvalue of a symmetric matrix of at most three rows.
 pub fn extremes<const D: usize>(m: &SMatrix<f64, D, D>) -> [f64; 2] {
-    // What the first axis alone gives lies between them.
+    // The padding entries equal a diagonal entry, which lies between the extreme eigenvalues.
     let mut whole = Matrix3::from_diagonal_element(m[(0, 0)]);
     for a in 0..D {
         for b in 0..D {
@@ -114,13 +121,13 @@ pub fn extremes<const D: usize>(m: &SMatrix<f64, D, D>) -> [f64; 2] {
     [all.min(), all.max()]
 }
 
-/// Whether all eigenvalues of a symmetric matrix of at most three rows are above 0, by Sylvester's criterion.
+/// Whether a symmetric matrix of at most three rows is positive definite, by Sylvester's criterion.
 fn is_positive_definite<const D: usize>(m: &SMatrix<f64, D, D>) -> bool {
     let of_two = D < 2 || m[(0, 0)] * m[(1, 1)] > m[(0, 1)] * m[(1, 0)];
     m[(0, 0)] > 0.0 && of_two && determinant(m) > 0.0
 }
 
-/// The determinant of a matrix of at most three rows.
+/// Return the determinant of a matrix of at most three rows.
 pub fn determinant<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
     match D {
         1 => m[(0, 0)],

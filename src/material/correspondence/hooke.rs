@@ -1,8 +1,9 @@
-//! Hooke's matrix: isotropic, orthotropic or full, in axes that may be turned against those of the body.
+//! Hooke's matrix: isotropic, orthotropic or full, in material axes that may be rotated against the axes of
+//! the body.
 //!
-//! Voigt's order is xx, yy, zz, yz, xz, xy with engineering shear strains. In the plane xx, yy and xy
-//! are used of it: in plane stress the matrix is that of a thin sheet, in plane strain part of that of
-//! the solid.
+//! Voigt's order is xx, yy, zz, yz, xz, xy with engineering shear strains. A plane problem uses the
+//! components xx, yy and xy.
+//! In plane stress the matrix is that of a thin sheet, in plane strain part of that of the solid.
 
 use nalgebra::{DMatrix, Matrix6, Rotation3, Vector3};
 
@@ -12,22 +13,24 @@ use super::tensor::{Number, Tensor, matrix, tensor};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
-/// The components of a tensor in Voigt's order.
+/// Components of a tensor in Voigt's order.
 const VOIGT: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
 
-/// Those of the plane.
+/// Indices in Voigt's order of the components in the plane.
 const PLANE: [usize; 3] = [0, 1, 5];
 
-/// C, Pa.
+/// Hooke's matrix C, Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hooke {
     matrix: Matrix6<f64>,
-    /// Factors of the strains xx, yy and 2 xy in what follows across a plane body: the stress zz (Pa) in plane strain,
-    /// the strain zz in plane stress. `None` in space, and where the constants of the deck do not contain it.
+    /// Row for the direction across the plane: factors of the strains xx, yy and 2 xy.
+    ///
+    /// The product is the stress zz (Pa) in plane strain, and the strain zz in plane stress.
+    /// `None` in space, and if the constants of the deck do not determine this row.
     across: Option<[f64; 3]>,
 }
 
-/// The full matrix: its upper triangle.
+/// Keys of the full matrix: its upper triangle.
 const FULL: [[&str; 6]; 6] = [
     ["c11", "c12", "c13", "c14", "c15", "c16"],
     ["", "c22", "c23", "c24", "c25", "c26"],
@@ -37,7 +40,7 @@ const FULL: [[&str; 6]; 6] = [
     ["", "", "", "", "", "c66"],
 ];
 
-/// An orthotropic solid: Young's moduli, Poisson's ratios and shear moduli.
+/// Keys of an orthotropic solid: Young's moduli, Poisson's ratios and shear moduli.
 const ORTHOTROPIC: [&str; 9] = [
     "youngs_modulus_x",
     "youngs_modulus_y",
@@ -50,7 +53,7 @@ const ORTHOTROPIC: [&str; 9] = [
     "shear_modulus_xz",
 ];
 
-/// Those of a thin sheet.
+/// Keys of an orthotropic thin sheet.
 const SHEET: [&str; 4] = [
     "youngs_modulus_x",
     "youngs_modulus_y",
@@ -108,7 +111,7 @@ pub const fn angle(name: &'static str) -> Key {
     }
 }
 
-/// These keys, and those of Hooke's matrix.
+/// The given keys, followed by the keys of Hooke's matrix.
 macro_rules! keys_with_hooke {
     ($($own:expr),* $(,)?) => {
         &[
@@ -130,7 +133,7 @@ macro_rules! keys_with_hooke {
 }
 pub(super) use keys_with_hooke;
 
-/// The first of some keys that has a value.
+/// Return the first of these keys that has a value.
 fn given_of(
     values: &Values,
     names: impl IntoIterator<Item = &'static str>,
@@ -150,12 +153,12 @@ fn fault_at(key: &'static str, message: impl Into<String>) -> Option<LawFault> {
     })
 }
 
-/// The first of the constants that are not those of an isotropic solid.
+/// Return the first given key of an anisotropic solid.
 pub fn own_constants(values: &Values) -> Option<&'static str> {
     given_of(values, full_entries().chain(ORTHOTROPIC))
 }
 
-/// What is wrong with the constants in this setting.
+/// Return the error in the constants for this dimension.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let full = given_of(values, full_entries());
     let orthotropic = given_of(values, ORTHOTROPIC);
@@ -195,7 +198,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
             let message = "in the plane Hooke's matrix has c11, c12, c16, c22, c26 and c66";
             return fault_at(key, message);
         }
-        // A diagonal entry that is not above 0 is to blame by itself.
+        // A diagonal entry of 0 or below is an error by itself, so the message points at this entry.
         let to_blame = |name: &&'static str| {
             let of_diagonal = (0..6).any(|k| FULL[k][k] == *name);
             of_diagonal && values.get(name).is_some() && values.number(name) <= 0.0
@@ -221,7 +224,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// A matrix in which some strain has no energy.
+/// Return the error of a matrix that is not positive definite.
 fn indefinite(
     matrix: &Matrix6<f64>,
     dimension: Dimension,
@@ -243,7 +246,7 @@ fn indefinite(
     )
 }
 
-/// The smallest eigenvalue (Pa) of the matrix as decks have it, and its strain in words.
+/// Return the smallest eigenvalue (Pa) of the matrix in the deck's notation, and its strain in words.
 fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     let used = used(dimension);
     let written = DMatrix::from_fn(used.len(), used.len(), |a, b| matrix[(used[a], used[b])]);
@@ -260,7 +263,7 @@ fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     (all.eigenvalues[softest], parts.join(", "))
 }
 
-/// The components of Hooke's matrix that a dimension has.
+/// Indices of the components of Hooke's matrix that a dimension uses.
 fn used(dimension: Dimension) -> Vec<usize> {
     match dimension {
         Dimension::Space => (0..6).collect(),
@@ -268,7 +271,7 @@ fn used(dimension: Dimension) -> Vec<usize> {
     }
 }
 
-/// The smallest eigenvalue of C : I (Pa) of constants that are not isotropic.
+/// Return the smallest eigenvalue of C : I (Pa); `None` for isotropic constants.
 pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64> {
     let hooke = Hooke {
         matrix: unturned(values, dimension)?,
@@ -280,7 +283,7 @@ pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64
     })
 }
 
-/// The matrix along the material's own axes, where it is not isotropic.
+/// Return Hooke's matrix in the material's axes; `None` for isotropic constants.
 fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let number = |key: &str| values.get(key).map_or(0.0, |_| values.number(key));
     if given_of(values, full_entries()).is_some() {
@@ -292,7 +295,7 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let young = ["x", "y", "z"].map(|axis| of("youngs_modulus", axis));
     let mut compliance = Matrix6::zeros();
     for (k, young) in young.into_iter().enumerate() {
-        // What a sheet has across it does not matter, if it does not couple.
+        // The stiffness across a sheet does not matter, because it does not couple to the plane here.
         compliance[(k, k)] = if sheet && k == 2 { 1.0 } else { 1.0 / young };
     }
     for (axes, a, b) in [("yz", 1, 2), ("xz", 0, 2), ("xy", 0, 1)] {
@@ -309,8 +312,8 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     Some(compliance.try_inverse().unwrap_or(not_a_solid))
 }
 
-/// The elastic constants of the isotropic solid with the same moduli on average over all directions
-/// (Voigt), where the law has constants of its own.
+/// Return the elastic constants of the isotropic solid whose moduli are the averages over all directions
+/// (Voigt). `None` if the law is isotropic.
 pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
     let c = unturned(values, dimension)?;
     if matches!(dimension, Dimension::Space) {
@@ -337,7 +340,7 @@ pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
 }
 
 impl Hooke {
-    /// Of a body; none where the constants are of no solid.
+    /// Create Hooke's matrix of a body; `None` if its entries are not finite.
     pub fn of(given: &Given) -> Option<Self> {
         let Some(own) = unturned(given.values, given.dimension) else {
             let matrix = isotropic(given);
@@ -366,14 +369,14 @@ impl Hooke {
             })
     }
 
-    /// The stress zz (Pa) in plane strain or the strain zz in plane stress, from the strain in the plane; `None` where
-    /// the constants do not contain it.
+    /// Return the stress zz (Pa) in plane strain, or the strain zz in plane stress, from the strain in the
+    /// plane. `None` if the constants of the deck do not determine it.
     pub fn across<const D: usize>(&self, strain: &Tensor<f64, D>) -> Option<f64> {
         let [xx, yy, xy] = self.across?;
         Some(xx * strain[0][0] + yy * strain[1][1] + xy * (strain[0][1] + strain[1][0]))
     }
 
-    /// S = C : E, Pa.
+    /// Return S = C : E, Pa.
     #[inline(always)]
     pub fn stress<T: Number, const D: usize>(&self, strain: &Tensor<T, D>) -> Tensor<T, D> {
         let mut stress = [[T::of(0.0); D]; D];
@@ -391,8 +394,8 @@ impl Hooke {
         stress
     }
 
-    /// Shear modulus of the isotropic solid with the same compliance on average over all directions (Reuss), Pa: that of
-    /// the softest shears, where these differ.
+    /// Return the shear modulus (Pa) of the isotropic solid whose compliance is the average over all
+    /// directions (Reuss). The softest shear modes dominate it.
     pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
         let used = used(dimension);
         let own = DMatrix::from_fn(used.len(), used.len(), |a, b| {
@@ -415,9 +418,9 @@ impl Hooke {
         extremes(&matrix::<D>(&self.stress(&unit)))[0]
     }
 
-    /// The largest eigenvalue of C : E = λ E, Pa.
+    /// Return the largest eigenvalue of C : E = λ E, Pa.
     pub fn largest(&self) -> f64 {
-        // Kelvin's notation, in which the length of a tensor is that of its vector.
+        // In Kelvin's notation the norm of a tensor is that of its vector.
         let factor = |k: usize| if k < 3 { 1.0 } else { 2_f64.sqrt() };
         let kelvin = Matrix6::from_fn(|a, b| self.matrix[(a, b)] * factor(a) * factor(b));
         kelvin
@@ -428,7 +431,7 @@ impl Hooke {
     }
 }
 
-/// The components that there are in `D` dimensions, by their place in Voigt's order.
+/// Indices in Voigt's order of the components in `D` dimensions.
 fn components<const D: usize>() -> impl Iterator<Item = usize> {
     const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
     let used: &[usize] = match D {
@@ -439,12 +442,12 @@ fn components<const D: usize>() -> impl Iterator<Item = usize> {
     used.iter().copied()
 }
 
-/// The place of a component in Voigt's order.
+/// Index of a component in Voigt's order.
 fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }
 
-/// The row of the stress zz in plane strain.
+/// Return the row of the stress zz in plane strain.
 fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
     let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
     is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))
@@ -467,7 +470,7 @@ fn isotropic(given: &Given) -> Matrix6<f64> {
     })
 }
 
-/// The matrix in the body's axes, of one in axes turned by Bunge's angles (rad).
+/// Transform a matrix from axes that are rotated by Bunge's angles (rad) to the axes of the body.
 fn turned(own: &Matrix6<f64>, [first, second, third]: [f64; 3]) -> Matrix6<f64> {
     let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
     let (z, x) = (Vector3::z_axis(), Vector3::x_axis());

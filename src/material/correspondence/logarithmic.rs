@@ -1,12 +1,15 @@
-//! J2 plasticity at large strains, in the logarithmic elastic strain of each point's family.
+//! J2 plasticity at large strains, with the logarithmic elastic strain of each point's family.
 //!
-//! F = F_e F_p. The state of a point is C_p⁻¹ − I with C_p = F_pᵀ F_p, so that b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ. With the
-//! eigenvalues b_a and the eigenvectors n_a of b_e (Simo 1992):
+//! F = F_e F_p. The stored state of a point is C_p⁻¹ − I with C_p = F_pᵀ F_p, so that b_e = F_e F_eᵀ = F
+//! C_p⁻¹ Fᵀ.
+//! With the eigenvalues b_a and the eigenvectors n_a of b_e (Simo 1992):
 //!
-//! ε_a = ½ ln b_a,  τ = Σ τ_a n_a⊗n_a,  τ_a = λ Σ ε + 2G ε_a,  P = τ F⁻ᵀ,  W = ½ Σ τ_a ε_a.
+//! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ Σ ε + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
 //!
-//! Flow is that of small strains, between ε_a and τ_a, and b_e becomes Σ exp(2 ε_a) n_a⊗n_a. Rotation of the body
-//! rotates b_e alone: there is no rate to integrate. Flow keeps the volume, det C_p = 1.
+//! The flow rule is that of small strains, applied to ε_a and τ_a. After the flow b_e is Σ exp(2 ε_a)
+//! n_a⊗n_a.
+//! A rigid rotation only rotates b_e, so no stress rate needs integration. Flow preserves volume, det C_p =
+//! 1.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -14,26 +17,27 @@ use super::super::PlasticState;
 use super::family::determinant;
 use super::plastic::{Plastic, tensor_of};
 
-/// Sweeps of Jacobi's method at most; about six are needed.
+/// Largest number of sweeps of Jacobi's method; about six are needed.
 const MOST_SWEEPS: usize = 30;
 
-/// The square of the off-diagonal entries over that of all at which Jacobi's method has converged.
+/// Jacobi's method has converged if the squared off-diagonal entries are below this fraction of all squared
+/// entries.
 const CONVERGED: f64 = 1e-32;
 
-/// What a point's F and state give before any flow.
+/// Elastic trial state of a point, before any flow.
 struct Trial {
     /// F⁻¹.
     inverse: Matrix3<f64>,
-    /// b_a.
+    /// Eigenvalues b_a.
     squares: Vector3<f64>,
-    /// n_a, by columns.
+    /// Eigenvectors n_a, by columns.
     axes: Matrix3<f64>,
-    /// ε_a.
+    /// Logarithmic strains ε_a.
     strains: Vector3<f64>,
 }
 
 impl Trial {
-    /// `None` where F or b_e is not positive.
+    /// Compute the trial state; `None` if det F ≤ 0 or b_e is not positive definite.
     fn of<const D: usize>(gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<Self> {
         let mut h = Matrix3::zeros();
         h.view_mut((0, 0), (D, D)).copy_from(gradient);
@@ -42,7 +46,7 @@ impl Trial {
             return None;
         }
         let inverse = deformation.try_inverse()?;
-        // b_e − I, with all digits of small strains.
+        // b_e − I, without cancellation at small strains.
         let plastic = deformation * tensor_of(&state.strain) * deformation.transpose();
         let (over_one, axes) = eigen(h + h.transpose() + h * h.transpose() + plastic);
         if over_one.min() <= -1.0 {
@@ -56,14 +60,14 @@ impl Trial {
         })
     }
 
-    /// Σ a_a n_a⊗n_a.
+    /// Return the tensor Σ a_a n_a⊗n_a with these entries a_a.
     fn tensor(&self, entries: &Vector3<f64>) -> Matrix3<f64> {
         self.axes * Matrix3::from_diagonal(entries) * self.axes.transpose()
     }
 }
 
-/// P (Pa) and the elastic energy density (J/m³) at a displacement gradient, to which the body comes from a plastic state
-/// that changes with it; `None` where F is not positive.
+/// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
+/// state. `None` if det F ≤ 0.
 pub fn at<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
@@ -76,7 +80,7 @@ pub fn at<const D: usize>(
         let change = trial.tensor(&change.component_mul(&trial.squares));
         let change = trial.inverse * change * trial.inverse.transpose();
         add(&mut state.strain, &change);
-        // The stress follows from the state alone, so that a restart computes the same bits.
+        // The stress is computed again from the stored state, so that a restart computes the same bits.
         trial = Trial::of(gradient, state)?;
     }
     let strains = trial.strains;
@@ -86,7 +90,7 @@ pub fn at<const D: usize>(
     Some((piola, 0.5 * stress.dot(&strains)))
 }
 
-/// Kirchhoff stress across the plane in plane strain, Pa; `None` where F is not positive.
+/// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if det F ≤ 0.
 pub fn across<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
@@ -97,7 +101,7 @@ pub fn across<const D: usize>(
     Some(trial.tensor(&stress.diagonal())[(2, 2)])
 }
 
-/// Adds a symmetric tensor to entries xx, yy, zz, yz, xz, xy.
+/// Add a symmetric tensor to entries xx, yy, zz, yz, xz, xy.
 pub fn add(entries: &mut [f64; 6], change: &Matrix3<f64>) {
     let places = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
     for (entry, place) in entries.iter_mut().zip(places) {
@@ -105,8 +109,9 @@ pub fn add(entries: &mut [f64; 6], change: &Matrix3<f64>) {
     }
 }
 
-/// Eigenvalues of a symmetric matrix and its eigenvectors, by columns. Jacobi's method takes sums, products, quotients and
-/// square roots alone, so that the bits are the same on every machine.
+/// Return the eigenvalues of a symmetric matrix, and its eigenvectors by columns. Jacobi's method uses
+/// additions, multiplications, divisions and square roots only. The bits are therefore the same on every
+/// machine.
 fn eigen(mut m: Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
     let mut axes = Matrix3::identity();
     for _ in 0..MOST_SWEEPS {
@@ -178,7 +183,7 @@ mod tests {
         law(Dimension::Space, "logarithmic")
     }
 
-    /// P, W and the Kirchhoff stress τ = P Fᵀ.
+    /// Return P, W and the Kirchhoff stress τ = P Fᵀ.
     fn stress(
         law: &Plastic,
         deformation: &Matrix3<f64>,
@@ -216,7 +221,7 @@ mod tests {
                 0..100 => 3_f64.powf((f64::from(step) + 1.0) / 100.0),
                 _ => 3_f64.powf(2.0 - (f64::from(step) + 1.0) / 100.0),
             };
-            // One dimension: the stress over the strain ln λ.
+            // Reference in one dimension: the stress as a function of the strain ln λ.
             let trial = YOUNG * (along.ln() - plastic);
             let limit = YIELD + HARDENING * flowed;
             let growth = ((trial.abs() - limit) / (YOUNG + HARDENING)).max(0.0);
@@ -224,7 +229,7 @@ mod tests {
             flowed += growth;
             plastic += growth * trial.signum();
             let wanted = YOUNG * (along.ln() - plastic);
-            // The stretch across at which the stress across is 0, in damped steps.
+            // Find the transverse stretch at which the transverse stress is 0, in damped steps.
             let deformation =
                 |across: f64| Matrix3::from_diagonal(&Vector3::new(along, across, across));
             for _ in 0..200 {
@@ -237,7 +242,7 @@ mod tests {
             assert!((state.work - work).abs() < 1e-9, "{step}");
         }
         assert!(flowed > 1.5, "{flowed}");
-        // Flow keeps the volume.
+        // Flow preserves volume.
         let volume = (Matrix3::identity() + tensor_of(&state.strain)).determinant();
         assert!((volume - 1.0).abs() < 1e-12, "{volume}");
     }
@@ -273,7 +278,7 @@ mod tests {
 
     #[test]
     fn work_becomes_elastic_energy_and_heat() {
-        // Tension, shear and a turn, with strains beyond 1.
+        // Tension, shear and rotation, with strains above 1.
         let error = |steps: i32| {
             let law = in_space();
             let mut state = PlasticState::default();
@@ -313,7 +318,7 @@ mod tests {
         let law = in_space();
         let base = Matrix3::new(1.0004, 0.3, -0.2, -0.3, 1.0, 0.1, 0.2, -0.1, 0.9995);
         let turn = Rotation3::new(Vector3::new(-0.1, -0.2, -0.3)).into_inner();
-        // Nearly a rotation, so that it does not yield.
+        // Nearly a rotation, so that the point does not yield.
         let svd = base.svd(true, true);
         let small = svd.singular_values.map(|s| 1.0 + 1e-3 * (s - 1.0));
         let deformation = turn * svd.u.unwrap() * Matrix3::from_diagonal(&small) * svd.v_t.unwrap();
@@ -338,8 +343,8 @@ mod tests {
     #[test]
     fn at_small_strains_it_is_the_law_of_small_strains() {
         let dimension = Dimension::PlaneStrain { thickness: 1.0 };
-        // As a fraction of the stress. Both strains differ by their squares, and so does the pressure, whereas flow limits the
-        // deviator: the error is of the order K ε²/σ_y.
+        // Error as a fraction of the stress. The two strain measures differ by ε², and so does the pressure,
+        // whereas the yield stress limits the deviator. The error is therefore of the order K ε²/σ_y.
         let error = |size: f64| {
             let laws = ["logarithmic", "green-lagrange"].map(|measure| law(dimension, measure));
             let mut states = [PlasticState::default(); 2];

@@ -1,19 +1,21 @@
-//! Correspondence: a classical law for the stress at each point, from the deformation gradient of its
-//! family.
+//! Correspondence: a classical stress at each point, from the deformation gradient of its family.
 //!
-//! Silling et al. 2007, §18; Willberg, Hesse & Heinecke 2022, eq. 6–15. With the shape tensor
-//! K = Σ ω ξ⊗ξ Ṽ and the displacement gradient H = (Σ ω η⊗ξ Ṽ) K⁻¹, F = I + H, both over the intact
-//! bonds, and a first Piola–Kirchhoff stress P that follows from F, the force state is
+//! Silling et al. 2007, §18; Willberg, Hesse & Heinecke 2022, eq. 6–15.
+//! The shape tensor is K = Σ ω ξ⊗ξ Ṽ, the displacement gradient is H = (Σ ω η⊗ξ Ṽ) K⁻¹, and F = I + H. Both
+//! sums are over the intact bonds.
+//! With a first Piola–Kirchhoff stress P(F), the force state is
 //!
-//! T⟨ξ⟩ = ω P K⁻¹ ξ + ω B z,  z = η − H ξ.
+//! T⟨ξ⟩ = ω P K⁻¹ ξ + ω B z, z = η − H ξ.
 //!
-//! z is the part of the motion that F does not see, and B z is what works against it
-//! ([`Control`]). In the loops this is T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H. The strain energy
-//! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
+//! z is the part of the motion that does not change F (a zero-energy mode). B z is the force of the
+//! zero-energy control ([`Control`]).
+//! The loops use T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H.
+//! The strain energy density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, because Σ ω z⊗ξ Ṽ = 0.
 //!
-//! Where a body yields ([`Plastic`]), P follows from F and from what flow has left at the point. The control of the elastic body
-//! is multiplied by a share s that falls with the flow ([`Plastic::control_left`]): an elastic control would carry load that
-//! the solid cannot. When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the elastic control is dissipated.
+//! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point.
+//! The control is then multiplied by a factor s that falls with the flow ([`Plastic::control_left`]). An
+//! elastic control would carry load that the solid cannot carry.
+//! When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the control is dissipated.
 
 mod bond_associated;
 mod control;
@@ -41,7 +43,7 @@ use hooke::Hooke;
 use plastic::Plastic;
 use stress::Stress;
 
-/// The law with its constants.
+/// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correspondence {
     stress: Stress,
@@ -49,7 +51,7 @@ pub struct Correspondence {
     modulus: f64,
     control: Control,
     plastic: Option<Plastic>,
-    /// The trace of the shape tensor of a whole family, m⁵.
+    /// Trace of the shape tensor of an untruncated family, m⁵.
     whole: f64,
 }
 
@@ -107,8 +109,8 @@ impl Declared for Correspondence {
 fn invariants(values: &Values) -> Invariants {
     let stress = of_stress(values);
     let yields = values.get(plastic::YIELD_STRESS.name).is_some();
-    // The control of Wan et al. has axes of its own where a family is not whole. They do not turn with the body, and it
-    // turns such points, by the square of z. The others have none.
+    // In truncated families the control of Wan et al. has fixed axes, which do not rotate with the body. It
+    // then exerts a moment of the order z². Other controls have no axes.
     let has_axes = values.word(control::KIND.name) == "wan2019";
     Invariants {
         conservative: stress.conservative && !yields,
@@ -117,7 +119,7 @@ fn invariants(values: &Values) -> Invariants {
     }
 }
 
-/// What holds for the stress alone.
+/// Return the invariants of the law without its control.
 fn of_stress(values: &Values) -> Invariants {
     let by_word = values.word(STRESS.name) == "willberg2022";
     Invariants {
@@ -150,24 +152,26 @@ impl Described for Correspondence {
     }
 }
 
-/// The constants of a point: a spring constant that its energy nowhere exceeds, and that of Silling's
-/// control (N/m⁷); then A, and the diagonal and mixed entries of B.
+/// Constants: a spring constant that bounds the energy, and the constant of the control (N/m⁷). Then A, and
+/// the diagonal and mixed entries of B.
 type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// W − ½ P : H (J/m³), and whether the shape tensor is singular; where a body yields and is controlled, also the part
-/// ½ tr(B H K Hᵀ) of ½ Σ ω η·B η Ṽ that is not of the control (J/m³), and s at the start of the step.
+/// Count of the point's own numbers: W − ½ P : H (J/m³), and the flag of a singular shape tensor.
+///
+/// If a body yields and has a control, two more follow. One is ½ tr(B H K Hᵀ), the part of ½ Σ ω η·B η Ṽ that
+/// does not belong to the control (J/m³). The other is s at the start of the step.
 const OWN: usize = 4;
 
-/// The first of them, which all points have.
+/// Count of the own numbers that all points have.
 const OWN_OF_ELASTIC: usize = 2;
 
 /// A, and the diagonal and mixed entries of B.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
-/// A ξ + B η. Row by row, written out: the compiler keeps loops over so much as loops, and then all of their
-/// numbers in memory.
+/// Return A ξ + B η. The rows are written out: the compiler does not unroll loops of this size, and then
+/// keeps all of their data in memory.
 #[inline(always)]
 fn times_bond<S: Simd, const D: usize>(
     simd: S,
@@ -202,13 +206,13 @@ fn row<S: Simd, const D: usize>(
 }
 
 impl Correspondence {
-    /// Whether points have a control that falls with their flow.
+    /// Whether points have a control that decreases with plastic flow.
     fn control_yields(&self) -> bool {
         self.plastic.is_some() && self.control != Control::None
     }
 }
 
-/// η·B η, N/m⁵.
+/// Return η·B η, N/m⁵.
 #[inline(always)]
 fn of_control<const D: usize>(control: &Symmetric<D>, eta: &[Lanes; D]) -> Lanes {
     let mut sum = Lanes::splat(0.0);
@@ -223,13 +227,13 @@ fn of_control<const D: usize>(control: &Symmetric<D>, eta: &[Lanes; D]) -> Lanes
 impl<const D: usize> Law<D> for Correspondence {
     type Point = Point<D>;
     type BondHistory = [Lanes; 0];
-    /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
+    /// Diagonal and mixed entries of K (m⁵), and Σ ω Ṽ (m³).
     type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
-    /// K as in the whole sum, and Σ ω η⊗ξ Ṽ (m⁵).
+    /// K and Σ ω η⊗ξ Ṽ over the intact bonds (m⁵).
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
     const CONSTANTS: usize = CONSTANTS;
-    /// The second is for the energy of a control that yields.
+    /// The second pass computes the energy of a control that decreases with plastic flow.
     const PASSES: usize = 2;
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;
@@ -264,7 +268,7 @@ impl<const D: usize> Law<D> for Correspondence {
         }
     }
 
-    /// The trace of K⁻¹ over that of a whole family.
+    /// Trace of K⁻¹ divided by that of an untruncated family.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         shape

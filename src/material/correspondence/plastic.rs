@@ -1,17 +1,20 @@
-//! J2 plasticity with isotropic hardening, of the strain of each point's family: at small strains, and by
-//! [`logarithmic`] at large ones.
+//! J2 plasticity with isotropic hardening, in the strain of each point's family. This file holds small
+//! strains; [`logarithmic`] holds large strains.
 //!
-//! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic one, E = E_e + E_p, and
-//! S = C : E_e, P = F S. E does not change when the body turns, so that none of this knows rotations: there is
-//! no frame to carry along, no polar decomposition and no rate to integrate, and without flow it is the law of
-//! St. Venant and Kirchhoff. It is meant for small strains under rotations of any size.
+//! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic strain, E = E_e + E_p. The
+//! stress is S = C : E_e, P = F S.
+//! A rigid rotation does not change E. Therefore the law needs no corotational frame, no polar decomposition
+//! and no integration of a stress rate.
+//! Without flow this is the St. Venant–Kirchhoff law. It is meant for small strains with rotations of any
+//! size.
 //!
-//! With the deviator S_d and q = √(3/2 |S_d|²) the yield surface is q = σ_y + H ε̄. What leaves it in a step
-//! returns along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In
-//! plane stress, where the stress across the sheet stays 0, ΔE_p = x S_d of the stress in the end, with the x
-//! of a scalar equation (§3.4).
+//! With the deviator S_d and q = √(3/2 |S_d|²) the yield surface is q = σ_y + H ε̄.
+//! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H
+//! ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
+//! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the final stress, where x
+//! solves a scalar equation (§3.4).
 //!
-//! What flow dissipates is all of the plastic work ∫ q dε̄.
+//! The whole plastic work ∫ q dε̄ is dissipated.
 
 use std::ops::AddAssign;
 
@@ -27,15 +30,15 @@ use crate::dimension::Dimension;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plastic {
-    /// σ_y, Pa.
+    /// Yield stress σ_y, Pa.
     yield_stress: f64,
-    /// H, Pa.
+    /// Hardening modulus H, Pa.
     hardening: f64,
-    /// λ, Pa; in plane stress that of the sheet.
+    /// Lamé's λ, Pa; in plane stress that of the sheet.
     lambda: f64,
-    /// G, Pa.
+    /// Shear modulus G, Pa.
     shear: f64,
-    /// Whether the stress across the plane is 0.
+    /// Whether the problem is plane stress, so that the stress across the plane is 0.
     is_sheet: bool,
     /// Whether the elastic strain is logarithmic.
     is_logarithmic: bool,
@@ -68,14 +71,15 @@ pub const STRAIN_MEASURE: Key = Key {
     kind: Kind::Word(&[Word::new("green-lagrange"), Word::new("logarithmic")]),
 };
 
-/// How far above the yield stress, as a share of it, nothing flows: what has returned once does not flow again
-/// by rounding.
+/// Tolerance of the yield surface, relative to the yield stress. Without it, a returned stress could flow
+/// again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// The same for logarithmic strains: b_e of a point that has returned is rounded by the square of its stretches.
+/// Tolerance of the yield surface for logarithmic strains. The round-off of b_e after a return is larger,
+/// because it scales with the square of the stretches.
 const LOGARITHMIC_SURFACE: f64 = 1e-9;
 
-/// What is wrong with the values of the keys.
+/// Return the error in the values of the keys.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let fault = |key: &Key, message: &str| {
         Some(LawFault {
@@ -113,7 +117,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
 }
 
 impl Plastic {
-    /// That of a body, if it yields.
+    /// Create the law of a body; `None` if the body does not yield.
     pub fn of(given: &Given) -> Option<Self> {
         let number = |key: &Key| {
             let is_given = given.values.get(key.name).is_some();
@@ -135,7 +139,7 @@ impl Plastic {
         })
     }
 
-    /// For people to read.
+    /// Properties for display.
     pub fn described(&self) -> [(&'static str, Property); 3] {
         let strain = if self.is_logarithmic {
             "logarithmic"
@@ -149,8 +153,8 @@ impl Plastic {
         ]
     }
 
-    /// P (Pa) and the elastic energy density (J/m³) at a displacement gradient, to which the body comes from
-    /// a plastic state that changes with it; `None` where there is no logarithmic strain.
+    /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
+    /// state. `None` if a logarithmic strain does not exist, because det F ≤ 0.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -172,7 +176,8 @@ impl Plastic {
         Some((second + gradient * second, 0.5 * stress.dot(&elastic)))
     }
 
-    /// Kirchhoff stress across the plane in plane strain, Pa; `None` where there is no logarithmic strain.
+    /// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if a logarithmic strain does
+    /// not exist.
     pub fn across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -187,7 +192,7 @@ impl Plastic {
         Some(self.stress(&elastic)[(2, 2)])
     }
 
-    /// Stretch F_zz across the plane in plane stress.
+    /// Return the stretch F_zz across the plane in plane stress.
     pub fn stretch_across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -199,7 +204,7 @@ impl Plastic {
         stretch_of(zz - 0.5 * self.lambda / self.shear * elastic)
     }
 
-    /// Stress of an elastic strain, Pa: S, or the Kirchhoff stress of a logarithmic strain.
+    /// Return the stress of an elastic strain, Pa: S, or the Kirchhoff stress of a logarithmic strain.
     pub fn stress(&self, elastic: &Matrix3<f64>) -> Matrix3<f64> {
         let mut stress = elastic * (2.0 * self.shear);
         if self.is_sheet {
@@ -216,23 +221,24 @@ impl Plastic {
         stress
     }
 
-    /// The share of the zero-energy control that is left: (σ/(σ + 3G ε̄))² with the present yield stress σ, the square of the
-    /// secant modulus of shear over G. It is 1 before any flow and never grows.
+    /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))² with the current yield stress σ. It is
+    /// the square of the secant shear modulus over G. It is 1 before any flow and never grows.
     ///
-    /// z grows with ε̄. Under the secant itself the energy of the control grows as the plastic work does, and a limit load
-    /// contains a share of it for ever; under its square that energy stays what it was when the body began to yield.
+    /// z grows with ε̄. With the secant modulus itself, the energy of the control would grow with the plastic
+    /// work, and limit loads would contain a part of it.
+    /// With the square, this energy stays at its value at first yield.
     pub fn control_left(&self, state: &PlasticState) -> f64 {
         let limit = self.limit(state);
         (limit / (limit + 3.0 * self.shear * state.equivalent)).powi(2)
     }
 
-    /// The stress at which a body of this state yields, Pa.
+    /// Return the current yield stress of this state, Pa.
     fn limit(&self, state: &PlasticState) -> f64 {
         self.yield_stress + self.hardening * state.equivalent
     }
 
-    /// The plastic strain that grows where the stress (Pa) would be this one without flow, and what it adds to ε̄ and to the
-    /// work; `None` if nothing flows.
+    /// Return the plastic strain that grows at a trial stress (Pa), and update ε̄ and the plastic work.
+    /// `None` if nothing flows.
     pub fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) -> Option<Matrix3<f64>> {
         let (limit, most) = (self.limit(state), equivalent(trial));
         let surface = if self.is_logarithmic {
@@ -240,7 +246,7 @@ impl Plastic {
         } else {
             SURFACE
         };
-        // Of what is not finite nothing flows, and it is told as what it is.
+        // NaN and infinity do not flow; the check for finite fields reports these.
         let flows = most > limit * (1.0 + surface) && most.is_finite();
         if !flows {
             return None;
@@ -256,9 +262,11 @@ impl Plastic {
         Some(change)
     }
 
-    /// Δε̄ and ΔE_p in plane stress. C and the deviator's projection have the same eigenvectors, so that the
-    /// parts of the stress shrink by 1/(1 + x c); q shrinks with x and is convex, and Newton's method comes to
-    /// its root from one side.
+    /// Return Δε̄ and ΔE_p in plane stress.
+    ///
+    /// C and the projection to the deviator have the same eigenvectors. Each part of the stress therefore
+    /// shrinks by 1/(1 + x c), with the eigenvalue c.
+    /// q decreases with x and is convex, so Newton's method converges to the root from one side.
     fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64) -> (f64, Matrix3<f64>) {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
         let even = 2.0 * (self.lambda + self.shear) / 3.0;
@@ -294,7 +302,7 @@ impl Plastic {
     }
 }
 
-/// A symmetric tensor of its entries xx, yy, zz, yz, xz, xy.
+/// Create a symmetric tensor from its entries xx, yy, zz, yz, xz, xy.
 pub fn tensor_of([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Matrix3<f64> {
     Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
 }
@@ -303,7 +311,7 @@ fn deviator(stress: &Matrix3<f64>) -> Matrix3<f64> {
     stress - Matrix3::from_diagonal_element(stress.trace() / 3.0)
 }
 
-/// q = √(3/2 |S_d|²).
+/// Return the equivalent stress q = √(3/2 |S_d|²).
 fn equivalent(stress: &Matrix3<f64>) -> f64 {
     1.5_f64.sqrt() * deviator(stress).norm()
 }
@@ -338,7 +346,7 @@ mod tests {
         Plastic::of(&given(dimension, &values)).unwrap()
     }
 
-    /// Gradients of a walk in all directions, some steps of which are large.
+    /// Displacement gradients of a random walk, with some large steps.
     fn walk<const D: usize>() -> impl Iterator<Item = SMatrix<f64, D, D>> {
         let mut number = 0.0_f64;
         let mut place = SMatrix::<f64, D, D>::zeros();
@@ -372,12 +380,12 @@ mod tests {
             assert!(flow.trace().abs() < 1e-16);
             if state != before {
                 assert!(over > -1e-12, "{over}");
-                // Along the deviator, and as long as the equivalent strain says.
+                // The flow is along the deviator, with the length of the equivalent strain.
                 let growth = state.equivalent - before.equivalent;
                 let wanted = deviator(&stress) * (1.5 * growth / equivalent(&stress));
                 assert!((flow - wanted).norm() < 1e-9 * growth);
             }
-            // Once it has flowed it stays.
+            // A returned stress does not flow again.
             let after = state;
             law.at(&gradient, &mut state);
             assert_eq!(state, after);
@@ -401,8 +409,7 @@ mod tests {
             let (stress, energy) = sheet.at(&gradient, &mut of_sheet).unwrap();
             let mut whole = Matrix3::zeros();
             whole.fixed_view_mut::<2, 2>(0, 0).copy_from(&gradient);
-            // The gradient across at which the stress across is 0, between two that are too small and too
-            // large.
+            // Find by bisection the gradient across the sheet at which the stress across is 0.
             let [mut low, mut high] = [-0.3, 0.3];
             for _ in 0..80 {
                 whole[(2, 2)] = 0.5 * (low + high);

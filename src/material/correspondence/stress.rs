@@ -1,4 +1,4 @@
-//! The first Piola–Kirchhoff stress and the strain energy density of a deformation gradient.
+//! First Piola–Kirchhoff stress and strain energy density from a deformation gradient.
 
 use nalgebra::SMatrix;
 
@@ -9,16 +9,16 @@ use super::tensor::{Number, Tensor, contracted, matrix, rows, tensor};
 use crate::dimension::Dimension;
 use crate::lanes::{Lanes, WIDTH};
 
-/// How stress follows from the deformation gradient.
+/// The stress law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stress {
-    /// P = F S, S = C : E with E = ½ (FᵀF − I): of an energy, and the same in every frame.
+    /// P = F S, S = C : E with E = ½ (FᵀF − I). It derives from an energy and is objective.
     StVenantKirchhoff(Hooke),
-    /// C : E taken for the Cauchy stress, P = J σ F⁻ᵀ (Willberg et al. 2022, eq. 9, where F⁻¹ is
-    /// printed): the same as the above for small strains, but not in a frame that has turned.
+    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E (Willberg et al. 2022, eq. 9, printed with F⁻¹). It
+    /// equals St. Venant–Kirchhoff at small strains without rotation, and is not objective.
     Willberg2022(Hooke),
-    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF, in plane stress with the thickness
-    /// at which no stress is left across it.
+    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress the thickness adjusts so
+    /// that the stress across is 0.
     NeoHooke(NeoHooke),
 }
 
@@ -34,19 +34,19 @@ pub struct NeoHooke {
     largest: f64,
 }
 
-/// What eight bonds have at their own displacement gradients.
+/// Results for eight bonds at their displacement gradients.
 #[derive(Debug, Clone, Copy)]
 pub struct OfBonds<const D: usize> {
     /// P, Pa.
     pub piola: Tensor<Lanes, D>,
     /// W, J/m³.
     pub energy: Lanes,
-    /// 1 where the law has no stress, and P and W are 0.
+    /// 1 for bonds at which the stress does not exist; their P and W are 0.
     pub missing: Lanes,
 }
 
 impl Stress {
-    /// That of this name in decks.
+    /// Create the stress law of this name in decks.
     pub fn of(name: &str, given: &Given, hooke: Hooke) -> Self {
         match name {
             "willberg2022" => Self::Willberg2022(hooke),
@@ -60,7 +60,7 @@ impl Stress {
         }
     }
 
-    /// For people to read.
+    /// Name for display.
     pub fn name(&self) -> &'static str {
         match self {
             Self::StVenantKirchhoff(_) => "St. Venant–Kirchhoff",
@@ -69,7 +69,7 @@ impl Stress {
         }
     }
 
-    /// The largest modulus at rest: W ≤ ½ c |H|², Pa.
+    /// Return the largest modulus c at rest, Pa: W ≤ ½ c |H|².
     pub fn largest_modulus(&self) -> f64 {
         match self {
             Self::StVenantKirchhoff(hooke) | Self::Willberg2022(hooke) => hooke.largest(),
@@ -77,8 +77,8 @@ impl Stress {
         }
     }
 
-    /// P (Pa) and W (J/m³) at a displacement gradient H = F − I; none where the law has no stress,
-    /// because the body is turned inside out.
+    /// Return P (Pa) and W (J/m³) at a displacement gradient H = F − I; `None` if the law has no stress
+    /// because det F ≤ 0.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -104,21 +104,22 @@ impl Stress {
                 let inverse = deformation.try_inverse()?.transpose();
                 let doubled = matrix(&green_strain(&rows(gradient))) * 2.0;
                 let (log, energy) = law.in_plane(&doubled);
-                // F − F⁻ᵀ = F⁻ᵀ (FᵀF − I).
+                // Identity: F − F⁻ᵀ = F⁻ᵀ (FᵀF − I).
                 let shear = inverse * doubled * law.shear;
                 Some((shear + inverse * (0.5 * law.lambda * log), energy))
             }
         }
     }
 
-    /// Kirchhoff stress across the plane (Pa) in plane strain; `None` where the constants do not contain it.
+    /// Return the Kirchhoff stress across the plane (Pa) in plane strain; `None` if the constants do not
+    /// determine it.
     pub fn across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         let volume = determinant(&(SMatrix::identity() + gradient));
         match self {
             Self::StVenantKirchhoff(hooke) => hooke.across(&strain),
             Self::Willberg2022(hooke) => Some(hooke.across(&strain)? * volume),
-            // The law has no stress where the body is turned inside out.
+            // The law has no stress for det F ≤ 0.
             Self::NeoHooke(_) if volume <= 0.0 => Some(0.0),
             Self::NeoHooke(law) => {
                 let log = libm::log1p(growth(&(matrix(&strain) * 2.0)));
@@ -127,7 +128,7 @@ impl Stress {
         }
     }
 
-    /// As [`Self::across`], of eight bonds; 0 where the constants do not contain it.
+    /// Same as [`Self::across`] for eight bonds; 0 if the constants do not determine the stress.
     #[inline(never)]
     pub fn across_of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> Lanes {
         Lanes(std::array::from_fn(|lane| {
@@ -136,12 +137,12 @@ impl Stress {
         }))
     }
 
-    /// Stretch F_zz across the plane in plane stress; `None` where the constants do not contain it.
+    /// Return the stretch F_zz across the plane in plane stress; `None` if the constants do not determine it.
     pub fn stretch_across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         match self {
             Self::StVenantKirchhoff(hooke) => stretch_of(hooke.across(&strain)?),
-            // The J of the law is that of the plane.
+            // The J of this law is that of the plane.
             Self::Willberg2022(_) => Some(1.0),
             Self::NeoHooke(law) => {
                 let growth = growth(&(matrix(&strain) * 2.0));
@@ -150,7 +151,8 @@ impl Stress {
         }
     }
 
-    /// As [`Self::at`], of eight bonds; compiled once, and not into every loop over bonds.
+    /// Same as [`Self::at`] for eight bonds. Not inlined, so that the code is compiled once and not into
+    /// every loop over bonds.
     #[inline(never)]
     pub fn of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
         let none = Lanes::splat(0.0);
@@ -184,7 +186,7 @@ impl Stress {
     }
 }
 
-/// E = ½ (H + Hᵀ + HᵀH), without the difference of FᵀF and I.
+/// Return E = ½ (H + Hᵀ + HᵀH), which avoids the cancellation of FᵀF − I.
 #[inline(always)]
 pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tensor<T, D> {
     tensor(|a, b| {
@@ -196,13 +198,13 @@ pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tenso
     })
 }
 
-/// The stretch along an axis with this Green strain.
+/// Return the stretch along an axis with this Green strain.
 pub fn stretch_of(strain: f64) -> Option<f64> {
     let square = 1.0 + 2.0 * strain;
     (square > 0.0).then(|| square.sqrt())
 }
 
-/// P = F (C : E) and W = ½ E : C : E.
+/// Return P = F (C : E) and W = ½ E : C : E.
 #[inline(always)]
 fn st_venant_kirchhoff<T: Number, const D: usize>(
     hooke: &Hooke,
@@ -221,10 +223,11 @@ fn st_venant_kirchhoff<T: Number, const D: usize>(
 }
 
 impl NeoHooke {
-    /// ln det FᵀF, that across the plane included, and W, from FᵀF − I of the plane or of space.
+    /// Return ln det FᵀF and W, from FᵀF − I of the plane or of space. The determinant includes the stretch
+    /// across the plane.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
         let own = libm::log1p(growth(doubled));
-        // q = ln of the square of the stretch across the plane.
+        // q is the logarithm of the squared stretch across the plane.
         let across = if self.plane_stress && D == 2 {
             self.across(own)
         } else {
@@ -236,7 +239,7 @@ impl NeoHooke {
         (log, energy)
     }
 
-    /// The q at which μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
+    /// Solve μ (e^q − 1) + ½ λ (own + q) = 0 for q by Newton's method.
     fn across(&self, own: f64) -> f64 {
         let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
         for _ in 0..20 {
@@ -251,7 +254,7 @@ impl NeoHooke {
     }
 }
 
-/// det (I + M) − 1 without a difference of large numbers.
+/// Return det (I + M) − 1 without cancellation.
 fn growth<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
     match D {
         1 => m[(0, 0)],
@@ -290,7 +293,7 @@ mod tests {
             .map(|name| Stress::of(name, &given, hooke))
     }
 
-    /// P is the slope of W, by central differences.
+    /// Check that P is the derivative of W, by central differences.
     fn is_slope<const D: usize>(law: &Stress, gradient: SMatrix<f64, D, D>) {
         let (stress, _) = law.at(&gradient).unwrap();
         let step = 1e-5;

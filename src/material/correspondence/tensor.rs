@@ -1,4 +1,4 @@
-//! Tensors of one point or of eight bonds, for what is computed alike for both.
+//! Tensors of one point or of eight bonds, for formulas that both use.
 
 use std::ops::{Add, Mul};
 
@@ -6,9 +6,9 @@ use nalgebra::SMatrix;
 
 use crate::lanes::Lanes;
 
-/// A number, or eight of them.
+/// A number, or eight numbers.
 pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Mul<f64, Output = Self> {
-    /// From a number.
+    /// Convert from a number.
     fn of(value: f64) -> Self;
 }
 
@@ -26,10 +26,10 @@ impl Number for Lanes {
     }
 }
 
-/// Row by row.
+/// Tensor entries, row by row.
 pub type Tensor<T, const D: usize> = [[T; D]; D];
 
-/// From a function of row and column.
+/// Create a tensor from a function of row and column.
 #[inline(always)]
 pub fn tensor<T: Number, const D: usize>(entry: impl Fn(usize, usize) -> T) -> Tensor<T, D> {
     let mut all = [[T::of(0.0); D]; D];
@@ -41,17 +41,17 @@ pub fn tensor<T: Number, const D: usize>(entry: impl Fn(usize, usize) -> T) -> T
     all
 }
 
-/// The rows of a matrix.
+/// Return the rows of a matrix.
 pub fn rows<const D: usize>(matrix: &SMatrix<f64, D, D>) -> Tensor<f64, D> {
     tensor(|a, b| matrix[(a, b)])
 }
 
-/// The matrix of these rows.
+/// Create a matrix from its rows.
 pub fn matrix<const D: usize>(rows: &Tensor<f64, D>) -> SMatrix<f64, D, D> {
     SMatrix::from_fn(|a, b| rows[a][b])
 }
 
-/// A : B.
+/// Return A : B.
 #[inline(always)]
 pub fn contracted<T: Number, const D: usize>(left: &Tensor<T, D>, right: &Tensor<T, D>) -> T {
     let mut sum = T::of(0.0);
