@@ -62,7 +62,6 @@ impl Law {
         match self {
             Self::Pmb => 23 + u64::from(failure),
             Self::Lps => 41 + 2 * u64::from(failure),
-            // 15 products and sums, 15 sums of the tensors of i and j, 18 products and sums with ξ.
             Self::Correspondence => 96 + 7 * u64::from(failure),
         }
     }
