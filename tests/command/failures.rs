@@ -24,7 +24,7 @@ fn bar(time: &str) -> String {
     )
 }
 
-/// Runs the deck and returns exit code and output; the message must be there once.
+/// Run the deck and returns exit code and output; the message must be there once.
 fn failing(command: &mut Command, message: &str, code: i32) -> String {
     let output = finish(command);
     let printed = text(&output);

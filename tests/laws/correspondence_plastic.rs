@@ -32,7 +32,7 @@ fn deck(dimension: &str, more: &str) -> String {
     )
 }
 
-/// Takes all points where a gradient of displacement has them, row by row.
+/// Take all points where a gradient of displacement has them, row by row.
 fn strain<const D: usize>(
     simulation: &mut Simulation<D>,
     gradient: [[f64; 3]; 3],

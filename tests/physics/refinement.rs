@@ -280,7 +280,7 @@ fn torn_and_coarsened() -> String {
     TORN.replace("every_steps = 6", "coarsen_after = 1e-7, every_steps = 6")
 }
 
-/// Makes steps and refines as a run does; deals the points out anew now and then. Returns how many points
+/// Make steps and refines as a run does; deals the points out anew now and then. Returns how many points
 /// were born, and how many left.
 fn go_on(simulation: &mut Simulation<'_, 2>, steps: u64) -> [u64; 2] {
     let mut change = [0; 2];

@@ -12,7 +12,7 @@ use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
 
-/// Makes a whole load step.
+/// Make a whole load step.
 fn load_step<const D: usize>(simulation: &mut Simulation<D>) {
     simulation.advance();
     while !simulation.load_step.is_settled {

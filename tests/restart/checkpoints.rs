@@ -78,7 +78,7 @@ fn rows(out: &Path) -> usize {
     text.map_or(0, |text| text.lines().count())
 }
 
-/// Starts a run, and waits for its second output.
+/// Start a run, and waits for its second output.
 fn with_two_outputs(mut command: Command, out: &Path) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
@@ -638,7 +638,7 @@ fn a_full_disc_leaves_the_checkpoint_before() {
     );
 }
 
-/// Runs the plate until 1e-5 s into a folder, and continues it with another deck until 1.5e-5 s; returns
+/// Run the plate until 1e-5 s into a folder, and continues it with another deck until 1.5e-5 s; returns
 /// what that prints.
 fn continued_with(folder: &Folder, name: &str, other: &str) -> String {
     let out = folder.join(name);

@@ -29,7 +29,7 @@ impl Folder {
         self.0.join(name)
     }
 
-    /// Writes a file into the folder.
+    /// Write a file into the folder.
     pub fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.join(name);
         std::fs::write(&path, text).unwrap();
@@ -126,10 +126,10 @@ fn under_mpirun(ranks: usize, program: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// Runs a command to its end.
+/// Run a command to its end.
 ///
 /// # Panics
-/// When it takes too long: nothing may hang.
+/// If it takes too long: nothing may hang.
 pub fn finish(command: &mut Command) -> Output {
     let child = command
         .stdout(Stdio::piped())
@@ -187,7 +187,7 @@ pub fn wait(mut child: Child) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// Runs a command that must succeed and returns what it prints.
+/// Run a command that must succeed and returns what it prints.
 pub fn succeed(command: &mut Command) -> String {
     let output = finish(command);
     assert!(output.status.success(), "{command:?}\n{}", text(&output));

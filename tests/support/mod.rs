@@ -24,14 +24,14 @@ pub fn problem(text: &str) -> Problem {
     deck::parse(&source).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Runs `body` on one rank without MPI.
+/// Run `body` on one rank without MPI.
 pub fn simulate<const D: usize, T>(text: &str, body: impl FnOnce(Simulation<D>) -> T) -> T {
     let problem = problem(text);
     let comm = threads::alone();
     body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Runs `body` on one rank without MPI, with a deck of `inputs/` in which some parameters have other
+/// Run `body` on one rank without MPI, with a deck of `inputs/` in which some parameters have other
 /// values.
 pub fn simulate_input<const D: usize, T>(
     name: &str,
@@ -50,7 +50,7 @@ pub fn simulate_input<const D: usize, T>(
     body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Runs `body` on several ranks, each a thread.
+/// Run `body` on several ranks, each a thread.
 pub fn simulate_on<const D: usize, T: Send>(
     ranks: usize,
     text: &str,
@@ -62,7 +62,7 @@ pub fn simulate_on<const D: usize, T: Send>(
     })
 }
 
-/// Sets all displacements, ghosts included, and evaluates the forces there.
+/// Set all displacements, ghosts included, and evaluates the forces there.
 pub fn displace<const D: usize>(
     simulation: &mut Simulation<D>,
     map: impl Fn([f64; 3]) -> [f64; 3],

@@ -20,7 +20,7 @@ pub struct Recorded {
     pub repartitions: usize,
 }
 
-/// Runs a problem on `ranks` ranks with `threads` threads each.
+/// Run a problem on `ranks` ranks with `threads` threads each.
 pub fn record(problem: &Problem, ranks: usize, threads: usize) -> Recorded {
     let mut of_rank = threads::run(ranks, |comm| {
         let pool = ThreadPoolBuilder::new().num_threads(threads);
@@ -88,7 +88,7 @@ impl Recorded {
         [output, row].map(|schedule| schedule.is_due(clock))
     }
 
-    /// Adds what is due after the present step. Collective.
+    /// Add what is due after the present step. Collective.
     fn add<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

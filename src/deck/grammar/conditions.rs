@@ -10,7 +10,7 @@ use crate::deck::number::{Number, Vector};
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
-    /// The set; all points if not given.
+    /// Name of the set; all points if not given.
     #[serde(default = "super::all_points")]
     pub set: Text,
     /// Displacement in m.
@@ -26,7 +26,7 @@ pub struct Initial {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// The set that it acts on.
+    /// Name of the set that the condition acts on.
     pub set: Text,
     /// Prescribed displacement in m.
     #[serde(skip_serializing_if = "Option::is_none")]

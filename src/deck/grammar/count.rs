@@ -14,8 +14,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub struct Count(NonZeroU64);
 
 impl Count {
+    /// Wrap a count.
+    ///
     /// # Panics
-    /// When it is 0.
+    /// If `number` is 0.
     pub const fn new(number: u64) -> Self {
         Self(NonZeroU64::new(number).expect("not 0"))
     }

@@ -59,7 +59,7 @@ impl<'de> Deserialize<'de> for Outputs {
     }
 }
 
-/// The keys of the main result; tables of further results are set apart.
+/// Map access that yields the keys of the main result, and moves the tables of further results to `further`.
 struct MainKeys<'a, A> {
     keys: A,
     further: &'a mut Tables<Output>,
@@ -86,7 +86,7 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for MainKeys<'_, A> {
     }
 }
 
-/// The schema of [`Output`], which further keys have as well.
+/// Schema of [`Output`]; the value of any other key is a further result with the same schema.
 impl JsonSchema for Outputs {
     fn schema_name() -> Cow<'static, str> {
         "Outputs".into()
@@ -285,9 +285,9 @@ pub enum Statistic {
     Maximum,
 }
 
-/// A front: the position that a field has reached along a line. It starts from the farthest point near the line whose
-/// value exceeds the threshold. Linear interpolation to the next point ahead gives the position where the threshold is
-/// crossed.
+/// A front: the position that a field has reached along a line. The search finds the farthest point near the
+/// line whose value exceeds the threshold. Linear interpolation to the next point ahead gives the position
+/// where the value crosses the threshold.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {
