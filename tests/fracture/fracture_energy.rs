@@ -318,7 +318,7 @@ fn by_the_energy_of_bonds_of_correspondence() {
 #[test]
 fn by_the_energy_of_bonds_of_bond_associated_correspondence() {
     let law = format!("bond_associated_{CORRESPONDENCE}");
-    // It sums over the bonds three times a step.
+    // This law has three passes over the bonds per step, so the steps are longer.
     by_energy(&law, 0.02, [0.96..1.03, 0.96..1.03, 0.98..1.06]);
 }
 
@@ -455,7 +455,7 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
         (CORRESPONDENCE.to_owned(), 0.94..1.08, 0.84..1.02),
         (associated.clone(), 0.9..1.03, 0.85..1.06),
     ] {
-        // It sums over the bonds three times a step.
+        // This law has three passes over the bonds per step, so the steps are longer.
         let growth = if law == associated { 0.02 } else { 0.01 };
         for angle in [0.0, 45.0, 90.0] {
             let (mode, rule) = (Mode::Slanted(angle), "energy tension_only = false");
@@ -467,8 +467,8 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     }
 }
 
-/// The deck of [`text`] with the damage of the body for a pair of bodies alone, which meet at the cut; the bodies have the
-/// damage that is given as keys of `[damage.own.…]`, or none.
+/// Return the deck of [`text`] with two bodies that meet at the cut; the damage law applies to the pair only.
+/// `own` has the keys of `[damage.own.…]`, the damage law of the bodies; `None` for bodies without damage.
 fn pair_text(dimension: &str, ratio: u32, law: &str, rule: &str, own: Option<&str>) -> String {
     let whole = text(dimension, ratio, law, rule);
     let (before, body) = whole.split_once("[body.block]").unwrap();
@@ -524,7 +524,7 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
         (PMB, STRETCH, vec![None, Some(&tough), Some(&weak)]),
         (NORMALISED, STRETCH, vec![Some(&tough)]),
         (&*soft, STRETCH, vec![None]),
-        // The pair breaks by work and its bodies by stretch.
+        // The pair breaks by work, and its bodies break by stretch.
         (&*soft, ENERGY, vec![None, Some(&tough)]),
         (CORRESPONDENCE, ENERGY, vec![None, Some(&tough_by_work)]),
     ] {
@@ -547,22 +547,22 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
 
 #[test]
 fn in_the_bodies_of_a_pair_their_own_damage_counts() {
-    // The cut between the halves lies within the lower body, whose damage is as tough as that of the whole block; the pair
-    // above it is weak.
+    // The cut between the halves lies within the lower body, which has the same fracture energy as the whole
+    // block. The pair above the cut is weak.
     let within = |own: &str, pair: &str| {
         let deck = pair_text("plane-stress", 3, PMB, STRETCH, Some(own));
         let deck = deck.replace(
             &format!("fracture_energy = {FRACTURE_ENERGY}\n"),
             &format!("{pair}\n"),
         );
-        // The border of the bodies, all others stay.
+        // Move only the border of the bodies.
         let deck = deck.replace("upper = [3.5, 0]", "upper = [3.5, 2]");
         let deck = deck.replace("lower = [-3.5, 0]", "lower = [-3.5, 2]");
         cost_of_deck::<2>(Mode::Opening, &deck, 0.02)
     };
     let own = format!("{STRETCH} = {{ fracture_energy = {FRACTURE_ENERGY} }}");
     let whole = cost::<2>("plane-stress", 3, PMB, STRETCH, 0.02);
-    // Bonds across the cut that reach the upper body have the toughness of the pair.
+    // Bonds across the cut that end in the upper body have the fracture energy of the pair.
     let same = within(&own, &format!("fracture_energy = {FRACTURE_ENERGY}"));
     let weak = within(&own, "fracture_energy = 0.02");
     assert!((same / whole - 1.0).abs() < 1e-6, "{same} for {whole}");
@@ -588,7 +588,7 @@ fn in_a_pair_that_never_breaks() {
         let mut broken = 0;
         simulation.forces.for_each_broken(|_, _| broken += 1);
         assert_eq!(broken, 0);
-        // Within the bodies they do.
+        // Bonds within the bodies break.
         displace(&mut simulation, |[x, y, z]| [x, 1.2 * y, z]);
         let mut within = [0, 0];
         let model = &simulation.model;
@@ -602,7 +602,7 @@ fn in_a_pair_that_never_breaks() {
 
 #[test]
 fn in_a_pair_of_unlike_bodies() {
-    // Moduli and horizons of their own; the bodies alone would cost 100 times as much.
+    // Bodies of different moduli and horizons. Within the bodies, the cost would be 100 times as large.
     let cost = |law: [&str; 2], rule: &str, spacing: f64| {
         let text = format!(
             "dimension = 'plane-strain'
@@ -639,8 +639,8 @@ fn in_a_pair_of_unlike_bodies() {
     assert!((0.8..1.05).contains(&by_work), "{by_work}");
 }
 
-/// The energy per area that opening costs at a height in two bodies that meet at y = 7, as a share of G0; the upper one has
-/// half the horizon and half the spacing of the lower one, which is given.
+/// Return the energy per area of an opening at a height in two bodies that meet at y = 7, divided by G0.
+/// `spacing` is the spacing of the lower body; the upper body has half its spacing and half its horizon.
 fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
     let (rule, more) = rule.split_once(' ').unwrap_or((rule, ""));
     let text = format!(
@@ -662,7 +662,7 @@ fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
     opening_cost(&text, height)
 }
 
-/// The energy per area that opening costs at a height in a plate 24 m wide, as a share of G0.
+/// Return the energy per area of an opening at a height in a plate 24 m wide, divided by G0.
 fn opening_cost(text: &str, height: f64) -> f64 {
     simulate::<2, _>(text, |mut simulation| {
         let mut opening = 1e-2;
@@ -696,8 +696,8 @@ fn between_bodies_of_different_horizons_by_energy() {
         let inside = 0.5 * (coarse + fine);
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        // Across the border the points do not lie where the midpoint rule has them, and the order in which bonds of
-        // correspondence break moves the cost by some per cent.
+        // Across the border, the points are not those of the midpoint rule. With correspondence, the cost
+        // also varies by some per cent with the order in which bonds break.
         assert!((border / inside - 1.0).abs() < 0.12, "{case}");
     }
 }
@@ -719,14 +719,15 @@ fn between_bodies_of_different_horizons_by_stretch() {
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         println!("{case}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        // With spacings of 1 and 0.5 the border costs 12 % more than the inside: the coarse body is a poor quadrature for the
-        // small horizon.
+        // With spacings of 1 and 0.5 the border costs 12 % more than the inside: the coarse points are a poor
+        // quadrature of the small horizon.
         assert!((border / inside - 1.0).abs() < 0.06, "{case}");
     }
 }
 
-/// The work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1 % of its extension, so
-/// the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the plane.
+/// Return the work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1
+/// % of its extension, so the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the
+/// plane.
 fn work_at_breaking<const D: usize>(dimension: &str, calibration: &str) -> f64 {
     let thickness = if D == 2 { "thickness = 0.5" } else { "" };
     let corner = |at: f64| {
