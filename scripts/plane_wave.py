@@ -89,7 +89,7 @@ class Energy:
         self.places = result.points[:, :2]
         kinetic = 0.5 * (result.field("velocity", 1) ** 2).sum(axis=1)
         self.density = result.field("strain_energy_density", 1) + kinetic
-        # A run without refinement has no levels.
+        # A run without refinement has no field `level`.
         self.is_refined = "level" in result.fields and result.field("level", 1) > 0
         self.time = result.times[1]
 

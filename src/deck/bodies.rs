@@ -140,8 +140,8 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
 const WHOLE: f64 = 1e-6;
 
 /// Return the grid origin along an axis, m, from which cells of this edge (m) fill a shape exactly. The
-/// origin is 0 if cells from 0 fill the shape, otherwise its lower face. `None` for a shape that is not a
-/// whole number of cells long between two flat faces.
+/// origin is 0 if cells from 0 fill the shape, otherwise the lower face of the shape. `None` for a shape that
+/// is not a whole number of cells long between two flat faces.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {

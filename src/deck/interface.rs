@@ -21,8 +21,8 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
 /// # Errors
-/// On bodies whose laws cannot share a bond, a rule or damage law that the material laws of a pair do not
-/// allow, an invalid pair, and a pair that is given twice.
+/// On bodies whose laws cannot share a bond, and on an invalid or repeated pair. Also on a rule or damage law
+/// that the material laws of a pair do not allow.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -248,8 +248,8 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     Err(scope.error(other.span.clone(), message))
 }
 
-/// Return an error if a rule needs one micromodulus for both ends of a bond, and the two laws do not have the
-/// same micromodulus function.
+/// Return an error if a rule needs one micromodulus for both ends of a bond, and the two laws have different
+/// micromoduli.
 fn one_micromodulus(
     scope: &Scope,
     key: &str,

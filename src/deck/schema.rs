@@ -55,7 +55,7 @@ fn remove_null(schema: &mut Value) {
 }
 
 /// Join a choice of tables with one key each into one table that allows one of the keys. Editors then
-/// complete the keys, and their messages name a wrong key.
+/// complete the keys, and their messages name the wrong key.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {
         let mut properties = serde_json::Map::new();

@@ -366,7 +366,8 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
     ] {
         let exact = body(dimension, "pmb", corners, ", volume_correction = 'exact'");
         let found = interior(&exact, 0).unwrap();
-        // Σ |ξ| Ṽ, divided by the integral.
+        // Σ |ξ| Ṽ over the family, divided by the integral of |ξ| over the ball, disc or interval of radius
+        // δ.
         let count = exact.dimension.count();
         let share = CellShare::new(VolumeCorrection::Exact, 3.0, 1.0, count);
         let range = |k: usize| if k < count { -5..=5 } else { 0..=0 };

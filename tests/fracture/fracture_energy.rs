@@ -174,8 +174,8 @@ fn ordinary(ratio: f64, influence: &str) -> String {
     )
 }
 
-/// Assert that the costs at two values of m have at most these errors against the expected fraction of G0,
-/// and that the second error is smaller.
+/// Assert that the costs at two values of m have at most these relative errors, and that the second error is
+/// smaller. `expected` is a fraction of G0.
 fn compare(case: &str, costs: [f64; 2], expected: f64, [coarse, fine]: [f64; 2]) {
     let errors = costs.map(|cost| (cost / expected - 1.0).abs());
     assert!(errors[0] < coarse && errors[1] < fine, "{case}: {costs:?}");

@@ -129,8 +129,8 @@ fn strength<const D: usize>(
     })
 }
 
-/// Return the strains at which the sides, the whole block and the inside break with this correction, divided
-/// by the strain at which the inside breaks without correction.
+/// Return the breaking strains of the sides, the whole block and the inside with this correction. They are
+/// divided by the breaking strain of the inside without correction.
 fn strengths<const D: usize>(law: &'static str, correction: f64, across: f64) -> [f64; 3] {
     let of = |correction, part| Block::new::<D>(law, correction, part).strength::<D>(across);
     let inside = of(0.0, Part::Inside);

@@ -1,6 +1,6 @@
-//! Requirements on every law in every dimension: no force at rest or under rigid motion, equal and opposite
-//! forces, forces that are the derivative of the energy, both ends of a bond broken together, and equal bits
-//! on any ranks and after restarts.
+//! Requirements on every law in every dimension. No force at rest or under rigid motion; equal and opposite
+//! forces that are the derivative of the energy. Both ends of a bond break together. Bits are equal on any
+//! ranks and after restarts.
 
 use crate::support::saved::{state, whole};
 use crate::support::{displace, force, forces, largest_force, problem, simulate, simulate_on};

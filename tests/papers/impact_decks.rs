@@ -150,8 +150,8 @@ fn an_elastic_sphere_between_rigid_plates_has_the_force_of_hertz() {
     assert!(fine < middle && middle < coarse, "{coarse} {middle} {fine}");
 }
 
-/// Return the angle between the notch and the line from the tip of the notch to the crack tip 40 mm above
-/// (degrees), and the largest speed of the crack over 10 mm (m/s).
+/// Return the angle of the crack to the notch (degrees) and the largest speed of the crack over 10 mm (m/s).
+/// The angle is that of the line from the tip of the notch to the crack tip 40 mm above.
 fn kalthoff(simulation: Simulation<'_, 3>) -> [f64; 2] {
     let names = ["time", "tip_upper_x", "tip_upper_y"];
     let rows = series(simulation, &names, 1);

@@ -156,8 +156,8 @@ fn horizons_follow_their_rule() {
     assert_eq!(horizons, [3.0, 3.0, 3.0, 3.0, 3.0, 6.0, 2.0, 2.0, 4.0]);
 }
 
-/// Return the smallest and largest energy density under a uniform strain along x, of points farther than 5 m
-/// from the sides, divided by that of a complete family on the lattice.
+/// Return the smallest and largest energy density under a uniform strain along x, divided by the energy
+/// density of a complete family. Only points farther than 5 m from the sides count.
 fn energies(more: &str, region: &str) -> [f64; 2] {
     let text = format!(
         "dimension = 'plane-stress'

@@ -111,7 +111,7 @@ pub enum Shape {
     Difference(Spanned<Vec<Spanned<Shape>>>),
 }
 
-/// A set of points; exactly one of the keys.
+/// A set of points, given by exactly one selector: `where`, `shape`, `ids`, `file` or `mesh`.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Set {

@@ -21,8 +21,9 @@ pub struct Initial {
     pub velocity: Option<Vector>,
 }
 
-/// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x, y, z and t
-/// for each component. The string `"free"` does not prescribe a component of displacement or velocity.
+/// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x,
+/// y, z and t for each component. A component of displacement or velocity with the string `"free"` is not
+/// prescribed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {

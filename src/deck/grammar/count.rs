@@ -22,7 +22,7 @@ impl Count {
         Self(NonZeroU64::new(number).expect("not 0"))
     }
 
-    /// The count as a `u64`.
+    /// Return the count as a `u64`.
     pub fn get(self) -> u64 {
         self.0.get()
     }

@@ -119,7 +119,7 @@ pub struct Output {
     /// Precision of the fields that change in time: `"double"` (8 bytes per number) or `"single"` (4 bytes).
     #[serde(default)]
     pub precision: Precision,
-    /// The set whose points the result holds; all points if not given.
+    /// Name of the set whose points the result contains; all points if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub set: Option<Text>,
 }
@@ -178,7 +178,7 @@ pub struct History {
     pub tip: Tables<Tip>,
 }
 
-/// Checkpoints; at most one of the keys.
+/// Interval of checkpoints, given by at most one of the keys.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
