@@ -1,21 +1,21 @@
-//! The commit of the build.
+//! The commit that a build is made from.
 
 use std::path::Path;
 use std::process::Command;
 
-/// Set `FISSURE_COMMIT` for the crate. Not in debug builds, which would be rebuilt after each commit, and
-/// not outside a checkout.
+/// Set `FISSURE_COMMIT` for the crate in release builds. Debug builds do not set it, because they would be
+/// rebuilt after each commit. Builds outside a checkout do not set it either.
 pub fn set_environment() {
     if std::env::var("PROFILE").as_deref() != Ok("release") {
         return;
     }
-    // `cargo package` records the commit in this file.
+    // `cargo package` records the commit in this JSON file.
     let packaged = std::fs::read_to_string(".cargo_vcs_info.json").ok();
     if let Some(commit) = packaged.as_deref().and_then(sha1) {
         println!("cargo::rustc-env=FISSURE_COMMIT={}", &commit[..12]);
         return;
     }
-    // The folder may lie in the checkout of another project.
+    // Without this check, git would report the commit of an enclosing checkout of another project.
     if !Path::new(".git").exists() {
         return;
     }
@@ -42,7 +42,7 @@ pub fn set_environment() {
     }
 }
 
-/// The commit in the file written by `cargo package`.
+/// Return the commit in the text of the file written by `cargo package`.
 fn sha1(information: &str) -> Option<&str> {
     let (_, rest) = information.split_once("\"sha1\"")?;
     let commit = rest.split('"').nth(1)?;
@@ -50,7 +50,7 @@ fn sha1(information: &str) -> Option<&str> {
     is_commit.then_some(commit)
 }
 
-/// Output of git; `None` if it fails or is missing.
+/// Return the output of git; `None` if git fails or is missing.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

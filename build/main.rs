@@ -1,4 +1,4 @@
-//! Build script: checks that HDF5 uses the linked MPI, and records the commit.
+//! Build script: check that HDF5 uses the linked MPI, and record the commit.
 
 mod commit;
 mod one_mpi;

@@ -1,6 +1,6 @@
 //! Check that HDF5 was built with the linked MPI; a program with two MPI libraries crashes at its start.
 //!
-//! `mpi-sys` and `hdf5-metno-sys` find their libraries independently. This repeats both searches and
+//! `mpi-sys` and `hdf5-metno-sys` find their libraries independently. This module repeats both searches, and
 //! compares the names of the MPI shared libraries.
 
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::process::Command;
 
 /// The linked MPI.
 pub struct Mpi {
-    /// It is Open MPI; its bindings differ from those of MPICH and derivatives.
+    /// True for Open MPI, whose bindings differ from the bindings of MPICH and its derivatives.
     pub is_open_mpi: bool,
 }
 
@@ -36,7 +36,7 @@ pub fn check() -> Result<Mpi, String> {
     let needed: Vec<String> = (needed_libraries(&hdf5).into_iter())
         .filter(|name| name.starts_with("libmpi"))
         .collect();
-    // Either is empty for a static library, or if the tool to read it is missing.
+    // A list of names is empty for a static library, or if the tool that reads the library is missing.
     if linked.is_empty() || needed.is_empty() || needed.iter().any(|name| linked.contains(name)) {
         return Ok(Mpi { is_open_mpi });
     }
@@ -52,7 +52,7 @@ pub fn check() -> Result<Mpi, String> {
     ))
 }
 
-/// Debian's path of the HDF5 for this MPI, if installed.
+/// Return a note with Debian's path of the HDF5 for this MPI, if installed.
 fn example(linked: &[String]) -> String {
     let family = if linked.iter().any(|name| name.starts_with("libmpich")) {
         "mpich"
@@ -68,7 +68,7 @@ fn example(linked: &[String]) -> String {
     }
 }
 
-/// The shared library that `hdf5-metno-sys` links, if found.
+/// Find the shared library that `hdf5-metno-sys` links.
 fn hdf5_library() -> Option<PathBuf> {
     let own = std::env::var_os("HDF5_DIR").map(|root| vec![PathBuf::from(root).join("lib")]);
     let folders = own.or_else(|| {
@@ -77,7 +77,7 @@ fn hdf5_library() -> Option<PathBuf> {
         Some(found.link_paths)
     });
     let mut folders = folders.unwrap_or_default();
-    // Set by the build of `hdf5-metno-sys`.
+    // The build script of `hdf5-metno-sys` sets this variable.
     if let Some(include) = std::env::var_os("DEP_HDF5_INCLUDE") {
         folders.extend(Path::new(&include).parent().map(|root| root.join("lib")));
     }
@@ -87,7 +87,7 @@ fn hdf5_library() -> Option<PathBuf> {
     files.into_iter().find(|file| file.exists())
 }
 
-/// The soname of a library linked with `-l NAME`.
+/// Return the soname of a library linked with `-l NAME`.
 fn loader_name(name: &str, folders: &[PathBuf]) -> Option<String> {
     let system = ["/usr/lib64", "/usr/lib"].map(PathBuf::from);
     let files = folders.iter().chain(&system);
@@ -102,7 +102,7 @@ fn loader_name(name: &str, folders: &[PathBuf]) -> Option<String> {
     entries(&file, "SONAME").into_iter().next()
 }
 
-/// The sonames of the libraries that a shared library needs.
+/// Return the sonames of the libraries that a shared library needs.
 fn needed_libraries(file: &Path) -> Vec<String> {
     if file.extension().is_some_and(|ending| ending == "dylib") {
         let lines = printed("otool", &["-L"], file).unwrap_or_default();
@@ -115,7 +115,7 @@ fn needed_libraries(file: &Path) -> Vec<String> {
     entries(file, "NEEDED")
 }
 
-/// The values of one tag in the dynamic section of an ELF file.
+/// Return the values of one tag in the dynamic section of an ELF file.
 fn entries(file: &Path, kind: &str) -> Vec<String> {
     let lines = printed("readelf", &["-d", "-W"], file).unwrap_or_default();
     let value = |line: &str| {
@@ -131,7 +131,7 @@ fn base_name(path: &str) -> String {
     path.rsplit('/').next().unwrap_or(path).to_owned()
 }
 
-/// Output of a program for a file, in English; `None` if the program is missing.
+/// Return the output of a program for a file, in English; `None` if the program is missing.
 fn printed(program: &str, options: &[&str], file: &Path) -> Option<String> {
     let mut command = Command::new(program);
     let output = command

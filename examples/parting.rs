@@ -1,5 +1,5 @@
-//! What it costs to part a body at any angle, by law and criterion, as a share of the fracture energy; a table for
-//! `scripts/parting`:
+//! Print the energy per area that separates a body, divided by the fracture energy, for laws, criteria and
+//! angles of opening. `scripts/parting` plots this table:
 //!
 //! ```sh
 //! cargo run --release --example parting
@@ -16,10 +16,11 @@ use fissure::problem::{
 };
 use fissure::solver::calibration::separation_energy_ratio;
 
-/// Horizon over spacing.
+/// m, the ratio of horizon to spacing.
 const RATIO: f64 = 4.0;
 
-/// To the normal of the cut, degrees: from opening to sliding.
+/// Angles between the relative displacement of the halves and the normal of the cut, degrees: 0 is opening,
+/// 90 is sliding.
 const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0];
 
 fn main() -> ExitCode {
@@ -71,7 +72,7 @@ fn rules() -> [(&'static str, DamageRule); 3] {
     ]
 }
 
-/// A body in plane strain whose bonds break at stretches of about 0.02.
+/// Return a body in plane strain whose bonds break at stretches of about 0.02.
 pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Problem> {
     let mut problem = Problem::new(Dimension::PlaneStrain { thickness: 1.0 }, RATIO, 1.0);
     let elastic = Isotropic {
@@ -80,7 +81,7 @@ pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Problem> 
     };
     let material = Material::new(Law::named(law)?, 1.0, elastic);
     let damage = Damage::new(rule, Toughness::FractureEnergy(2.0));
-    // What is parted is a block of its lattice, of a size of its own.
+    // The computation separates its own block of lattice points; the size of this shape has no effect.
     let cell = Shape::Box {
         lower: [0.0; 3],
         upper: [1.0, 1.0, 0.0],

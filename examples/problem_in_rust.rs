@@ -1,5 +1,5 @@
-//! A glass plate with a notch, torn apart, built in Rust without a deck; prints its energies every 50
-//! steps:
+//! Run a glass plate with a notch that is pulled apart. The problem is built in Rust without a deck; the
+//! energies are printed every 50 steps:
 //!
 //! ```sh
 //! cargo run --release --example problem_in_rust
@@ -41,7 +41,8 @@ fn tear(end: f64) -> Result<()> {
     Ok(())
 }
 
-/// A plate of 60 mm × 30 mm whose ends go apart, soon at 2 m/s, up to the end (s).
+/// Return a plate of 60 mm × 30 mm whose ends move apart, each at 1 m/s after a ramp of 10 µs. `end` is the
+/// end time, s.
 pub fn plate(end: f64) -> Result<Problem> {
     let dimension = Dimension::PlaneStress { thickness: 1e-3 };
     let mut problem = Problem::new(dimension, 3.0 * SPACING, end);
@@ -81,7 +82,7 @@ pub fn plate(end: f64) -> Result<Problem> {
     Ok(problem)
 }
 
-/// Prints the energies in each row of the history.
+/// Observer that prints the energies of each row of the history.
 struct Printer {
     speaks: bool,
 }

@@ -1,4 +1,4 @@
-//! Runs a deck, alone or under mpirun, and prints the energies at the end:
+//! Run a deck, as a single process or under mpirun, and print the energies at the end:
 //!
 //! ```sh
 //! cargo run --release --example run_deck inputs/crack_branching.toml out/example
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Runs a deck and writes the result into a folder, in the place of an earlier one.
+/// Run a deck and write the result into a folder; an earlier result is replaced.
 pub fn run_deck(deck: &Path, folder: &Path, comm: &dyn Communicator) -> Result<Outcome> {
     let deck = agree(comm, deck::read(deck, &[]))?;
     let problem = agree(comm, deck.problem())?;

@@ -4,13 +4,13 @@ Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 finer spacings
 Runs the same plate on the coarse grid and on uniform fine grids, one run after the other on one core.
 
 Prints for each run: points, run time, fracture energy and crack length. For a refined grid, it prints the largest
-distance of its crack from two others, in coarse spacings: from the crack of the uniform fine grid, and from that of a
-uniform grid with the points of the refined one. Both are given for all branches and for those that reach the right
-side. The cracks are drawn into the output folder.
+distance of its crack from two other cracks, in coarse spacings: the crack on the uniform fine grid, and the crack on
+a uniform grid with the points of the refined grid. Both distances are printed for all branches, and for the branches
+that reach the right side. The cracks are drawn into the output folder.
 
 With --shifts N, runs the refined and the uniform fine grid on N shifted lattices each. Prints mean and standard
-deviation of where the crack branches and of where its upper and lower branch reach the right side, and whether the
-means differ (Welch's t above 2.1 in size is significant at 5 % for 12 shifts).
+deviation of the branching point and of the heights of the outermost branches at the right side. Also prints Welch's t
+for the difference of the means; an absolute value above 2.1 is significant at 5 % for 12 shifts.
 """
 
 import argparse
@@ -30,28 +30,31 @@ NEAR_THE_SIDE = 0.095  # m
 
 
 def deck(spacing):
-    """The refined plate with a spacing (m) of the coarse grid."""
+    """Return the deck of the refined plate with a spacing (m) of the coarse grid."""
     return with_value(DECK.read_text(), "dx", spacing)
 
 
 def value(text, key):
-    """The first number of a key of a deck."""
+    """Return the first number of a key of a deck."""
     return float(re.search(rf"(?m)^{key} = (\S+)", text)[1])
 
 
 def with_value(text, key, number):
-    """A deck with another first number of a key."""
+    """Return a deck with another first number of a key."""
     return re.sub(rf"(?m)^{key} = \S+", f"{key} = {number}", text, count=1)
 
 
 def uniform(spacing, ratio):
-    """The plate on a uniform grid with a spacing (m) and a horizon in spacings."""
+    """Return the deck of the plate on a uniform grid with a spacing (m) and a horizon in spacings."""
     text = re.sub(r"(?ms)^\[refinement[^\]]*\]\n.*?(?=^\[(?!refinement)|\Z)", "", deck(spacing))
     return re.sub(r'(?m)^horizon = "3\*dx"', f'horizon = "{ratio}*dx"', text)
 
 
 def same_places(coarse, ratio):
-    """The plate on a fine grid with points at and half-way between those of the coarse one, except on the notch."""
+    """Return the deck with a uniform fine grid.
+
+    Its points are at and half-way between the points of the coarse grid, except on the notch.
+    """
     text = uniform(coarse / 2, ratio)
     shift = coarse / 4
     whole = 'shape.box = { lower = [0, "-height/2"], upper = ["length", "height/2"] }'
@@ -71,19 +74,19 @@ def same_places(coarse, ratio):
 
 
 def refined(coarse, ratio):
-    """The plate on a grid with one refined level, with the horizon in finer spacings."""
+    """Return the deck with one refined level; the horizon is in finer spacings."""
     return with_value(deck(coarse), "m", ratio)
 
 
 def refined_twice(coarse):
-    """The plate on a grid with two refined levels and the same ratio on all levels."""
+    """Return the deck with two refined levels and the same ratio on all levels."""
     text = re.sub(r"(?m)^levels = 1", "levels = 2", deck(coarse))
     text = re.sub(r'(?m)^rule = .*\n^m = \["m"\]\n', 'rule = "delta"\n', text)
     return re.sub(r"(?m)^interface_factor = .*\n", "", text)
 
 
 def cases(arguments):
-    """Name, deck, and the uniform grids to compare with."""
+    """Return name and deck of each run, and the uniform grids to compare with."""
     coarse = arguments.dx
 
     def asked(text):
@@ -103,7 +106,7 @@ def cases(arguments):
 
 
 def run(arguments, name, text):
-    """The folder of the result, and the run time, s."""
+    """Run a deck; return the folder of the result and the run time, s."""
     folder = arguments.folder / re.sub(r"\W+", "_", name)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.toml").write_text(text)
@@ -118,7 +121,7 @@ def run(arguments, name, text):
 
 
 def lines(out):
-    """The branches of the final crack, each an array of positions, m."""
+    """Read the branches of the final crack, each an array of positions, m."""
     branches = {}
     with open(out / "crack_notch.csv", newline="") as file:
         for row in csv.DictReader(file):
@@ -127,7 +130,7 @@ def lines(out):
 
 
 def distance(places, branches):
-    """The largest distance of positions beyond the notch from the nearest line, m."""
+    """Return the largest distance of positions beyond the notch from the nearest line, m."""
     places = places[places[:, 0] > BEYOND_THE_NOTCH]
     nearest = numpy.full(len(places), numpy.inf)
     for branch in branches:
@@ -144,19 +147,19 @@ def has_grown(branches):
 
 
 def apart(one, other):
-    """The Hausdorff distance of two cracks, m; NaN without a crack."""
+    """Return the Hausdorff distance of two cracks, m; NaN without a crack."""
     if not has_grown(one) or not has_grown(other):
         return numpy.nan
     return max(distance(numpy.concatenate(one), other), distance(numpy.concatenate(other), one))
 
 
 def through(branches):
-    """The branches that reach the right side."""
+    """Return the branches that reach the right side."""
     return [branch for branch in branches if branch[:, 0].max() > NEAR_THE_SIDE]
 
 
 def shifted(text, coarse, number):
-    """The deck with its lattice shifted by a fraction of the coarse spacing in both directions.
+    """Return the deck with its lattice shifted by a fraction of the coarse spacing in both directions.
 
     The shifts are a low-discrepancy sequence (Roberts 2018) in the unit square.
     """
@@ -167,7 +170,10 @@ def shifted(text, coarse, number):
 
 
 def figures(branches):
-    """Where the crack branches, and the heights of the outermost branches at the right side, m; NaN where there is none."""
+    """Return the x of the branching point and the heights of the outermost branches at the right side, m.
+
+    Values are NaN without branches.
+    """
     places = numpy.concatenate(branches)
     apart = places[numpy.abs(places[:, 1]) > 2e-3]
     at_side = places[places[:, 0] > NEAR_THE_SIDE]
@@ -179,7 +185,7 @@ def figures(branches):
 
 
 def statistics(arguments):
-    """Print the figures of both grids over shifted lattices."""
+    """Print the statistics of both grids over shifted lattices."""
     print("                        more than 2 mm off axis from x, mm   upper branch at the side, mm   lower, mm   time, s")
     for ratio in arguments.m:
         both = {

@@ -1,4 +1,4 @@
-"""Checks that h5py and VTK's reader read a result file equally.
+"""Checks that h5py and VTK's reader return equal data of a result file.
 
 usage: check_result.py RESULT.h5
 
@@ -34,7 +34,7 @@ def check_vtk(path, file):
     root = file["VTKHDF"]
     steps = root["Steps"]
     count = int(steps.attrs["NSteps"])
-    # One number for all steps; one per step with adaptive refinement.
+    # One number of points for all steps, or one per step with adaptive refinement.
     counts = root["NumberOfPoints"][:]
     changing = root["PointData"]["id"].maxshape[0] is None
     names = sorted(root["PointData"])

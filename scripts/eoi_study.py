@@ -16,7 +16,7 @@ import matplotlib
 import numpy
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
 
 EXAMPLES = """\
 examples:
@@ -51,7 +51,7 @@ THEORY = (1.8 * BULK_MODULUS / DENSITY) ** 0.5
 PLATE = (1.6 * BULK_MODULUS / DENSITY) ** 0.5
 
 LAWS = ["pmb", "energy", "diehl2016", "pmb-exact", "ordinary", "printed"]
-# Only in the first limit, down to 1 mm.
+# Laws of the first limit only, down to 1 mm.
 ADDED = ("pmb-exact", "ordinary", "printed")
 LIMITS = {
     "local": "horizon 3 dx, dx to 0",
@@ -90,7 +90,7 @@ def arguments():
 
 
 def grids(limit, small):
-    """The pairs (spacing in m, horizon in spacings) of a limit, from coarse to fine."""
+    """Return the pairs (spacing in m, horizon in spacings) of a limit, from coarse to fine."""
     if limit == "local":
         return [(dx, 3.0) for dx in ([2.5e-3, 2e-3, 1.25e-3] if small else [2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3])]
     if limit == "continuum":
@@ -99,7 +99,7 @@ def grids(limit, small):
 
 
 def deck(law, dx):
-    """The deck's text with another law."""
+    """Return the text of the deck with another law."""
     text = DECK.read_text()
 
     def replace(old, new):
@@ -127,7 +127,7 @@ def deck(law, dx):
 
 
 def offsets(ratio):
-    """Offsets of the neighbours on a lattice of unit spacing."""
+    """Return the offsets of the neighbours on a lattice of unit spacing."""
     reach = range(-int(ratio) - 1, int(ratio) + 2)
     every = numpy.array([(x, y, z) for x in reach for y in reach for z in reach], dtype=float)
     length = numpy.linalg.norm(every, axis=1)
@@ -136,8 +136,8 @@ def offsets(ratio):
 
 
 def long_waves(law, dx, ratio):
-    """Speeds (m/s) of long waves along a lattice axis: in the bulk, and in the tile with free lateral
-    displacement of its layers; `None` for `pmb-exact`, whose neighbours count with parts of their volumes."""
+    """Return the speeds (m/s) of long waves along a lattice axis: in the bulk, and in the tile with free lateral
+    displacement of its layers. `None` for `pmb-exact`, whose volume correction is not implemented here."""
     if law == "pmb-exact":
         return None, None
     steps, lengths = offsets(ratio)
@@ -148,7 +148,7 @@ def long_waves(law, dx, ratio):
     layers = round(THICKNESS / dx)
     level = numpy.round(steps[:, 2] / dx).astype(int)
 
-    # The energy of a bond is w = (g/2) s²|ξ|, with g of point i from the family in each layer.
+    # The energy of a bond is w = (g/2) s²|ξ|. The constant g of point i depends on the family in its layer.
     def modulus(inside):
         if law == "pmb":
             return numpy.full(len(lengths), 18 * BULK_MODULUS / (numpy.pi * horizon**4))
@@ -188,7 +188,7 @@ def long_waves_of_ordinary(steps, lengths, dx):
     level = numpy.round(steps[:, 2] / dx).astype(int)
 
     def energy(layer_of, count):
-        """Energy density of a point as a quadratic form of (1, the lateral displacements of the layers)."""
+        """Return the energy density of a point as a quadratic form of (1, lateral displacements of the layers)."""
         total = numpy.zeros((count + 1, count + 1))
         for layer in layer_of:
             inside = (0 <= level + layer) & (level + layer < count) if count else numpy.full(len(level), True)
@@ -214,7 +214,7 @@ def long_waves_of_ordinary(steps, lengths, dx):
 
 
 def slope(times, places, start, end):
-    """Speed (m/s) of a front between two positions (m); None if it covers too little of the distance or jumps."""
+    """Return the speed (m/s) of a front between two positions (m); None if it covers too little distance or jumps."""
     chosen = (places >= start) & (places <= end)
     if chosen.sum() < 3 or numpy.ptp(places[chosen]) < 0.015:
         return None
@@ -244,7 +244,7 @@ def run(options, limit, law, dx, ratio):
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
-    # Fields are not needed.
+    # Only the history is needed.
     for name in ("result.vtkhdf", "result.xdmf", "checkpoint_0.h5", "checkpoint_1.h5"):
         (folder / name).unlink(missing_ok=True)
     return columns(history)
@@ -256,7 +256,7 @@ def columns(history):
 
 
 def evaluate(history, limit, law, dx, ratio):
-    """The text of a row of the table."""
+    """Return the row of the table for a run."""
     bulk, plate = long_waves(law, dx, ratio)
     result = {"limit": limit, "law": law, "dx": dx, "ratio": ratio, "bulk": bulk, "plate": plate}
     for front, window in (("wave", (0.03, 0.09)), ("damage", (0.02, 0.05))):
@@ -311,7 +311,7 @@ def draw(results, path):
                 continue
             place = [result["ratio"] if limit == "discrete" else result["dx"] * 1e3 for result in chosen]
             for kind, marker, fill in (("wave", "o", "full"), ("damage", "^", "none")):
-                # Omit fronts at 0.
+                # Omit fronts that have not started.
                 speeds = [result[kind] or 0.0 for result in chosen]
                 label = f"{names[law]}: {kind}" if axis is axes[0][0] else None
                 axis.plot(place, speeds, marker=marker, fillstyle=fill, color=colours[law], linewidth=0.8, label=label)

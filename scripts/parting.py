@@ -1,6 +1,6 @@
 """Draws the separation energy of a body by angle, from opening to sliding, for each law and criterion.
 
-Runs examples/parting.rs, which pulls the halves of a small block apart, and draws its table.
+Runs examples/parting.rs, which separates the halves of a small block, and draws its table.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import subprocess
 import matplotlib
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PANELS = [("ordinary", "0.1"), ("ordinary", "0.4"), ("correspondence", "0.3"), ("bond_associated_correspondence", "0.3")]
@@ -24,7 +24,7 @@ LABELS = {
 
 
 def table(program):
-    """The rows of the table: law, ratio, criterion, separation energies by angle (degrees)."""
+    """Return the rows of the table: law, ratio, criterion, separation energies by angle (degrees)."""
     printed = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     head, *rows = csv.reader(printed.splitlines())
     angles = [float(angle) for angle in head[3:]]

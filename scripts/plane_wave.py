@@ -4,11 +4,11 @@ Runs inputs/plane_wave_refined.toml without refinement and with levels 1 to 3 fo
 the energy densities when the crest of the wave is in the patch, and the largest displacement of a node that only a
 reflected wave reaches.
 
-Four readings of the paper are run:
-- patches with two horizons a level, refined nodes only (the caption of table 3), each end of a bond with its own horizon;
-- the same with one horizon a level, all nodes in the patch;
-- the latter with the mean of both horizons for bonds between levels;
-- the latter without the enlarged horizon at interfaces (figure 5b).
+Four interpretations of the paper are run:
+- patches with two horizons per level, refined nodes only (caption of table 3), each end of a bond with its own horizon;
+- the same with one horizon per level, and all nodes in the patch;
+- the second one with the mean of both horizons for bonds between levels;
+- the second one without the enlarged horizon at interfaces (figure 5b).
 """
 
 import argparse
@@ -30,17 +30,17 @@ PAPER = {
     ("delta-m", 2): (18.96, 6.25, 0.87),
     ("delta-m", 3): (20.81, 7.27, 1.03),
 }
-# Figure 5b.
+# Largest loss in figure 5b, without the enlarged horizon, in percent.
 PAPER_UNCORRECTED = 37.4
 
 AMPLITUDE = 0.1  # of each half of the wave, m
 CENTRE = np.array([0.2005, 0.0405])
 DX = 1e-3
-SPEED = 1.125**0.5  # transverse motion is blocked, m/s
+SPEED = 1.125**0.5  # with blocked transverse motion, m/s
 
 
 def without_section(text, name):
-    """The deck without a section and its subtables."""
+    """Return the deck without a section and its subtables."""
     pattern = rf"(?ms)^\[{name}[^\]]*\]\n.*?(?=^\[(?!{name})|\Z)"
     return re.sub(pattern, "", text)
 
@@ -50,7 +50,7 @@ def horizons(rule, level):
 
 
 def deck(rule, levels, margin, factor, bonds, seen, end):
-    """The deck's text, with an output at the time `seen`; no refinement with 0 levels.
+    """Return the text of the deck with an output at the time `seen`; 0 levels mean no refinement.
 
     The patch of each level has the radius of `margin` horizons of the next coarser level.
     """
@@ -74,7 +74,7 @@ def deck(rule, levels, margin, factor, bonds, seen, end):
 
 
 def run(arguments, name, text):
-    """The result of a deck."""
+    """Run a deck and return its result."""
     folder = arguments.folder / name
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "deck.toml"
@@ -89,19 +89,19 @@ class Energy:
         self.places = result.points[:, :2]
         kinetic = 0.5 * (result.field("velocity", 1) ** 2).sum(axis=1)
         self.density = result.field("strain_energy_density", 1) + kinetic
-        # A run without refinement has no levels.
+        # A run without refinement has no field `level`.
         self.is_refined = "level" in result.fields and result.field("level", 1) > 0
         self.time = result.times[1]
 
     def profile(self):
-        """The density along the row of nodes through the patch; all other rows are equal."""
+        """Return the density along the row of nodes through the patch; without a patch all rows are equal."""
         row = np.abs(self.places[:, 1] - CENTRE[1]) < 1e-3 * DX
         order = np.argsort(self.places[row, 0])
         return self.places[row, 0][order], self.density[row][order]
 
 
 def columns(result, *names):
-    """Columns of the history of a result."""
+    """Return columns of the history of a result."""
     history = result.history
     return [np.array(history[name]) for name in names]
 
@@ -112,7 +112,7 @@ def main():
     parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/plane_wave")
     arguments = parser.parse_args()
 
-    # The energy has its maximum with the velocity, beside the centre of the displacement.
+    # The energy is largest at the largest velocity, beside the centre of the displacement pulse.
     crest = CENTRE[0] - 0.03 / 2**0.5
     seen = crest / SPEED
     after = (2 * CENTRE[0] - 0.1) / SPEED
@@ -130,7 +130,7 @@ def main():
         name = f"{rule}_{level}_{margin}_{factor}_{bonds}"
         result = run(arguments, name, deck(rule, level, margin, factor, bonds, seen, after))
         energy = Energy(result)
-        # Time steps differ, and with them the times of the outputs.
+        # The output times of the two runs differ slightly, because their time steps differ.
         shift = SPEED * (energy.time - uniform.time)
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
         near = np.abs(energy.places - CENTRE).max(axis=1) < 5 * DX

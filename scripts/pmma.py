@@ -1,8 +1,8 @@
 """Mixed-mode fracture of a PMMA plate: the experiment of Réthoré (2018) and the computation of Willberg,
 Hesse & Heinecke (2022).
 
-Runs `inputs/pmma_mixed_mode.toml` with one law or several on the same grid and draws the path of the crack
-against the measured one, and force and crack length over the displacement of the plate's right side.
+Runs `inputs/pmma_mixed_mode.toml` with one or several laws on the same grid. Draws the crack path beside the
+measured path, and force and crack length over the displacement of the plate's right side.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import matplotlib
 import numpy
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
 
 EXAMPLES = """\
 examples:
@@ -72,7 +72,7 @@ INITIATION = 0.43e-3  # m, the paper's section 6.3
 HOLE = (0.095, 0.035, 0.015)  # centre and radius, m
 CRACKED = 0.35  # the deck's damage_threshold
 
-# What relaxation has in place of these keys: no inertia, and a row of the history at each equilibrium.
+# Replacements of keys for relaxation: no inertia, and a row of the history at each equilibrium.
 RELAXED = {
     r'(?m)^end = "end_displacement/speed"$': """\
 end = "end_displacement/speed"
@@ -82,7 +82,7 @@ relaxation = {{ load_steps = {steps}, tolerance = 1e-4 }}""",
     r'every = "end_displacement/speed/700"': "every_steps = 1",
 }
 
-# The tables of material and damage; those of the deck itself where there are none.
+# Tables of material and damage for each law; None for the tables of the deck.
 LAWS = {
     "correspondence": None,
     "ordinary": """\
@@ -98,7 +98,7 @@ no_failure = ["left", "right"]
 
 """,
 }
-# A parameter that only damage by work has.
+# Parameter of the deck that only damage by work uses.
 OF_WORK = "family_correction"
 COLOURS = ("#1b6ca8", "#d1495b", "#66a182", "#8d6a9f")
 
@@ -156,7 +156,7 @@ def arguments():
 
 
 def deck(law, load_steps):
-    """The deck's text with another law, and with relaxation if there are load steps."""
+    """Return the text of the deck with another law, and with relaxation if load steps are given."""
     text = DECK.read_text()
 
     def replace(pattern, new):
@@ -201,7 +201,7 @@ def history(folder):
 
 
 def branches(folder):
-    """The branches of the crack as arrays of positions (m), longest first."""
+    """Read the branches of the crack as arrays of positions (m), longest first."""
     with open(folder / "crack_main.csv") as file:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
     numbers = sorted({row[0] for row in rows})
@@ -210,8 +210,8 @@ def branches(folder):
 
 
 def deviation(path):
-    """Largest distance (m) of a path from the measured one, and the leftmost x (m) of the comparison."""
-    # From left to right; where the path turns back, its last part counts.
+    """Return the largest distance (m) of a path from the measured path, and the leftmost x (m) of the comparison."""
+    # Sort the path from left to right; if the path turns back, its last part is used.
     left = max(path[:, 0].min(), MEASURED[-1, 0])
     places = numpy.linspace(left, min(path[:, 0].max(), MEASURED[0, 0]), 400)
     order = numpy.argsort(path[:, 0], kind="stable")
@@ -221,13 +221,13 @@ def deviation(path):
 
 
 def damage(folder):
-    """Positions (m), damage at each output, times (s) and horizon (m)."""
+    """Return positions (m), damage at each output, and times (s)."""
     with fissure.open(folder) as result:
         return result.points, result["damage"], result.times
 
 
 def evaluate(folder, law, dx):
-    """The row of the table of a run."""
+    """Return the row of the table for a run."""
     columns = history(folder)
     way = -columns["probe_right_displacement_x"]
     force, length = columns["force_push"], columns["crack_main_length"]
@@ -244,7 +244,7 @@ def evaluate(folder, law, dx):
     result["peak_at"] = float(way[force.argmax()])
     result["lengths"] = [at(length, displacement) for displacement in LENGTHS_AT]
     result["branches"] = float(columns["crack_main_branches"][-1])
-    # Skip the first tenth, where the reference is too small.
+    # Skip the first tenth of the displacement, in which the strain energy is too small for a ratio.
     late = way > 0.1 * way[-1]
     result["kinetic_share"] = float((columns["kinetic_energy"][late] / columns["strain_energy"][late]).max())
     result["deviation"] = result["reached"] = None
@@ -291,7 +291,7 @@ def draw_path(runs, path):
     for (law, dx, folder), axis in zip(runs, axes[:, 0]):
         places, values, _ = damage(folder)
         x, y = 1e3 * places[:, 0], 1e3 * places[:, 1]
-        # A point's cell in points of print: the plate is 140 mm wide, the axis about 7 inches.
+        # Area of a cell in square points (1/72 inch): the plate is 140 mm wide, the axis about 7 inches.
         size = (72 * 7 / 140 * 1e3 * dx) ** 2
         marks = axis.scatter(x, y, c=values[-1], s=size, marker="s", linewidths=0, cmap="Greys", vmin=0, vmax=0.8)
         figure.colorbar(marks, ax=axis, label="damage")

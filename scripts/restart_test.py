@@ -1,12 +1,12 @@
 """Compares restarted runs with uninterrupted ones, bit for bit.
 
-Each small deck uses one feature with a state. It runs once uninterrupted on one rank. Then it runs in parts: a signal
+Each small deck tests one feature with a state. It runs once uninterrupted on one rank. Then it runs in parts: a signal
 stops each part, or one of its ranks is killed. The next part restarts on other numbers of ranks and threads and with
 another instruction set. All datasets of the result and history.csv must equal those of the uninterrupted run.
 
-The instruction sets are those of this machine, chosen by FISSURE_INSTRUCTIONS. If there is only one, that is printed.
+The instruction sets are those of this machine, chosen by FISSURE_INSTRUCTIONS. If there is only one, a note is printed.
 
-The binary is that of the environment variable FISSURE, or target/release/fissure, or else target/debug/fissure.
+The binary is $FISSURE, or target/release/fissure, or else target/debug/fissure.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from pathlib import Path
 STOPPED = 75
 # Time-out of a part of a run, s.
 PATIENCE = 300
-# Time-out of mpirun after all ranks have ended, s: that of Open MPI 4.1.4 can hang.
+# Time-out of mpirun after all ranks have ended, s; mpirun of Open MPI 4.1.4 can hang.
 LAUNCHER_PATIENCE = 10
 # Number of parts of a run that are stopped or killed.
 INTERRUPTIONS = 2
@@ -35,7 +35,7 @@ STEPS = "time = { end = 12, step = 0.2 }"
 
 
 def plate(law, time_rule, damage, more=""):
-    """A notched plate that is pulled apart."""
+    """Return the deck of a notched plate under tension."""
     return f"""
 dimension = 'plane-stress'
 grid = {{ spacing = 1, horizon = 3 }}
@@ -137,7 +137,7 @@ class Failure(Exception):
 
 
 def binary():
-    """Path of the tested program."""
+    """Return the path of the tested program."""
     named = os.environ.get("FISSURE")
     for path in [named] if named else ["target/release/fissure", "target/debug/fissure"]:
         if Path(path).is_file():
@@ -146,7 +146,7 @@ def binary():
 
 
 def instruction_sets(program):
-    """The instruction sets of this machine, widest last."""
+    """Return the instruction sets of this machine, widest last."""
     printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
     line = next(line for line in printed.splitlines() if line.split()[:1] == ["instructions"])
     largest, built = line.split(maxsplit=1)[1].split(", of ")
@@ -167,7 +167,7 @@ def start(program, deck, out, layout):
 
 
 def children(process):
-    """Process ids of the children of a process, zombies included."""
+    """Return the process ids of the children of a process, including zombies."""
     try:
         return [int(number) for number in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
     except OSError:
@@ -203,7 +203,7 @@ def wait(run, until=lambda: False):
 
 
 def rows(out):
-    """Current number of rows of the history."""
+    """Return the current number of rows of the history."""
     try:
         return max(0, (out / "history.csv").read_bytes().count(b"\n") - 1)
     except OSError:
@@ -211,7 +211,7 @@ def rows(out):
 
 
 def printed_by(out):
-    """The output of the last part of a run."""
+    """Return the printed text of the last part of a run."""
     return out.with_suffix(".log").read_text()
 
 
@@ -221,7 +221,7 @@ def has_checkpoint(out):
 
 
 def interrupt(program, deck, out, layout, at, kind):
-    """Runs a part of a deck until the history has some rows, then stops or kills it. Returns whether the part was
+    """Run a part of a deck until the history has some rows, then stop or kill it. Return whether the part was
     interrupted; it may have ended before."""
     run = start(program, deck, out, layout)
     code = wait(run, lambda: rows(out) >= at and has_checkpoint(out))
@@ -265,7 +265,7 @@ def changes(whole, column):
 
 
 def layouts(most, sets):
-    """An endless sequence of ranks, threads and instruction sets; consecutive ranks differ."""
+    """Yield ranks, threads and instruction sets without end; consecutive numbers of ranks differ."""
     before = 1
     number = random.randrange(len(sets))
     while True:

@@ -1,11 +1,11 @@
-"""A model of the time per step on many ranks and of the limits, with stated inputs.
+"""Model of the time per step and of the limits on many ranks, with given inputs.
 
 A rank has the points of a cube and exchanges a layer of one horizon with its neighbours. The time per
 step, with the interior overlapping the messages, is
 
     border bonds + packing + max(interior bonds, messages · latency + bytes / bandwidth)
 
-The partition of 64³ points to 8 and 27 ranks has 1.04 and 1.00 times the ghosts of cubes.
+For comparison: METIS partitions of 64³ points on 8 and 27 ranks have 1.04 and 1.00 times the ghosts of cubes.
 """
 
 import math
@@ -32,7 +32,7 @@ RANKS = [10**3, 10**4, 10**5]
 
 # Bytes of the reduction per history row: some 30 exact sums of 69 words.
 HISTORY_BYTES = 30 * 69 * 8
-# METIS: 216 000 cells in 0.24 s on one core.
+# Time of METIS per cell, s: 216 000 cells in 0.24 s on one core.
 METIS_SECONDS = 0.24 / 216_000
 # Bytes per cell on every rank: occupation twice (the sum needs a copy), owner three times.
 CELL_BYTES = 2 * 8 + 3 * 4
@@ -43,12 +43,12 @@ GRAPH_CELLS = 2**31 / 26
 
 
 def step(given, points):
-    """Seconds per step by part, for a rank with a number of points, and its messages and bytes."""
+    """Return the parts of the time per step (s), the messages and the bytes of a rank with this number of points."""
     edge = points ** (1 / 3)
     layers = given["layers"]
     ghosts = (edge + 2 * layers) ** 3 - points
     interior = max(0.0, edge - 2 * layers) ** 3 / points
-    # Number of ranks within the layer; several deep if cubes are thinner than it.
+    # Number of ranks within the layer of ghosts; the layer contains several cubes if they are thinner than the layer.
     messages = (2 * math.ceil(layers / edge) + 1) ** 3 - 1
     bonds = given["imbalance"] * points * given["neighbours"] / (given["rate"] * given["cores"])
     size = 8 * given["values"] * ghosts
@@ -68,7 +68,7 @@ def step(given, points):
 
 
 def predict(given, points_of):
-    """A row for each number of ranks; `points_of` gives the points of one rank."""
+    """Return a row for each number of ranks; `points_of` returns the points of one rank."""
     rows = []
     for ranks in RANKS:
         row = {"ranks": ranks, **step(given, points_of(ranks))}
@@ -81,7 +81,7 @@ def predict(given, points_of):
 
 
 def limits(given, ranks, points):
-    """The limits for a number of ranks and points: (name, amount, limit) in the same unit, worst
+    """Return the limits for a number of ranks and points: (name, amount, limit) in the same unit, worst
     first."""
     # As in src/partition/cells.rs: at most one cell per horizon in each direction.
     cells = min(points / given["layers"] ** 3, max(1e5, 2000 * ranks), max(4e6, 64 * ranks))
@@ -101,7 +101,7 @@ def limits(given, ranks, points):
 
 
 def report(given):
-    """The model as lines of text."""
+    """Format the model as lines of text."""
     lines = ["model of many ranks, with"]
     for name, (_, unit, meaning) in INPUTS.items():
         lines.append(f"  {name:<17}{given[name]:>12.4g} {unit:<4}{meaning}")

@@ -1,4 +1,4 @@
-"""The plots of scripts/scaling as SVG, without a library."""
+"""Plots of scripts/scaling as SVG, without a plotting library."""
 
 import math
 
@@ -53,7 +53,7 @@ class Panel:
             return
         edge = max(self.left, self.x(max(self.least, cores)) + 8)
         width = self.left + WIDTH - edge
-        # Below the lines of the axes.
+        # First in the file, so that the axes are drawn above it.
         self.parts.insert(0, f'<rect x="{edge:.1f}" y="{TOP}" width="{width:.1f}" height="{HEIGHT}" class="beyond"/>')
         self.text(self.left + WIDTH - 4, TOP + HEIGHT - 8, "more than the cores", "small", "end")
 
@@ -70,7 +70,7 @@ class Panel:
 
 
 def measured(left, runs, title, axis, key, ideal, cores):
-    """A panel of measured layouts, one line per number of ranks."""
+    """Draw a panel of measured layouts, one line per number of ranks."""
     counts = [run["cores"] for run in runs]
     least = min(counts)
     highest = max([run[key] for run in runs] + [ideal(max(counts) / least)])
@@ -84,7 +84,7 @@ def measured(left, runs, title, axis, key, ideal, cores):
 
 
 def modelled(left, given, predicted):
-    """The panel of the model."""
+    """Draw the panel of the model."""
     names = {
         "weak": f"{given['points']:.2g} points a rank",
         "strong": f"{given['total']:.2g} points in all",
@@ -99,7 +99,7 @@ def modelled(left, given, predicted):
 
 
 def plot(runs, cores, given, predicted):
-    """All panels as the text of an SVG file."""
+    """Return all panels as the text of an SVG file."""
     panels = []
     strong = [run for run in runs if run["kind"] == "strong"]
     weak = [run for run in runs if run["kind"] == "weak"]

@@ -1,9 +1,9 @@
 """Runs a deck for many values of its parameters: a table, or a Morris design.
 
-Each row of the design is a run of its own, in parallel here or as a Slurm array. What was interrupted is
-continued by the same command: complete rows are left as they are, others go on from their checkpoints.
-The numbers that the study asks for are taken from the histories into a table; of a Morris design μ* and σ
-of each parameter are found and drawn; and the paths of the cracks of all runs are laid over one another.
+Each row of the design is a separate run; the runs are executed in parallel on this machine or as a Slurm
+array. The same command continues an interrupted study: complete rows are kept, other rows restart from their
+checkpoints. The requested numbers are collected from the histories into a table. For a Morris design, μ* and σ
+of each parameter are computed and drawn. The crack paths of all runs are drawn in one picture.
 """
 
 import argparse
@@ -27,7 +27,7 @@ import matplotlib
 import numpy
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
 
 EXAMPLES = """\
 examples:
@@ -121,7 +121,7 @@ class Study:
         self.names, self.rows = self.design()
 
     def wrong(self, key, message):
-        """The error at a key, with the line of its last word."""
+        """Return an error at a key, with the line of its last word."""
         word = re.escape(key.rsplit(".", 1)[-1])
         pattern = re.compile(rf"^\s*(\[[^\]]*\b{word}\]|[^#]*\b{word}\s*=)")
         lines = (number for number, line in enumerate(self.text.splitlines(), 1) if pattern.search(line))
@@ -209,7 +209,7 @@ class Study:
             raise self.wrong("paths.cell", "must be above 0")
 
     def design(self):
-        """The names of the varied parameters, and their values by row, as texts."""
+        """Return the names of the varied parameters, and their values by row, as texts."""
         design = self.values.get("design", {})
         self.check_keys("design", design)
         ranges = self.tables("parameter")
@@ -336,7 +336,7 @@ def chosen_rows(text, count):
 
 
 def prepare(study, options):
-    """Create the output folder; fail if it has another study."""
+    """Create the output folder; fail if it contains another study."""
     table = options.output / "table.txt"
     # Common values are part of the design.
     shared = "".join(f"# {name} = {value}\n" for name, value in study.fixed.items())
@@ -369,7 +369,7 @@ class Runner:
             child.send_signal(signal.SIGTERM)
 
     def run(self, row):
-        """The exit code of a row's run."""
+        """Run a row and return its exit code."""
         folder = self.options.output / f"row_{row}"
         folder.mkdir(exist_ok=True)
         values = dict(zip(self.study.names, self.study.rows[row - 1]))
@@ -385,7 +385,7 @@ class Runner:
             with self.lock:
                 if self.stopped:
                     return STOPPED
-                # In its own process group, so Ctrl-C reaches it once, from here.
+                # In its own process group, so that only this script forwards Ctrl-C to the run.
                 child = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
                 self.children.add(child)
             if self.stopped:
@@ -424,7 +424,7 @@ class Runner:
 
 
 def submit(study, options, rows):
-    """Submits the rows as a Slurm array."""
+    """Submit the rows as a Slurm array."""
     for row in rows:
         folder = options.output / f"row_{row}"
         if folder.exists() and not any(folder.glob("checkpoint_[01].h5")):
@@ -438,7 +438,7 @@ def submit(study, options, rows):
 
 
 def history(folder):
-    """The columns of a run's history by name; None without a history."""
+    """Return the columns of a run's history by name; None without a history."""
     try:
         table = fissure.read_history(folder)
     except (OSError, ValueError):
@@ -448,7 +448,7 @@ def history(folder):
 
 
 def value_of(study, name, output, columns):
-    """The value of an output from a run's history; NaN beyond its end."""
+    """Return the value of an output from a run's history; NaN if the history ends before."""
 
     def column(wanted):
         if wanted not in columns:
@@ -498,7 +498,7 @@ def collect(study, options):
 
 
 def sensitivities(study, results):
-    """By output: mean, μ*, its 95 % confidence and σ of each parameter; from complete trajectories only."""
+    """Return mean, μ*, its 95 % confidence and σ of each parameter by output; only complete trajectories are used."""
     from SALib.analyze import morris as analysis
 
     problem, levels = study.morris
@@ -550,7 +550,7 @@ def write_sensitivities(study, options, found):
 
 
 def branches(path):
-    """The branches of a path's table as arrays of positions (m)."""
+    """Read the branches of a table of crack paths as arrays of positions (m)."""
     with open(path) as file:
         rows = list(csv.reader(file))[1:]
     numbers = sorted({int(row[0]) for row in rows})
@@ -558,7 +558,7 @@ def branches(path):
 
 
 def covered(lines, centres, reach):
-    """The cells whose centre is within reach (m) of a line."""
+    """Return the cells whose centre is within `reach` (m) of a line."""
     near = numpy.zeros(centres.shape[:2], dtype=bool)
     for line in lines:
         for start, end in zip(line[:-1], line[1:]):
@@ -571,7 +571,7 @@ def covered(lines, centres, reach):
 
 
 def heat_map(study, options):
-    """Number of runs whose crack crosses each cell."""
+    """Return for each cell the number of runs whose crack crosses it."""
     rule = study.paths
     cell = rule["cell"]
     xs, ys = (numpy.arange(low + cell / 2, high, cell) for low, high in zip(rule["lower"], rule["upper"]))

@@ -1,15 +1,15 @@
-"""Compares results with values that Peridigm, PeriLab and LAMMPS print.
+"""Compares results with values printed by Peridigm, PeriLab and LAMMPS.
 
 tests/decks/verification/values.toml lists the problems: the deck, the source of the values, the tolerance of each field
 and its reason, and the values, each with field, component, time and place. Each deck runs once, on one thread.
-A value is multiplied by the `factor` of its field, or of its field and component, where the other code defines the
-quantity otherwise; the reason says why.
-A field's error is the largest difference from the values, over the largest of these values.
-In a problem with `departs`, the other code computes fields by another formula: their error must lie between the two shares
-that are given. `formulas` names two functions of this script: the first must give the values of the other code, the second
-those of the run.
+If the other code defines a quantity differently, its value is multiplied by the `factor` of the field, or of the field and
+component; the reason explains the factor.
+The error of a field is the largest difference from the values, divided by the largest of these values.
+In a problem with `departs`, the other code computes fields by another formula. The error of these fields must be between the
+two given fractions. `formulas` names two functions of this script: the first must give the values of the other code, the
+second those of the run.
 
-The binary is that of the environment variable FISSURE, or `fissure` on the path.
+The binary is $FISSURE, or `fissure` on the path.
 """
 
 import argparse
@@ -38,10 +38,10 @@ class Failure(Exception):
 
 
 def eight_points(deck, theta_of):
-    """Displacement, velocity and force density of the eight points of a viscoelastic deck, by step.
+    """Compute displacement, velocity and force density of the eight points of a viscoelastic deck, by step.
 
-    The law is the viscoelastic solid in the form of LAMMPS. `theta_of` gives the dilatations that the deviatoric
-    extension of a bond has at its two ends, from those of points i and j.
+    The law is the viscoelastic solid in the form of LAMMPS. `theta_of` returns the dilatations for the deviatoric
+    extension at both ends of a bond, from the dilatations of points i and j.
     """
     h, delta = deck["grid"]["spacing"], deck["grid"]["horizon"]
     [law] = deck["material"]["solid"].values()
@@ -58,7 +58,7 @@ def eight_points(deck, theta_of):
     weighted = (omega * length**2 * volume).sum(axis=1)
     decay = math.exp(-step / tau)
     beta = 1 - tau / step * (1 - decay)
-    # By bond and end: the deviatoric extension before, and the part of it that has relaxed.
+    # For each bond and end: the previous deviatoric extension, and its relaxed part.
     before, relaxed = numpy.zeros((2, 8, 8)), numpy.zeros((2, 8, 8))
 
     def force(u):
@@ -93,7 +93,7 @@ def eight_points(deck, theta_of):
 
 
 def at_eight_points(deck, values, theta_of):
-    """Results of the eight points at the places and times of values."""
+    """Return results of the eight points at the positions and times of values."""
     reference, states = eight_points(deck, theta_of)
     fields = ["displacement", "velocity", "force_density"]
     computed = []
@@ -105,17 +105,17 @@ def at_eight_points(deck, values, theta_of):
 
 
 def lammps_ves(deck, values):
-    """LAMMPS's peri/ves: the force on point i has the dilatation of i at both ends of the bond."""
+    """LAMMPS's peri/ves: the force on point i uses the dilatation of i at both ends of the bond."""
     return at_eight_points(deck, values, lambda own, other: (own, own))
 
 
 def viscoelastic(deck, values):
-    """Mitchell's viscoelastic solid: each end of a bond has the dilatation of its own family."""
+    """Mitchell's viscoelastic solid: each end of a bond uses the dilatation of its own family."""
     return at_eight_points(deck, values, lambda own, other: (own, other))
 
 
 def peridigm_hypoelastic(deck, values):
-    """Peridigm's correspondence law in a bar stretched by a thousandth: E Σ ΔF/F, with F at the end of each step."""
+    """Peridigm's correspondence law in a bar stretched by 0.001: E Σ ΔF/F, with F at the end of each step."""
     [law] = deck["material"]["bar"].values()
     step = 1e-3 * deck["time"]["step"] / deck["time"]["end"]
     counts = [round(value[2] / deck["time"]["step"]) for value in values]
@@ -130,9 +130,9 @@ def saint_venant(deck, values):
 
 
 def thermal_pair(deck, values, mechanical_force):
-    """Displacement of a point that one bond of length 1 holds, whose temperature is lowered and raised.
+    """Compute the displacement of a point with one bond of length 1, whose temperature is lowered and raised.
 
-    `mechanical_force` gives the force over its stiffness, from displacement and free thermal expansion.
+    `mechanical_force` returns the force divided by the stiffness, from displacement and free thermal expansion.
     """
     [law] = deck["material"]["steel"].values()
     stiffness, step = 18 * law["bulk_modulus"] / law["density"], deck["time"]["step"]
@@ -144,7 +144,7 @@ def thermal_pair(deck, values, mechanical_force):
         a = -stiffness * mechanical_force(u, -law["thermal_expansion"] * cooling)
         v += step / 2 * a
         displacements.append(u)
-    # The other points are held.
+    # The other points are fixed.
     return [
         displacements[round(at_time / step)] if x > 1 and y > 1 else 0.0
         for _, _, at_time, x, y, _, _ in values
@@ -157,11 +157,11 @@ def additive_expansion(deck, values):
 
 
 def multiplied_expansion(deck, values):
-    """Fissure: the extension |Y|/(1 + αΔT) − |ξ|, and its slope in the force."""
+    """Fissure: the extension |Y|/(1 + αΔT) − |ξ|, with the force as its energy's derivative."""
     return thermal_pair(deck, values, lambda u, expansion: (u - expansion) / (1 + expansion) ** 2)
 
 
-# By name: the results at the places and times of values.
+# Functions by name that return results at the positions and times of values.
 FORMULAS = {
     "lammps_ves": lammps_ves,
     "viscoelastic": viscoelastic,
@@ -173,7 +173,7 @@ FORMULAS = {
 
 
 def column(result, field, component):
-    """Values of a component of a field: [output, point]."""
+    """Return the values of a component of a field: [output, point]."""
     values = numpy.asarray(result[field])
     if component == "":
         return values
@@ -183,13 +183,13 @@ def column(result, field, component):
 
 
 def factor_of(problem, field, component):
-    """Factor that makes the quantity of the other code that of the field."""
+    """Return the factor that converts the quantity of the other code to the field."""
     factors = problem.get("factor", {})
     return factors.get(f"{field}.{component}", factors.get(field, 1.0))
 
 
 def compare(problem, result):
-    """Error and largest value of each field, and the own value at the place of each value of a problem."""
+    """Return error and largest value of each field, and Fissure's result at the position of each value of a problem."""
     points = result.points
     pairs, all_ours, spacing = {}, [], None
     for field, component, at_time, x, y, z, value in problem["values"]:
@@ -214,7 +214,7 @@ def compare(problem, result):
 
 
 def formula_error(problem, name, deck, values):
-    """Error of values at the places of a problem against a formula of this script, over the fields that depart."""
+    """Return the error of values against a formula of this script, over the fields in `departs`."""
     rows = [(row, value) for row, value in zip(problem["values"], values) if row[0] in problem["departs"]]
     computed = FORMULAS[name](deck, [row for row, _ in rows])
     worst, largest = {}, {}

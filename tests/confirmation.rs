@@ -1,5 +1,5 @@
-//! When ranks wait for the disc to confirm a result: not at outputs that have room, but where the file grows and
-//! where that is asked for. A program of its own, in which a function of MPI is another one.
+//! Calls of fsync on a result: none at outputs with preallocated space, only if the file grows or on request.
+//! A separate test program, because it replaces a function of MPI.
 
 use std::os::raw::c_int;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ mod command;
 
 static ASKED: AtomicUsize = AtomicUsize::new(0);
 
-/// In the place of the MPI library's, which HDF5's call ends in.
+/// Replacement of the function of the MPI library that HDF5 calls to flush a file.
 #[unsafe(no_mangle)]
 extern "C" fn PMPI_File_sync(_: mpi_sys::MPI_File) -> c_int {
     ASKED.fetch_add(1, Ordering::Relaxed);
@@ -38,7 +38,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
     world.broadcast(0, &mut path);
     let path = PathBuf::from(String::from_utf8(path).unwrap());
 
-    // Times that the disc was asked in the meantime.
+    // Return the number of calls since the last query.
     let asked = || ASKED.swap(0, Ordering::Relaxed);
     let rank = world.rank() as u64;
     let moving = [FieldDescription {
@@ -57,7 +57,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
         moving: &moving,
         metadata: &[],
         single: false,
-        // As many as fill one chunk.
+        // The number of steps that fills one chunk.
         steps: 512,
     };
     let mut file = ResultFile::create(&path, &world, Creation::Exclusive, &contents).unwrap();
@@ -69,7 +69,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
             step += 1;
         }
     };
-    // The tables of steps get their first rows.
+    // The first output also writes the first rows of the tables of steps.
     write(&mut file, 1);
     asked();
     write(&mut file, 2);
@@ -78,7 +78,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
     assert_eq!(asked(), 1);
     write(&mut file, 509);
     assert_eq!(asked(), 0);
-    // More than were expected: the file grows.
+    // One output more than expected: the file grows.
     write(&mut file, 1);
     assert!(asked() > 0);
     file.close(true).unwrap();

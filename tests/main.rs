@@ -1,5 +1,5 @@
-//! All tests but those of single files, as one program: what they call is generic, and would be
-//! compiled for each. `tests/README.md` says what each folder holds.
+//! Nearly all tests in one program, because the generic code that they call would be compiled for each
+//! program. `tests/README.md` describes the folders.
 
 mod support;
 

@@ -1,6 +1,6 @@
-"""Tests of the package, with the program that $FISSURE names.
+"""Tests of the package with the program $FISSURE.
 
-Tables are tested with pandas, where it is installed, and without.
+Tables are tested with pandas, if installed, and without pandas.
 """
 
 import contextlib

@@ -1,11 +1,11 @@
-//! Assignments of the command line to keys of a deck, as `time.safety=0.4`.
+//! Assignments from the command line to keys of a deck, such as `time.safety=0.4`.
 
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
 use super::source::Source;
 use crate::error::{Error, Result, excerpt};
 
-/// Keys of values outside of all sections.
+/// Keys outside of all sections.
 const TOP_KEYS: [&str; 5] = [
     "title",
     "dimension",
@@ -14,8 +14,8 @@ const TOP_KEYS: [&str; 5] = [
     "constraint",
 ];
 
-/// Whether a name is that of a key: a path with dots, or the key of a value outside of all sections, unless the
-/// deck has a parameter of that name.
+/// Return whether a name is a key: a path with dots, or a key outside of all sections. A parameter with the
+/// same name takes precedence over a key outside of all sections.
 pub fn is_key(source: &Source, name: &str) -> bool {
     let is_parameter = || {
         let deck = source.text.parse::<DocumentMut>().ok()?;
@@ -24,12 +24,13 @@ pub fn is_key(source: &Source, name: &str) -> bool {
     name.contains('.') || (TOP_KEYS.contains(&name) && is_parameter().is_none())
 }
 
-/// The text of a deck with the values of these keys, added where they are missing.
+/// Return the text of a deck with these values assigned to keys; missing keys are added.
 ///
-/// A value is written as in a deck; any other text, such as a bare word or an expression, is a string.
+/// A text that is a TOML value keeps its type. Any other text, such as a bare word or an expression, becomes
+/// a string.
 ///
 /// # Errors
-/// If the deck is not TOML, or a key is not one of a table.
+/// If a key has an empty part, passes through a list or a value, or names a section.
 pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
     let mut document: DocumentMut = match source.text.parse() {
         Ok(document) => document,
@@ -69,7 +70,7 @@ pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
             })?;
         }
         match table.get_mut(name) {
-            // The comment beside the value stays.
+            // Keep the comment beside the value.
             Some(Item::Value(old)) => {
                 let decor = old.decor().clone();
                 *old = value;

@@ -16,12 +16,14 @@ use crate::message::format_number;
 use crate::points::Columns;
 use crate::problem;
 
-/// Largest number of bodies; each step searches as many bond lists as the square of this number.
+/// Largest number of bodies. Each step searches one bond list per pair of bodies, so the cost grows with the
+/// square.
 const MOST_BODIES: usize = 256;
 
-/// Validates the bodies.
+/// Validate the bodies.
 ///
-/// # Errors On an unknown material or damage law, a wrong shape, or not exactly one source of points.
+/// # Errors
+/// On an unknown material or damage law, an invalid shape, or a body without exactly one source of points.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -97,10 +99,10 @@ pub fn bodies(
     })
 }
 
-/// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their
-/// points stay aligned. In each direction, the first body that is a whole number of cells long between flat faces
-/// decides. The origin is 0 if cells from 0 fill this body exactly, otherwise its lower face. Without such a body it is
-/// 0.
+/// Set the grid origins of a deck without `origin`. Bodies with the same cells share an origin, so that their
+/// points stay aligned. In each direction, the origin follows from the first body that is a whole number of
+/// cells long between flat faces. The origin is 0 if cells from 0 fill this body exactly, otherwise the lower
+/// face of the body. Without such a body, the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -124,7 +126,7 @@ fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     }
 }
 
-/// The shapes of the bodies with cells of these edges (m).
+/// Return the shapes of the bodies whose lattice cells have these edges, m.
 fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item = &problem::Shape> {
     bodies.iter().filter_map(move |body| match &body.points {
         problem::PointSource::Lattice { shape, spacing, .. } => {
@@ -137,8 +139,9 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
 /// Tolerance for a whole number of cells, as a fraction of a cell's edge.
 const WHOLE: f64 = 1e-6;
 
-/// Where cells with an edge (m) begin that fill a shape exactly along an axis, m: 0 if they may begin there. `None` for a
-/// shape that is not a whole number of cells long between two flat faces.
+/// Return the grid origin along an axis, m, from which cells of this edge (m) fill a shape exactly. The
+/// origin is 0 if cells from 0 fill the shape, otherwise the lower face of the shape. `None` for a shape that
+/// is not a whole number of cells long between two flat faces.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {
@@ -148,7 +151,8 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     is_whole(upper - lower).then_some(if is_whole(lower) { 0.0 } else { lower })
 }
 
-/// Where a shape begins and ends along an axis, m, if it does so with flat faces.
+/// Return the positions of the two flat faces that bound a shape along an axis, m; `None` if a face is not
+/// flat.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
@@ -170,7 +174,8 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// An error if a body requests rows of a point file, or elements of a mesh, that belong to an earlier body.
+/// Return an error if a body requests rows of a point file, or elements of a mesh, that belong to an earlier
+/// body.
 fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
     let rows = |body: &problem::Body| match &body.points {
         problem::PointSource::File {
@@ -211,7 +216,7 @@ fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<
     Ok(bodies)
 }
 
-/// An error if two bodies name different columns of the same point file.
+/// Return an error if two bodies name different columns of the same point file.
 fn columns_agree(scope: &Scope, bodies: &[problem::Body]) -> Result<()> {
     let file = |body: &problem::Body| match &body.points {
         problem::PointSource::File {
@@ -308,7 +313,7 @@ impl From<grammar::Quadrature> for problem::Quadrature {
     }
 }
 
-/// Points of a file or a mesh.
+/// Validate the points of a body from a file or a mesh.
 fn from_file(
     scope: &Scope,
     key: &str,

@@ -9,10 +9,10 @@ use crate::error::Result;
 use crate::expression::{Expression, POSITION, POSITION_AND_TIME};
 use crate::problem::{self, Action};
 
-/// Validates the initial values.
+/// Validate the initial values.
 ///
 /// # Errors
-/// On an unknown set, a wrong expression, or a table that sets nothing.
+/// On an unknown set, an invalid expression, or a table with neither displacement nor velocity.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,
@@ -46,10 +46,10 @@ pub fn initials(
         .collect()
 }
 
-/// Validates the loads and supports.
+/// Validate the loads and supports.
 ///
 /// # Errors
-/// On an unknown set, a wrong expression, or anything but one quantity a table.
+/// On an unknown set, an invalid expression, or a table without exactly one quantity.
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,
@@ -89,10 +89,10 @@ pub fn conditions(
         .collect()
 }
 
-/// An error at the first temperature if no material expands.
+/// Check that a prescribed temperature has an effect.
 ///
 /// # Errors
-/// As said.
+/// At the first prescribed temperature, if no material has a coefficient of thermal expansion.
 pub fn temperatures_act<'m>(
     scope: &Scope,
     conditions: &[problem::Condition],
@@ -114,7 +114,7 @@ pub fn temperatures_act<'m>(
     Err(scope.error(condition.place.clone(), message))
 }
 
-/// Whether what a condition prescribes is spread over a layer with a depth.
+/// Return whether a condition acts on a surface layer with a depth.
 fn on_a_layer(condition: &grammar::Condition) -> bool {
     condition.traction.is_some() || condition.pressure.is_some()
 }

@@ -8,10 +8,10 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, ContactModel, ContactRule};
 
-/// Damping beyond that of this coefficient of restitution makes steps very short.
+/// Smallest coefficient of restitution. The damping of smaller coefficients requires very short time steps.
 const LEAST_RESTITUTION: f64 = 0.01;
 
-/// The keys of a rule, as `[contact]`, its pairs and rigid bodies have them.
+/// Keys of a contact rule, common to `[contact]`, its pairs and rigid bodies.
 #[derive(Clone, Copy)]
 pub(super) struct Keys<'a> {
     pub model: ContactName,
@@ -22,10 +22,11 @@ pub(super) struct Keys<'a> {
     pub restitution: Option<&'a Number>,
 }
 
-/// Validates contact.
+/// Validate contact.
 ///
 /// # Errors
-/// On numbers out of range, on pairs that are given twice, and where the run has a method that knows no contact.
+/// On numbers out of range, on pairs that are given twice, and on methods or grids that do not support
+/// contact.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
@@ -99,7 +100,7 @@ pub fn contact(
     Ok(Some(contact))
 }
 
-/// An error if a run with contact refines its grid, or finds equilibria by Newton's method.
+/// Return an error if a run with contact refines its grid during the run, or uses Newton's method.
 fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     let refinement = deck.refinement.as_ref();
     if let Some(trigger) = refinement.and_then(|table| table.get_ref().trigger.as_ref()) {
@@ -118,13 +119,14 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     Ok(())
 }
 
-/// Whether any stage of a run is a relaxation.
+/// Return whether any stage of the run is a relaxation.
 pub(super) fn relaxes(deck: &Deck) -> bool {
     let mut all = methods(deck).into_iter();
     all.any(|(_, method)| *method.get_ref() == grammar::Method::Relaxation)
 }
 
-/// Validates a rule of a run that may have relaxations; `None` where there is no contact.
+/// Validate a contact rule; `relaxes` is true if any stage of the run is a relaxation. The model `"none"`
+/// gives `None`.
 pub(super) fn rule(
     scope: &Scope,
     section: &str,
@@ -194,7 +196,7 @@ pub(super) fn rule(
     }))
 }
 
-/// The names of the bodies of a pair.
+/// Return the names of the bodies of a pair.
 fn pair(
     scope: &Scope,
     key: &str,

@@ -1,4 +1,4 @@
-//! Damage laws of decks.
+//! Damage laws of a deck, validated.
 
 use super::grammar::{self, Text};
 use super::number::Number;
@@ -9,13 +9,13 @@ use crate::error::Result;
 use crate::problem::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
 use crate::scatter::Weibull;
 
-/// A key that says how much it takes for bonds to break, and what it means.
+/// A measure of toughness: its key, its value in the deck, and the constructor of [`Toughness`].
 type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
 
-/// Validates a damage law.
+/// Validate a damage law.
 ///
 /// # Errors
-/// On a wrong number, an unknown set, or anything but one measure of toughness.
+/// On an invalid number, an unknown set, or a table without exactly one measure of toughness.
 pub fn damage(
     scope: &Scope,
     sets: &[problem::Set],
@@ -88,7 +88,7 @@ pub fn damage(
     }
 }
 
-/// What a crack takes by its area or at its tip.
+/// Return the measures of toughness of a crack: fracture energy and fracture toughness.
 fn of_crack<'a>(energy: &'a Option<Number>, toughness: &'a Option<Number>) -> [Measure<'a>; 2] {
     [
         ("fracture_energy", energy, Toughness::FractureEnergy),
@@ -100,7 +100,7 @@ fn of_crack<'a>(energy: &'a Option<Number>, toughness: &'a Option<Number>) -> [M
     ]
 }
 
-/// The one measure that is given.
+/// Return the toughness, from the only measure that the table gives.
 fn measure<T>(
     scope: &Scope,
     table: &Spanned<T>,

@@ -17,21 +17,22 @@ const FREE_KEYS: [&str; 1] = ["time.end"];
 /// Keys of the history that set the interval of rows.
 const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
 
-/// The differences in the physics of two decks with all defaults filled in: one line per key, with its old and new
-/// value.
+/// Return the differences in the physics of two decks with all defaults filled in: one line per key, with its
+/// old and new value.
 ///
 /// # Errors
-/// When a deck cannot be parsed.
+/// If a deck cannot be parsed.
 pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
     compared(old, new, |comparison, old, new| {
         comparison.compare("", Some(old), Some(new))
     })
 }
 
-/// The differences in the meaning of the history's columns, as in [`differences`]. The interval of rows is ignored.
+/// Return the differences in the definitions of the history columns, as in [`differences`]. The interval of
+/// rows is ignored.
 ///
 /// # Errors
-/// When a deck cannot be parsed.
+/// If a deck cannot be parsed.
 pub fn history_differences(old: &Source, new: &Source) -> Result<Vec<String>> {
     compared(old, new, |comparison, old, new| {
         let keys = |deck: &Value| {
@@ -67,8 +68,9 @@ fn compared(
         lines: Vec::new(),
     };
     let (mut old, mut new) = (table(&old.text)?, table(&new.text)?);
-    // A checkpoint of an earlier version lacks keys that were added since; they have their defaults. A deck that this version
-    // cannot fill in, because a file is gone, is compared as it is.
+    // A deck from a checkpoint of an earlier version lacks keys that were added later. These keys get their
+    // defaults. If defaults cannot be filled in, for example because a file is missing, the deck is compared
+    // without them.
     if let Ok(explained) = decks.0.explain() {
         complete(&mut old, &table(&explained)?, &new);
     }
@@ -79,7 +81,8 @@ fn compared(
     Ok(comparison.lines)
 }
 
-/// Add the keys of another deck that a deck leaves out, with the values that it has with all defaults.
+/// Add to `deck` the missing keys that `other` has. The values come from `explained`, which is `deck` with
+/// all defaults.
 fn complete(deck: &mut Value, explained: &Value, other: &Value) {
     let is_empty = |value: &Value| value.as_table().is_some_and(Table::is_empty);
     match (deck, explained, other) {
@@ -87,7 +90,8 @@ fn complete(deck: &mut Value, explained: &Value, other: &Value) {
             for (key, other) in other {
                 match (deck.get_mut(key), explained.get(key)) {
                     (Some(own), Some(explained)) => complete(own, explained, other),
-                    // No tables are as good as none of them.
+                    // A missing table and an empty table are equivalent, so an empty table is only added
+                    // beside an empty table.
                     (None, Some(explained)) if !is_empty(explained) || is_empty(other) => {
                         deck.insert(key.clone(), explained.clone());
                     }
@@ -144,7 +148,7 @@ impl Comparison<'_> {
             (old, new) => {
                 let values = [self.expression(0, old), self.expression(1, new)];
                 let same = match &values {
-                    // A later end may need more rows of a table.
+                    // A run with a later end may need more rows of a table than the old run.
                     [Some(old), Some(new)] => new.extends(old),
                     _ => old == new,
                 };
@@ -157,7 +161,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// A value as an expression of position and time, with its deck's parameters put in.
+    /// Return a value as an expression of position and time, with the parameters of its deck inserted.
     fn expression(&self, deck: usize, value: Option<&Value>) -> Option<Expression> {
         let written = match value? {
             Value::Integer(value) => Written::Value(*value as f64),
@@ -172,13 +176,13 @@ impl Comparison<'_> {
     }
 }
 
-/// Whether the section of a key is compared where it is used.
+/// Return whether the section of a key is compared where it is used.
 fn counts_where_used(key: &str) -> bool {
     let section = key.split('.').next().and_then(Section::find);
     section.is_some_and(|section| section.restart == Restart::WhereUsed)
 }
 
-/// A value for messages: as written, and its evaluated number.
+/// Format a value for messages: the text of the deck, and the number of a constant expression.
 fn shown(value: Option<&Value>, expression: Option<&Expression>) -> String {
     let Some(value) = value else {
         return "not there".to_owned();

@@ -12,14 +12,14 @@ use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
 use crate::problem::{self, CheckpointRule, HorizonRule, Interval, Problem};
 
-/// The deck as TOML with every default written out.
+/// Return the deck as TOML with every default written out.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If the deck cannot be serialized.
 pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> {
     let mut deck = deck.clone();
     fill(&mut deck, problem);
-    // A file may change before a restart.
+    // Write out the rows of tables, because the file of a table may change before a restart.
     for (name, table) in &mut deck.table {
         let [times, values] = scope.tables[name].rows();
         *table.get_mut() = Table::of_rows(times, values);
@@ -100,7 +100,8 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         }
     }
     let time = deck.time.get_mut();
-    // Newton's method takes load steps and tolerance from the relaxation if it has none.
+    // Newton's method uses the load steps and tolerance of the relaxation if `[time.static]` does not give
+    // them.
     if problem.is_quasi_static() {
         let default = || Spanned::new(0..0, Relaxation::default());
         time.relaxation.get_or_insert_with(default);
@@ -143,7 +144,7 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     }
 }
 
-/// Puts the keys of a law in the order of the grammar, with those that are not given.
+/// Put the keys of a law in the order of the grammar, and add missing keys with their defaults.
 fn fill_material(material: &mut Material, dimension: Dimension) {
     let Some(law) = declarations().find(|law| law.name == material.law.get_ref()) else {
         return;
@@ -176,7 +177,7 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// The grid's spacing, if it is the same in all directions.
+/// Return the grid's spacing if it is the same in all directions.
 fn edge(grid: &Grid) -> Option<Number> {
     let spacing = grid.spacing.as_ref()?;
     match spacing.get_ref() {

@@ -1,4 +1,4 @@
-//! Names of groups of a mesh as written: a name, or a whole number.
+//! Group of a mesh as written in the deck: a name or a whole number.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::mesh::GroupKey;
 
-/// A name or number of a group.
+/// Name or number of a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupName(pub GroupKey);
 

@@ -10,10 +10,10 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, Field, Interval};
 
-/// Validates what is written to the history; `horizon` (m) is that of the grid.
+/// Validate the content and interval of the history; `horizon` is the horizon of the grid, m.
 ///
 /// # Errors
-/// On an unknown set or field, a wrong place or number.
+/// On an unknown set or field, or an invalid position or number.
 pub fn history(
     scope: &Scope,
     deck: &Deck,
@@ -80,7 +80,7 @@ pub fn history(
     })
 }
 
-/// When rows are written, if the deck says so.
+/// Return the interval of rows; `None` if the deck gives none.
 fn rows(scope: &Scope, history: &grammar::History) -> Result<Option<Interval>> {
     let seconds = |every: &Number| scope.positive(every, "[history] every");
     let steps = history
@@ -98,7 +98,7 @@ fn rows(scope: &Scope, history: &grammar::History) -> Result<Option<Interval>> {
     })
 }
 
-/// The key of a table, if its name can be part of the names of columns.
+/// Return the header of a table of the history. A name that cannot be part of a column name is an error.
 fn column_name<T>(scope: &Scope, kind: &str, name: &str, table: &Spanned<T>) -> Result<String> {
     let key = format!("[history.{kind}.{name}]");
     suits_a_column(scope, &key, name, table)?;
@@ -146,7 +146,8 @@ fn front(
     })
 }
 
-/// A field whose values are properties of the solid: neither its ranks nor its fragments.
+/// Find an output field by name. Ranks and fragments are excluded, because they are labels and not physical
+/// quantities.
 fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
     let fields = Field::ALL.into_iter();
     let fields = fields.filter(|field| !matches!(field, Field::Rank | Field::Fragment));
@@ -155,7 +156,8 @@ fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
     Ok(fields[find(scope.source, name, names, key)?])
 }
 
-/// The component or invariant that a table requests; by default the scalar or the magnitude of a vector.
+/// Return the component or invariant that a table requests. The default is the scalar, or the magnitude of a
+/// vector.
 fn component(
     scope: &Scope,
     key: &str,
@@ -256,7 +258,7 @@ fn statistics(
     })
 }
 
-/// The statistics, for messages.
+/// Names of the statistics, for messages.
 const STATISTICS: &str = "sum, integral, mean, minimum, maximum";
 
 fn of(statistic: grammar::Statistic) -> problem::Statistic {

@@ -20,8 +20,9 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
-/// # Errors On bodies whose laws cannot share a bond, a rule or damage that the laws of a pair do not allow, an invalid
-/// pair, and a pair that is given twice.
+/// # Errors
+/// On bodies whose laws cannot share a bond, and on an invalid or repeated pair. Also on a rule or damage law
+/// that the material laws of a pair do not allow.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -91,7 +92,7 @@ pub fn interface(
     Ok(interface)
 }
 
-/// Damage of the bonds of a pair.
+/// Context for the validation of the damage of a pair's bonds.
 struct Damages<'a> {
     scope: &'a Scope<'a>,
     key: &'a str,
@@ -101,7 +102,7 @@ struct Damages<'a> {
 }
 
 impl Damages<'_> {
-    /// When the bonds break, and the span of this setting.
+    /// Return the damage of the bonds, and the byte range of this setting.
     fn damage(
         &self,
         table: &grammar::Pair,
@@ -145,7 +146,7 @@ impl Damages<'_> {
         Ok((InterfaceDamage::Own(damages[index].clone()), span))
     }
 
-    /// The critical stretch that belongs to a strength.
+    /// Return the damage law whose critical stretch follows from a strength.
     fn of_strength(&self, strength: &Number) -> Result<problem::Damage> {
         let key = format!("{} strength", self.key);
         let stress = self.scope.positive(strength, &key)?;
@@ -203,7 +204,7 @@ fn rule(rule: &Spanned<Rule>) -> problem::InterfaceRule {
     }
 }
 
-/// The indices of two different bodies, the lower one first.
+/// Return the indices of two different bodies, the lower index first.
 fn pair(
     scope: &Scope,
     key: &str,
@@ -229,7 +230,7 @@ fn pair(
     Ok([a.min(b), a.max(b)])
 }
 
-/// An error if the laws of two bodies exert forces in different directions on their bonds.
+/// Return an error if the laws of two bodies exert forces of different directions on a bond.
 fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     let law = |body: &problem::Body| body.material.law.declaration;
     let linear = pair.into_iter().find(|body| law(body).linear);
@@ -247,7 +248,8 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     Err(scope.error(other.span.clone(), message))
 }
 
-/// An error if a rule needs one micromodulus for both ends and the laws of two bodies cannot have it.
+/// Return an error if a rule needs one micromodulus for both ends of a bond, and the two laws have different
+/// micromoduli.
 fn one_micromodulus(
     scope: &Scope,
     key: &str,

@@ -15,7 +15,7 @@ use crate::problem::{PointSource, Problem, Selector, changes_density_scale};
 /// Return a warning for each probable mistake; `scope` is the scope of the validated deck.
 ///
 /// # Errors
-/// When the deck cannot be written out to look for names.
+/// If the deck cannot be serialized for the search of unused parameters.
 pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warning>> {
     let mut warnings = unused_parameters(deck)?;
     warnings.extend(unused(scope, deck));
@@ -48,7 +48,7 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
     Ok(warnings)
 }
 
-/// A warning for each point file with columns that are not read.
+/// Return a warning for each point file with columns that are not read.
 fn ignored_columns(problem: &Problem) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for (index, body) in problem.bodies.iter().enumerate() {
@@ -58,7 +58,7 @@ fn ignored_columns(problem: &Problem) -> Vec<Warning> {
         if file::users(problem, path)[0].0 != index {
             continue;
         }
-        // A file that cannot be read is reported where its points are.
+        // The error of an unreadable file is reported when its points are read.
         let Ok(Ok(layout)) = file::layout_of(problem, path) else {
             continue;
         };
@@ -75,7 +75,7 @@ fn ignored_columns(problem: &Problem) -> Vec<Warning> {
     warnings
 }
 
-/// A warning for each table that only has an effect by reference and that no other part of the deck refers to.
+/// Return a warning for each unreferenced table of a section whose tables have an effect only by reference.
 fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let used = scope.used.borrow();
     let mut tables = deck.named_tables();
@@ -95,7 +95,7 @@ fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
 fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
     let mut used = IndexSet::new();
     let mut rest = deck.clone();
-    // The title is no expression.
+    // The title is not an expression.
     rest.title.get_mut().clear();
     let written = Value::try_from(&rest)
         .map_err(|error| Error::run(format!("cannot write the deck: {error}")))?;
@@ -111,7 +111,7 @@ fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
     Ok(unused.map(warning).collect())
 }
 
-/// The names in all texts of a value, as if they were expressions.
+/// Collect the names in all strings of a value, each parsed as an expression.
 fn names_in(value: &Value, names: &mut IndexSet<String>) {
     match value {
         Value::String(text) => names.extend(Expression::names(text).unwrap_or_default()),

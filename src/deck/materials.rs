@@ -18,9 +18,10 @@ use crate::message::suggestion;
 use crate::problem;
 use crate::problem::law;
 
-/// Validates a material.
+/// Validate a material.
 ///
-/// # Errors On an unknown law or key; on wrong, missing or surplus constants; and on constants of a solid that the law
+/// # Errors
+/// On an unknown law or key; on wrong, missing or surplus constants; and on constants of a solid that the law
 /// cannot model.
 pub fn material(
     scope: &Scope,
@@ -58,10 +59,10 @@ pub fn material(
     })
 }
 
-/// The table of a law.
+/// The table of a law, with the context of its validation.
 struct Section<'a> {
     scope: &'a Scope<'a>,
-    /// Its header, for errors.
+    /// Header of the section, for error messages.
     key: String,
     declaration: &'static Declaration,
     table: &'a LawTable,
@@ -69,12 +70,12 @@ struct Section<'a> {
 }
 
 impl Section<'_> {
-    /// One of its keys, for errors.
+    /// Return the section header and a key, for error messages.
     fn key_of(&self, name: &str) -> String {
         format!("{} {name}", self.key)
     }
 
-    /// An error at the value of a key, or else at the whole table.
+    /// Return an error that points at the value of a key; without a key or value, at the whole table.
     fn error(&self, name: Option<&str>, message: impl AsRef<str>) -> crate::error::Error {
         let number = name.and_then(|name| self.table.get(name));
         let place = number.map_or(self.place.clone(), Spanned::span);
@@ -121,7 +122,7 @@ impl Section<'_> {
         })
     }
 
-    /// The law with the values of its own keys.
+    /// Return the law with the values of its declared keys.
     fn law(&self, dimension: Dimension) -> Result<problem::Law> {
         let mut law = problem::Law::of(self.declaration);
         for key in self.declaration.keys {
@@ -152,8 +153,8 @@ impl Section<'_> {
         Ok(value)
     }
 
-    /// The elastic constants. A bond-based law fixes Poisson's ratio, except for a bar under uniaxial stress. A law may
-    /// have its own keys instead of elastic constants.
+    /// Return the elastic constants. A bond-based law fixes Poisson's ratio, except for a bar under uniaxial
+    /// stress. A law may declare its own keys instead of elastic constants.
     fn elastic(&self, law: &problem::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
         if let Some(own) = own {
@@ -205,7 +206,7 @@ impl Section<'_> {
         if !bond_based || dimension.allows_any_poisson_ratio() {
             return Ok(found);
         }
-        // A ratio given as 0.33 or 0.333 means 1/3.
+        // The tolerance accepts 0.33 and 0.333 for 1/3.
         if (found.poisson_ratio - own).abs() > 0.005 {
             let others =
                 declarations().filter(|law| law.any_poisson_ratio && law.is_for(dimension));
@@ -230,7 +231,7 @@ impl Section<'_> {
         })
     }
 
-    /// The elastic constants that are given, in the order of the deck.
+    /// Return the given elastic constants in the order of the deck.
     fn elastic_constants(&self) -> Vec<(&'static str, Constant)> {
         let mut given: Vec<_> = ELASTIC_CONSTANTS
             .into_iter()

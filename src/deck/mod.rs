@@ -54,17 +54,17 @@ pub struct Deck {
 /// Read a deck. `set` replaces parameters by name (with values or expressions) and keys by section and name.
 ///
 /// # Errors
-/// An input error that names file, line, column and key and says what would be right.
+/// An input error with file, line, column, key and the allowed values.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
     read_with(path, &[], set)
 }
 
-/// As [`read`], with the keys of the decks `overlays` over those of the deck, later ones over earlier ones, and `set`
-/// over them all. Tables are merged key by key; lists and choices, such as the law of a material, are replaced. Paths
-/// in an overlay start from the folder of the deck.
+/// Read a deck as [`read`] does, and merge the decks `overlays` into it. Later overlays override earlier
+/// overlays; `set` overrides all decks. Tables are merged key by key. Lists and choices, such as the law of a
+/// material, are replaced. Paths in an overlay are relative to the folder of the deck.
 ///
 /// # Errors
-/// As [`read`]; places are those in the deck or the overlay.
+/// As [`read`]; the location is in the deck or in an overlay.
 pub fn read_with(path: &Path, overlays: &[PathBuf], set: &[(String, String)]) -> Result<Deck> {
     let mut files = vec![Source::read(path)?];
     for overlay in overlays {
@@ -98,22 +98,23 @@ impl Deck {
         Ok(Self { source, grammar })
     }
 
-    /// File name and text.
+    /// Return the path and the text of the deck.
     pub fn source(&self) -> &Source {
         &self.source
     }
 
-    /// The error of a problem made from this deck, with file, line, column and the line itself if it has a span.
+    /// Add file, line, column and an excerpt to an error about a problem of this deck, if the error has a
+    /// span.
     pub fn locate(&self, error: Error) -> Error {
         self.source.locate(error)
     }
 
-    /// The warning of a problem made from this deck, with file and line if it has a span.
+    /// Add file and line to a warning about a problem of this deck, if the warning has a span.
     pub fn locate_warning(&self, warning: Warning) -> Warning {
         self.source.locate_warning(warning)
     }
 
-    /// The validated deck.
+    /// Validate the deck.
     ///
     /// # Errors
     /// As [`read`].
@@ -127,7 +128,8 @@ impl Deck {
         Ok(problem)
     }
 
-    /// The deck as TOML with every default written out, and the rows of tables in place of their files.
+    /// Return the deck as TOML with every default written out. Rows of tables replace the paths of their
+    /// files.
     ///
     /// # Errors
     /// As [`read`].
@@ -137,7 +139,7 @@ impl Deck {
     }
 }
 
-/// Validates a deck's text.
+/// Validate the text of a deck.
 ///
 /// # Errors
 /// As [`read`].
@@ -145,7 +147,7 @@ pub fn parse(source: &Source) -> Result<Problem> {
     Deck::new(source.clone())?.problem()
 }
 
-/// A deck's text with every default written out.
+/// Return the text of a deck with every default written out.
 ///
 /// # Errors
 /// As [`read`].

@@ -1,17 +1,17 @@
-//! The names that a deck gives to its tables: they become those of columns, and stand in messages.
+//! Check of the names of tables, which appear in column names and messages.
 
 use super::grammar::{Deck, NamedTable};
 use super::resolve::Scope;
 use crate::deck::spanned::Spanned;
 use crate::error::{Result, excerpt};
 
-/// The most characters of a name.
+/// Largest number of characters of a name.
 const LONGEST: usize = 64;
 
-/// Looks at all names, and at the title.
+/// Check the title and the names of all tables.
 ///
 /// # Errors
-/// On the first one that cannot be printed on a line or written to a table.
+/// On the first name that cannot be printed on one line or written to a CSV table.
 pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
     if deck.title.get_ref().contains(char::is_control) {
         let message = "title: must be one line of text, without control characters";
@@ -36,10 +36,10 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
     Ok(())
 }
 
-/// An error if a name cannot be part of the name of a column; `key` and `place` say where it stands.
+/// Check that a name can be part of a column name; `key` and `place` locate the name for the error.
 ///
 /// # Errors
-/// On a name with a character that separates parts of such names, or columns.
+/// On a name with `/`, `.` or `,`, which separate columns and the parts of their names.
 pub fn suits_a_column<T>(scope: &Scope, key: &str, name: &str, place: &Spanned<T>) -> Result<()> {
     if name.contains(['/', '.', ',']) {
         let message = format!(

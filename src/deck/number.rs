@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::deck::spanned::Spanned;
 
-/// What was written for a number.
+/// A number as written in the deck.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Written {
     /// A plain number; TOML integers are accepted.
@@ -18,22 +18,22 @@ pub enum Written {
     Text(String),
 }
 
-/// A number with its place in the deck.
+/// A number with its byte range in the deck.
 pub type Number = Spanned<Written>;
 
-/// A vector of numbers with its place in the deck, one entry a dimension.
+/// A vector of numbers with its byte range in the deck; one entry per dimension.
 pub type Vector = Spanned<Vec<Number>>;
 
-/// The edges of a lattice cell as written: one number, or a list with one a dimension.
+/// Edges of a lattice cell as written in the deck: one number, or a list with one number per dimension.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edges {
-    /// All alike.
+    /// The same edge in all directions.
     Same(Written),
-    /// One a dimension.
+    /// One edge per dimension.
     Each(Vec<Number>),
 }
 
-/// A number that stands nowhere: a default.
+/// Return a default number. Its byte range is empty, because the deck does not contain it.
 pub fn default_number(value: f64) -> Number {
     Spanned::new(0..0, Written::Value(value))
 }

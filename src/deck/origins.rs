@@ -19,14 +19,14 @@ struct Piece {
     changed: Range<usize>,
     /// Index of the file.
     file: usize,
-    /// Its bytes there.
+    /// Byte range in this file.
     place: Range<usize>,
-    /// The bytes are equal.
+    /// Both byte ranges have equal content.
     is_equal: bool,
 }
 
 impl Origins {
-    /// The places of the keys and values of a text in these files; later files take precedence.
+    /// Locate the keys and values of the merged text in these files; later files take precedence.
     pub fn new(text: &str, files: Vec<(PathBuf, String)>) -> Self {
         let mut pieces = Vec::new();
         if let Ok(changed) = DeTable::parse(text) {
@@ -44,15 +44,16 @@ impl Origins {
         Self { files, pieces }
     }
 
-    /// Path, text and bytes of a place of the changed text, whose length is given; `None` for a value that stands in no
-    /// file.
+    /// Return the path, text and byte range in the file that a range of the merged text comes from. `length`
+    /// is the length of the merged text, bytes. `None` for a value that is in no file, such as a value of
+    /// `--set`.
     pub fn find(
         &self,
         span: &Range<usize>,
         length: usize,
     ) -> Option<(&PathBuf, &str, Range<usize>)> {
         let (path, deck) = &self.files[0];
-        // The start and the end of the deck, where something is missing.
+        // Errors about missing sections point at the start or the end of the deck.
         if span.end == 0 {
             return Some((path, deck, 0..0));
         }
@@ -77,9 +78,9 @@ impl Origins {
     }
 }
 
-/// A search for the places of a changed text in a file.
+/// Search for the ranges of the merged text that come from one file.
 struct Search<'a> {
-    /// The changed text and that of the file.
+    /// The merged text and the text of the file.
     texts: [&'a str; 2],
     file: usize,
     pieces: &'a mut Vec<Piece>,

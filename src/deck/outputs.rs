@@ -8,13 +8,13 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem;
 
-/// Part of the names of results that a restart has set aside.
+/// Part of the names of results that a restart has renamed instead of overwriting them.
 const SET_ASIDE: &str = "until_step_";
 
-/// Validates what is written to the main result; `end` (s) is the end of the run.
+/// Validate the main result; `end` is the end of the run, s.
 ///
 /// # Errors
-/// On an unknown field or set and on a wrong interval.
+/// On an unknown field or set, and on an invalid interval.
 pub fn output(
     scope: &Scope,
     deck: &Deck,
@@ -24,10 +24,10 @@ pub fn output(
     of_table(scope, (None, &deck.output.get_ref().main), sets, end)
 }
 
-/// Validates what is written to further results; `end` (s) is the end of the run.
+/// Validate the further results; `end` is the end of the run, s.
 ///
 /// # Errors
-/// As [`output`], and on a name that cannot be part of the name of a file.
+/// As [`output`], and on a name that cannot be part of a file name.
 pub fn further_outputs(
     scope: &Scope,
     deck: &Deck,
@@ -66,7 +66,7 @@ pub fn further_outputs(
     Ok(found)
 }
 
-/// Validates an output, the main one or one with a name.
+/// Validate the main result (no name) or a further result (with a name).
 fn of_table(
     scope: &Scope,
     (name, output): (Option<&String>, &grammar::Output),
@@ -117,7 +117,7 @@ fn of_table(
     })
 }
 
-/// The interval of outputs; none where only `times` are given.
+/// Return the interval of outputs; `None` if only `times` are given.
 fn every(
     scope: &Scope,
     section: &str,
@@ -139,7 +139,7 @@ fn every(
     }
 }
 
-/// The given times of outputs, in ascending order.
+/// Return the given times of outputs in ascending order, s.
 fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Result<Vec<f64>> {
     let Some(written) = &output.times else {
         return Ok(Vec::new());
@@ -166,7 +166,7 @@ fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Re
 /// Validate the settings of the rebalancing.
 ///
 /// # Errors
-/// On a bound that every partition exceeds.
+/// If `imbalance` is below 1: the slowest rank always takes at least the mean time.
 pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<problem::Balance>> {
     let rule = |table: &Spanned<Balance>| {
         let table = table.get_ref();
@@ -179,10 +179,10 @@ pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<problem::Balance>> {
     deck.balance.as_ref().map(rule).transpose()
 }
 
-/// Validates when checkpoints are written.
+/// Validate the interval of checkpoints.
 ///
 /// # Errors
-/// On a wrong interval or more than one.
+/// On an invalid interval, or on more than one interval.
 pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<problem::CheckpointRule> {
     use problem::{CheckpointRule, Interval};
     let table = deck.checkpoint.get_ref();
@@ -214,7 +214,7 @@ pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<problem::CheckpointRule>
     }
 }
 
-/// Seconds of a number with one of the units s, min, h; `None` for anything else.
+/// Parse a number with the unit s, min or h, and return seconds; `None` for any other text.
 fn duration(text: &str) -> Option<f64> {
     let units = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
     let (number, factor) = units

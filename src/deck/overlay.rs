@@ -6,8 +6,9 @@ use super::source::Source;
 use super::toml_error::toml_error;
 use crate::error::Result;
 
-/// The text of a deck with the keys of overlays, later ones over earlier ones. Tables are merged key by key; any other
-/// value, a list of stages included, is replaced as a whole, and so is a choice by another one.
+/// Return the text of a deck merged with overlays; later overlays override earlier overlays. Tables are
+/// merged key by key. Any other value, including the list of stages, is replaced as a whole. A choice is
+/// replaced by a different choice.
 ///
 /// # Errors
 /// If the deck or an overlay is not TOML.
@@ -27,9 +28,9 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
     Ok(merged.to_string())
 }
 
-/// A text with the places of its comments and blanks.
+/// Parse a text, and keep its comments and blanks.
 fn document(source: &Source) -> Result<DocumentMut> {
-    // Its errors have the same text as for decks without overlays.
+    // Errors of this parser have the same text as for decks without overlays.
     if let Err(error) = source.text.parse::<toml::Table>() {
         return Err(toml_error(source, &error));
     }
@@ -37,7 +38,7 @@ fn document(source: &Source) -> Result<DocumentMut> {
     parsed.map_err(|error| source.error(error.span().unwrap_or(0..0), error.message()))
 }
 
-/// Write the keys of `upper` over those of `lower`, the table at this path.
+/// Merge `upper` into `lower`, the table at `path`; keys of `upper` override keys of `lower`.
 fn merge_tables<'k>(
     lower: &mut dyn TableLike,
     upper: &'k dyn TableLike,
@@ -61,7 +62,7 @@ fn merge_tables<'k>(
                 let mut item = item.clone();
                 forget_positions(&mut item);
                 if let (Item::Value(value), true) = (&mut item, is_inline) {
-                    // A comment after the value would hide the rest of the line.
+                    // In an inline table, a comment after the value would hide the rest of the line.
                     value.decor_mut().clear();
                 }
                 lower.insert(key, item);
@@ -70,7 +71,8 @@ fn merge_tables<'k>(
     }
 }
 
-/// Whether a table has one key, which names a choice: the law of a material, the kind of a damage or crack, a shape.
+/// Return whether the only key of a table names a choice: the law of a material, the kind of a damage law or
+/// crack, or a shape.
 fn is_choice(path: &[&str]) -> bool {
     matches!(
         path,
@@ -78,7 +80,8 @@ fn is_choice(path: &[&str]) -> bool {
     )
 }
 
-/// Reset the positions of an item's tables, so that they follow those of the deck: the order of bodies and conditions counts.
+/// Reset the positions of an item's tables, so that these tables follow the tables of the deck. The order of
+/// bodies and conditions matters.
 fn forget_positions(item: &mut Item) {
     match item {
         Item::Table(table) => {
@@ -112,7 +115,7 @@ mod tests {
             .unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
 
-    /// The merge of two tables with these keys and values, without choices.
+    /// Merge two tables without choices; the reference for the test.
     fn over(lower: &mut Table, upper: &Table) {
         for (key, value) in upper {
             match (lower.get_mut(key), value) {
@@ -177,12 +180,12 @@ mod tests {
         assert_eq!(plate.keys().collect::<Vec<_>>(), ["material", "shape"]);
         let shape = plate["shape"].as_table().unwrap();
         assert_eq!(shape.keys().collect::<Vec<_>>(), ["disc"]);
-        // The same choice is merged.
+        // If both decks name the same choice, its keys are merged.
         let overlay = "material.glass.pmb.damping = 3";
         let merged = super::tests::merged(deck, overlay);
         let law = merged["material"]["glass"]["pmb"].as_table().unwrap();
         assert_eq!(law.keys().collect::<Vec<_>>(), ["density", "damping"]);
-        // A table without keys replaces nothing.
+        // An empty table replaces no choice.
         let merged = super::tests::merged(deck, "[material.glass]");
         let glass = merged["material"]["glass"].as_table().unwrap();
         assert_eq!(glass.keys().collect::<Vec<_>>(), ["pmb"]);

@@ -11,12 +11,13 @@ use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::message::suggestion;
 
-/// Words that mean something else in an expression or in its place.
+/// Words with a meaning in expressions, and `free`, which replaces an expression.
 const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free"];
 
-/// Evaluates the parameters into the scope.
+/// Evaluate the parameters, and store their values in the scope.
 ///
-/// # Errors On a name that no expression can use, an unknown name, or a circular definition.
+/// # Errors
+/// On a name that no expression can use, an unknown name, or a circular definition.
 pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<()> {
     for name in written.keys() {
         let text = name.get_ref();
@@ -25,7 +26,7 @@ pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<(
             return Err(scope.error(name.span(), message));
         }
     }
-    // Each round resolves whatever depends on resolved names only.
+    // Each round evaluates the parameters that depend on evaluated parameters only.
     while scope.parameters.len() < written.len() {
         let before = scope.parameters.len();
         for (name, number) in written {
@@ -42,7 +43,7 @@ pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<(
     Ok(())
 }
 
-/// The reason why expressions cannot use a name; `None` if they can.
+/// Return the reason why expressions cannot use a name; `None` for a valid name.
 pub fn name_fault(name: &str) -> Option<String> {
     let is_identifier = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !name.is_empty()
@@ -59,7 +60,7 @@ pub fn name_fault(name: &str) -> Option<String> {
 /// Replace the value or expression of a parameter.
 ///
 /// # Errors
-/// When the deck has no such parameter or the value is no expression.
+/// If the deck has no such parameter, or the value is not an expression.
 pub fn set(
     source: &Source,
     parameters: &mut IndexMap<Text, Number>,
@@ -93,7 +94,7 @@ pub fn set(
     Ok(())
 }
 
-/// The first parameter that a number needs and that has no value yet.
+/// Return the index of the first parameter that a number needs and that is not evaluated yet.
 fn awaited(scope: &Scope, written: &IndexMap<Text, Number>, number: &Number) -> Option<usize> {
     let Written::Text(text) = number.get_ref() else {
         return None;
@@ -105,13 +106,13 @@ fn awaited(scope: &Scope, written: &IndexMap<Text, Number>, number: &Number) -> 
         .find_map(|need| written.get_index_of(need.as_str()))
 }
 
-/// The error about parameters with a circular definition.
+/// Return the error about parameters with a circular definition.
 fn circle(scope: &Scope, written: &IndexMap<Text, Number>) -> Error {
     let mut way: Vec<usize> = Vec::new();
     let mut next = written
         .values()
         .find_map(|number| awaited(scope, written, number));
-    // Every unresolved parameter leads to the circle, but may not be part of it.
+    // Every unevaluated parameter leads to a circle, but may not be part of the circle.
     while let Some(index) = next.filter(|index| !way.contains(index)) {
         way.push(index);
         next = awaited(scope, written, &written[index]);

@@ -9,19 +9,19 @@ use crate::expression::{POSITION, POSITION_AND_TIME};
 use crate::message::format_number;
 use crate::problem::{self, InterfaceRule, PointSource};
 
-/// The finest level; there the spacing is a 64th.
+/// Largest refinement level; its spacing is 1/64 of the spacing of the grid.
 const FINEST: u64 = 6;
 
-/// Shares of the largest energy, and damage.
+/// Allowed values of the triggers `energy` and `damage`: above 0, up to 1.
 const SHARE: std::ops::Range<f64> = f64::MIN_POSITIVE..1.0 + f64::EPSILON;
 
-/// By how much m = δ/dx grows from level to level if nothing is said (Dipasquale et al. 2014, table 2).
+/// Default increase of m = δ/dx per level (Dipasquale et al. 2014, table 2).
 const RISE: f64 = 1.0;
 
-/// Validates the refinement.
+/// Validate the refinement.
 ///
 /// # Errors
-/// On bodies that cannot be refined, and on levels and ratios that do not fit.
+/// On bodies that cannot be refined, and on invalid levels or ratios m.
 pub fn refinement(
     scope: &Scope,
     deck: &Deck,
@@ -100,7 +100,7 @@ fn trigger(
         let message = format!("{key}: give at least one of `energy`, `damage` and `where`");
         return Err(scope.error(table.span(), message));
     }
-    // Those that a new point lies between must be in reach of its rank.
+    // The rank of a new point needs the parents of the point, which may be a cell's diagonal apart.
     for body in bodies {
         if let PointSource::Lattice { spacing, .. } = body.points {
             let edges = spacing[..scope.dimension].iter();

@@ -17,16 +17,16 @@ use crate::expression::{Expression, POSITION_AND_TIME, Table, Variable};
 use crate::message::format_number;
 use crate::message::suggestion;
 
-/// Lengths from those far below atoms to those far above galaxies, m.
+/// Allowed lengths, m. Squares and volumes of these lengths do not overflow or underflow.
 const LENGTHS: RangeInclusive<f64> = 1e-30..=1e30;
 
-/// The deck's text, its parameters and its dimension: what values are resolved against.
+/// Context for the evaluation of values: text, parameters, tables and dimension of the deck.
 pub struct Scope<'a> {
-    /// For errors.
+    /// Text of the deck, for error messages.
     pub source: &'a Source,
-    /// Named numbers.
+    /// Values of the parameters by name.
     pub parameters: IndexMap<String, f64>,
-    /// Named tables.
+    /// Tables by name.
     pub tables: IndexMap<String, Arc<Table>>,
     /// Number of components of a vector.
     pub dimension: usize,
@@ -37,7 +37,9 @@ pub struct Scope<'a> {
 impl<'a> Scope<'a> {
     /// Evaluate the parameters, which may refer to each other in any order, and read the tables.
     ///
-    /// # Errors On a name that hides a variable, an unknown name, a circular definition, or a wrong table.
+    /// # Errors
+    /// On a parameter with the name of a variable, an unknown name, a circular definition, or an invalid
+    /// table.
     pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {
             source,
@@ -56,12 +58,12 @@ impl<'a> Scope<'a> {
         Ok(scope)
     }
 
-    /// An error at a place of the deck.
+    /// Return an error at a byte range of the deck.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
         self.source.error(span, message)
     }
 
-    /// The index of a table of `section` by its name, one of `names`. The table counts as used from then on.
+    /// Return the index of the table `name` in `names`, the tables of `section`, and mark the table as used.
     ///
     /// # Errors
     /// On an unknown name.
@@ -79,13 +81,13 @@ impl<'a> Scope<'a> {
         Ok(index)
     }
 
-    /// A finite number.
+    /// Evaluate a finite number.
     pub fn number(&self, number: &Number, key: &str) -> Result<f64> {
         let value = self.expression(number, key, &[])?.as_constant();
         Ok(value.expect("an expression without variables is a constant"))
     }
 
-    /// A whole number below 2⁶³, the limit of TOML integers.
+    /// Return a whole number below 2⁶³, the limit of TOML integers.
     pub fn whole(&self, number: &Spanned<u64>, key: &str) -> Result<u64> {
         let (value, most) = (*number.get_ref(), i64::MAX);
         if value <= most as u64 {
@@ -95,12 +97,12 @@ impl<'a> Scope<'a> {
         Err(self.error(number.span(), message))
     }
 
-    /// A number above 0.
+    /// Evaluate a number above 0.
     pub fn positive(&self, number: &Number, key: &str) -> Result<f64> {
         self.within(number, key, f64::MIN_POSITIVE..f64::INFINITY, "above 0")
     }
 
-    /// A length in m of which squares and volumes can be taken.
+    /// Evaluate a length in m, within `LENGTHS`.
     pub fn length(&self, number: &Number, key: &str) -> Result<f64> {
         let length = self.positive(number, key)?;
         if LENGTHS.contains(&length) {
@@ -115,7 +117,7 @@ impl<'a> Scope<'a> {
         Err(self.error(number.span(), message))
     }
 
-    /// A number within a range, which `words` describes.
+    /// Evaluate a number within a range; `words` describes the range in the error message.
     pub fn within(
         &self,
         number: &Number,
@@ -134,7 +136,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// An expression of the given variables; z and y only if the dimension has them.
+    /// Parse an expression of the given variables. y and z are only allowed if the dimension has them.
     pub fn expression(
         &self,
         number: &Number,
@@ -164,7 +166,7 @@ impl<'a> Scope<'a> {
         let parsed = Expression::parse_with_tables(text, &lookup, &names, &allowed, &tables);
         let parsed = parsed.map_err(|error| {
             let span = number.span();
-            // Where the string has escapes, the whole of it is marked.
+            // If the string has escapes, the whole string is marked.
             let raw = self.source.text.get(span.clone()).unwrap_or_default();
             let marked = match raw.find(text) {
                 Some(offset) if !text.is_empty() => {
@@ -182,20 +184,20 @@ impl<'a> Scope<'a> {
         self.finite(parsed, number, key)
     }
 
-    /// The name of a table.
+    /// Return the name of a table.
     pub fn table_name(&self, table: &Arc<Table>) -> &str {
         let mut tables = self.tables.iter();
         let found = tables.find(|(_, known)| Arc::ptr_eq(known, table));
         found.map_or("", |(name, _)| name)
     }
 
-    /// Note that a table is used.
+    /// Mark a table as used.
     fn use_table(&self, table: &Arc<Table>) {
         let name = self.table_name(table).to_owned();
         self.used.borrow_mut().insert(("table", name));
     }
 
-    /// The expression, unless it is a constant that is not finite.
+    /// Return the expression, or an error if it is a constant that is not finite.
     fn finite(&self, expression: Expression, number: &Number, key: &str) -> Result<Expression> {
         match expression.as_constant() {
             Some(value) if !value.is_finite() => {
@@ -205,10 +207,10 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// The entries of a vector, one for each dimension.
+    /// Return the entries of a vector.
     ///
     /// # Errors
-    /// When there are more or fewer.
+    /// If the number of entries differs from the dimension.
     pub fn entries<'v>(&self, vector: &'v Vector, key: &str) -> Result<&'v [Number]> {
         let entries = vector.get_ref();
         if entries.len() == self.dimension {
@@ -222,7 +224,7 @@ impl<'a> Scope<'a> {
         Err(self.error(vector.span(), message))
     }
 
-    /// A vector of numbers; components beyond the dimension are 0.
+    /// Evaluate a vector; components beyond the dimension are 0.
     pub fn vector(&self, vector: &Vector, key: &str) -> Result<[f64; 3]> {
         let mut values = [0.0; 3];
         for (value, entry) in values.iter_mut().zip(self.entries(vector, key)?) {
@@ -231,7 +233,7 @@ impl<'a> Scope<'a> {
         Ok(values)
     }
 
-    /// A vector of unit length.
+    /// Evaluate a vector, and scale it to unit length.
     pub fn direction(&self, vector: &Vector, key: &str) -> Result<[f64; 3]> {
         let values = Vector3::from(self.vector(vector, key)?);
         let length = values.dot(&values).sqrt();
@@ -242,7 +244,8 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// The index of the one given key among mutually exclusive keys; `place` is the table with these keys.
+    /// Return the index of the only given key among mutually exclusive keys. `place` is the byte range of the
+    /// table with these keys.
     pub fn exactly_one(
         &self,
         place: Range<usize>,
@@ -275,7 +278,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// One expression for each component.
+    /// Parse one expression per component.
     pub fn expressions(
         &self,
         vector: &Vector,
@@ -296,7 +299,7 @@ impl<'a> Scope<'a> {
             .collect()
     }
 
-    /// One expression for each component; `None` for a component with `"free"`.
+    /// Parse one expression per component of a prescribed motion; `None` for a component with `"free"`.
     pub fn motion(&self, vector: &Vector, key: &str) -> Result<Vec<Option<Expression>>> {
         let motion = self
             .entries(vector, key)?
@@ -314,12 +317,12 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// Whether the deck leaves this component of a motion free.
+/// Return whether an entry is `"free"`, a component that is not prescribed.
 fn is_free(entry: &Number) -> bool {
     matches!(entry.get_ref(), Written::Text(text) if text == "free")
 }
 
-/// The index of `name` in `names`, or an error that names the nearest.
+/// Return the index of `name` in `names`. The error suggests the most similar name.
 pub fn find<'n>(
     source: &Source,
     name: &Text,
@@ -339,7 +342,7 @@ pub fn find<'n>(
         })
 }
 
-/// Resolve every table; the results have the names of the tables.
+/// Resolve every table; the results keep the names of the tables.
 pub fn resolve_each<T, U>(
     tables: &Tables<T>,
     resolve: impl Fn(&str, &Spanned<T>) -> Result<U>,

@@ -10,11 +10,11 @@ use crate::error::Result;
 use crate::expression::{Expression, Variable};
 use crate::problem::{self, RigidMotion, RigidShape, Shape};
 
-/// Validates rigid bodies.
+/// Validate rigid bodies.
 ///
 /// # Errors
-/// On a body without a shape or with one that cannot be rigid, on keys of free bodies for one that is driven, and on numbers
-/// out of range.
+/// On a missing shape, a shape that cannot be rigid, keys of free bodies for a driven body, and numbers out
+/// of range.
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies
@@ -72,7 +72,7 @@ fn body(
     })
 }
 
-/// The shape of a body about its centre, and that.
+/// Return the shape of a rigid body relative to its centre, and the centre, m.
 fn solid(
     scope: &Scope,
     key: &str,
@@ -165,7 +165,7 @@ fn angular_velocity(scope: &Scope, key: &str, table: &grammar::Rigid) -> Result<
         return Ok(velocity);
     };
     let key = format!("{key} angular_velocity");
-    // About z in the plane, and about nothing on a line.
+    // Axes of rotation: none in 1-D, z in the plane, all in 3-D.
     let axes = [0..0, 2..3, 0..3][scope.dimension - 1].clone();
     let numbers = written.get_ref();
     if numbers.len() != axes.len() {

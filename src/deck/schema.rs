@@ -5,10 +5,10 @@ use serde_json::{Value, json};
 
 use super::grammar::Deck;
 
-/// The JSON Schema (draft 7) of decks, generated from the grammar.
+/// Return the JSON Schema (draft 7) of decks, generated from the grammar.
 ///
-/// It knows keys, kinds of values and words. What depends on several values, such as names of sets, only
-/// [`read`](super::read) and [`Deck::problem`](super::Deck::problem) check.
+/// The schema covers keys, types of values and allowed words. Rules about several values, such as names of
+/// sets, are checked only by [`read`](super::read) and [`Deck::problem`](super::Deck::problem).
 pub fn schema() -> Value {
     let generator = SchemaSettings::draft07().into_generator();
     let mut schema = generator.into_root_schema_for::<Deck>().to_value();
@@ -19,7 +19,8 @@ pub fn schema() -> Value {
     schema
 }
 
-/// Rewrite what editors use badly, everywhere in a schema: `null`, which TOML lacks, and choices of tables.
+/// Rewrite constructs that editors handle badly, everywhere in a schema: the type `null`, which TOML lacks,
+/// and choices of tables.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Array(entries) => entries.iter_mut().for_each(tidy),
@@ -44,7 +45,7 @@ fn remove_null(schema: &mut Value) {
         return;
     };
     choices.retain(|choice| *choice != json!({ "type": "null" }));
-    // Beside `$ref`, draft 7 ignores all keys.
+    // Draft 7 ignores all keys beside `$ref`, so the reference moves to `allOf`.
     if choices.len() == 1 {
         let all = schema
             .as_object_mut()
@@ -53,8 +54,8 @@ fn remove_null(schema: &mut Value) {
     }
 }
 
-/// Join a choice of tables with one key each into one table with one of the keys: editors complete its keys, and
-/// their messages name the wrong one.
+/// Join a choice of tables with one key each into one table that allows one of the keys. Editors then
+/// complete the keys, and their messages name the wrong key.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {
         let mut properties = serde_json::Map::new();
@@ -93,7 +94,7 @@ mod tests {
     use crate::deck::grammar::{Form, SECTIONS};
     use crate::material::declarations;
 
-    /// Follow references.
+    /// Follow the references of a schema.
     fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
         let target = schema.get("allOf").map_or(schema, |all| &all[0]);
         match target.get("$ref").and_then(Value::as_str) {

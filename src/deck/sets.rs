@@ -9,10 +9,10 @@ use crate::expression::POSITION;
 use crate::points::id_file;
 use crate::problem;
 
-/// The sets of a problem: `all`, the bodies, those of the deck.
+/// Return the sets of a problem: `all`, the bodies, and the sets of the deck.
 ///
 /// # Errors
-/// On a name that is taken and on a wrong selector.
+/// On a name that is already used, and on an invalid selector.
 pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Set>> {
     let mut sets = vec![problem::Set {
         name: "all".to_owned(),
@@ -116,7 +116,7 @@ fn selector(
     }
 }
 
-/// The index of a set.
+/// Return the index of a set.
 ///
 /// # Errors
 /// On an unknown set.
@@ -125,7 +125,7 @@ pub fn find_set(scope: &Scope, name: &Text, sets: &[problem::Set], key: &str) ->
     scope.find_used("set", name, names, key)
 }
 
-/// The indices of several sets.
+/// Return the indices of several sets.
 ///
 /// # Errors
 /// On an unknown set.

@@ -13,10 +13,10 @@ use crate::message::format_number;
 use crate::points::Polygon;
 use crate::problem;
 
-/// Validates a shape.
+/// Validate a shape.
 ///
 /// # Errors
-/// On a shape of another dimension, an empty one, or a wrong number.
+/// On a shape for another dimension, an empty shape, or an invalid number.
 pub fn shape(scope: &Scope, key: &str, shape: &Spanned<grammar::Shape>) -> Result<problem::Shape> {
     resolve(scope, key, shape.get_ref(), shape.span())
 }
@@ -152,10 +152,10 @@ fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<
     Ok(Polygon::new(corners.collect::<Result<_>>()?))
 }
 
-/// Validates a pre-crack.
+/// Validate a pre-crack.
 ///
 /// # Errors
-/// On a crack of another dimension or one without extent.
+/// On a crack for another dimension, or a crack without extent.
 pub fn crack(
     scope: &Scope,
     name: &str,

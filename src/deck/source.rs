@@ -12,23 +12,23 @@ use crate::error::{Error, Result, Warning};
 /// Largest size of a deck, bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// Characters of a whole error, where the path is not longer than all the rest.
+/// Largest number of characters of an error, unless the path is very long.
 const MOST_SHOWN: usize = 790;
 
-/// Characters of what an error says.
+/// Largest number of characters of the message of an error.
 const MOST_SAID: usize = 600;
 
-/// The least and the largest number of characters of a line that are shown.
+/// Smallest and largest number of characters of an excerpt of a line.
 const SHOWN_OF_LINE: [usize; 2] = [24, 160];
 
 /// A deck's file name and text.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Where it was read from.
+    /// Path of the file.
     pub path: PathBuf,
     /// The whole text.
     pub text: String,
-    /// The files that the text was merged from; `None` if the text is that of the file.
+    /// The files that the text was merged from; `None` if the text is the content of the file at `path`.
     origins: Option<Arc<Origins>>,
 }
 
@@ -36,7 +36,7 @@ pub struct Source {
 const CHANGED: &str = "\nnote: lines are those of the deck as changed by --with and --set";
 
 impl Source {
-    /// The text of a file.
+    /// Create a source from the path and the text of a file.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -45,7 +45,7 @@ impl Source {
         }
     }
 
-    /// The text of a deck that was put together from files, the deck the first of them. Errors name their lines.
+    /// Create a source from a text merged from `files`, the deck first. Errors name the lines of these files.
     pub(super) fn changed(text: String, files: Vec<Self>) -> Self {
         let files: Vec<_> = files
             .into_iter()
@@ -56,7 +56,8 @@ impl Source {
         source
     }
 
-    /// Path and text of the file where a span stands, the span there, and a note on a place that is in no file.
+    /// Return the path and text of the file that a span comes from, and the span in this file. The last entry
+    /// is a note for a span that is in no file.
     fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
         let Some(origins) = &self.origins else {
             return (&self.path, &self.text, span, "");
@@ -67,10 +68,10 @@ impl Source {
         }
     }
 
-    /// Reads a deck.
+    /// Read a deck.
     ///
     /// # Errors
-    /// When the file cannot be read, is not UTF-8, or is far too long for a deck.
+    /// If the file cannot be read, is not UTF-8, or is longer than `LONGEST`.
     pub fn read(path: &Path) -> Result<Self> {
         let mut bytes = Vec::new();
         let read = |bytes: &mut Vec<u8>| File::open(path)?.take(LONGEST + 1).read_to_end(bytes);
@@ -92,12 +93,12 @@ impl Source {
         }
     }
 
-    /// An input error that names file, line and column and shows the line.
+    /// Return an input error with file, line, column and an excerpt of the line.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
         Error::input(self.marked(span, message.as_ref()))
     }
 
-    /// The warning, with file and line if it has a span.
+    /// Add file and line to a warning that has a span.
     pub fn locate_warning(&self, warning: Warning) -> Warning {
         let Some(span) = warning.span else {
             return warning;
@@ -109,7 +110,7 @@ impl Source {
         Warning::new(format!("{}:{line}: {message}", path.display()))
     }
 
-    /// The error, with file, line, column and the line itself if it has a span.
+    /// Add file, line, column and an excerpt of the line to an error that has a span.
     pub fn locate(&self, error: Error) -> Error {
         let Some(span) = error.span else {
             return error;
@@ -121,8 +122,8 @@ impl Source {
         }
     }
 
-    /// File, line, column and message; then the line, with carets below the bytes of `span`. About 800 characters at
-    /// most.
+    /// Format file, line, column and message, then the line with carets below the bytes of `span`. The result
+    /// has at most about 800 characters.
     fn marked(&self, span: Range<usize>, message: &str) -> String {
         let message = shortened(message, MOST_SAID);
         let (path, text, span, note) = self.place(span);
@@ -152,17 +153,17 @@ impl Source {
     }
 }
 
-/// The part of a line that is shown.
+/// Excerpt of a line in an error.
 struct Window {
     text: String,
-    /// The blanks below the text before the mark; tabs are kept as tabs.
+    /// Blanks below the text before the mark; tabs are kept as tabs.
     indent: String,
 }
 
 impl Window {
-    /// An excerpt of at most this many characters of a line, which includes the text at `column`.
+    /// Return an excerpt of a line with at most `width` characters, which includes `column`.
     fn new(line: &str, column: usize, width: usize) -> Self {
-        // The end of a line may be marked as well.
+        // `column` may be one past the last character of the line.
         let fits = line.chars().nth(width).is_none();
         let first = if fits || column < 2 * width / 3 {
             0
@@ -188,13 +189,13 @@ impl Window {
         }
     }
 
-    /// Characters from the mark on.
+    /// Return the number of characters from the mark to the end of the excerpt.
     fn rest(&self) -> usize {
         self.text.chars().count() - self.indent.chars().count()
     }
 }
 
-/// A message on one line, of so many characters at most.
+/// Return a message on one line, with at most `most` characters.
 fn shortened(message: &str, most: usize) -> String {
     let mut shown = String::new();
     for c in message.chars() {

@@ -1,4 +1,4 @@
-//! Values with their places in the deck.
+//! Values with their byte ranges in the deck.
 
 use std::borrow::{Borrow, Cow};
 use std::fmt;
@@ -7,34 +7,34 @@ use std::ops::Range;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
-/// A value and the bytes of the deck that it is written in. Comparison and hash are those of the value.
+/// A value and its byte range in the deck. Comparison and hash use the value only.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(transparent)]
 pub struct Spanned<T>(serde_spanned::Spanned<T>);
 
 impl<T> Spanned<T> {
-    /// A value at these bytes.
+    /// Create a value with this byte range.
     pub fn new(span: Range<usize>, value: T) -> Self {
         Self(serde_spanned::Spanned::new(span, value))
     }
 
-    /// Its bytes.
+    /// Return the byte range.
     pub fn span(&self) -> Range<usize> {
         self.0.span()
     }
 
-    /// The value.
+    /// Return a reference to the value.
     pub fn get_ref(&self) -> &T {
         self.0.get_ref()
     }
 
-    /// The value, to be changed.
+    /// Return a mutable reference to the value.
     pub fn get_mut(&mut self) -> &mut T {
         self.0.get_mut()
     }
 }
 
-/// A default, which stands nowhere.
+/// The default value, with an empty byte range because the deck does not contain it.
 impl<T: Default> Default for Spanned<T> {
     fn default() -> Self {
         Self::new(0..0, T::default())
@@ -59,7 +59,7 @@ impl<T> AsRef<T> for Spanned<T> {
     }
 }
 
-/// As the value.
+/// The schema of the value.
 impl<T: JsonSchema> JsonSchema for Spanned<T> {
     fn inline_schema() -> bool {
         T::inline_schema()

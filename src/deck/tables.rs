@@ -1,4 +1,4 @@
-//! Tables of a deck: values by time for its expressions.
+//! Tables of a deck: values over time for use in expressions.
 
 use std::ops::Range;
 use std::path::Path;
@@ -18,19 +18,19 @@ use crate::problem::{Action, Problem, RigidMotion};
 /// Maximum number of rows.
 const MAX_ROWS: usize = 100_000;
 
-/// Difference of times, as a share of the end, that is round-off.
+/// Round-off tolerance of times, as a fraction of the end.
 const ROUNDING: f64 = 1e-9;
 
-/// Maximum length of a file, bytes.
+/// Maximum size of a file, bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// Names of the column of times, if the deck names none.
+/// Default names of the column of times.
 const TIME: [&str; 2] = ["t", "time"];
 
-/// Reads the tables into the scope.
+/// Read the tables, and store them in the scope.
 ///
 /// # Errors
-/// On a name that no expression can use, and on a wrong table.
+/// On a name that no expression can use, and on an invalid table.
 pub fn read(scope: &mut Scope, deck: &Deck) -> Result<()> {
     for (name, spanned) in &deck.table {
         let key = format!("[table.{name}]");
@@ -92,7 +92,7 @@ fn table(scope: &Scope, key: &str, spanned: &Spanned<grammar::Table>) -> Result<
     }
 }
 
-/// A table whose rows stand in the deck.
+/// Return a table whose rows are in the deck.
 fn inline(
     scope: &Scope,
     key: &str,
@@ -130,7 +130,7 @@ fn inline(
     })
 }
 
-/// A table from two columns of a file.
+/// Return a table from two columns of a file.
 fn from_file(
     scope: &Scope,
     key: &str,
@@ -197,7 +197,7 @@ fn from_file(
         .map_err(|(row, message)| at(lines.get(row).copied().unwrap_or(header.line), message))
 }
 
-/// The columns of time and value.
+/// Return the indices of the columns of time and value.
 fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usize; 2], String> {
     let find = |wanted: &str| {
         let missing = || {
@@ -240,10 +240,10 @@ fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usi
     Ok([time, value])
 }
 
-/// An error if a table has no rows for a time at which the run needs its value.
+/// Check that tables cover all times at which the run needs their values.
 ///
 /// # Errors
-/// When the rows of a table begin too late or end too early.
+/// If the rows of a table begin too late or end too early.
 pub fn cover_the_run(scope: &Scope, problem: &Problem) -> Result<()> {
     let mut start = 0.0;
     for stage in problem.all_stages() {
@@ -280,7 +280,7 @@ pub fn cover_the_run(scope: &Scope, problem: &Problem) -> Result<()> {
     Ok(())
 }
 
-/// An error if a table of these expressions does not reach from one time to another, s.
+/// Return an error if a table in these expressions does not cover the times from `start` to `end`, s.
 fn covers(
     scope: &Scope,
     key: &str,
@@ -289,7 +289,7 @@ fn covers(
     [start, end]: [f64; 2],
 ) -> Result<()> {
     let tables = expressions.into_iter().flat_map(Expression::tables);
-    // Ends of runs and stages are often products, such as `3*0.1`.
+    // Ends of runs and stages are often products with round-off, such as `3*0.1`.
     let slack = ROUNDING * end;
     for table in tables {
         let [first, last] = table.range();

@@ -14,13 +14,13 @@ const UP_TO_ROUNDING: f64 = 1e-9;
 /// Largest number of halvings of a load step, which gives about a million parts.
 const MOST_HALVINGS: u64 = 20;
 
-/// A time span with the keys of `[time]` or of a stage.
+/// The run or a stage, with the keys of `[time]` or `[[stage]]`.
 struct TimeSegment<'a> {
-    /// The table, as messages name it.
+    /// Header of the section, for messages.
     key: &'static str,
     /// Length, s.
     length: f64,
-    /// Its end, s.
+    /// End, s.
     end: f64,
     step: Option<&'a Number>,
     safety: &'a Number,
@@ -31,10 +31,10 @@ struct TimeSegment<'a> {
     adaptive: Option<&'a Spanned<grammar::Adaptive>>,
 }
 
-/// Validates the time axis.
+/// Validate the time axis.
 ///
 /// # Errors
-/// On a wrong number, and on keys of a method that nothing uses.
+/// On an invalid number, and on keys of a method that no stage uses.
 pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     let time = deck.time.get_ref();
     let end = scope.positive(&time.end, "[time] end")?;
@@ -59,7 +59,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         end,
         step: time.step.as_ref(),
         safety: &time.safety,
-        // With stages, keys that a relaxation does not use may be meant for other stages.
+        // With stages, keys without effect in a relaxation may be intended for other stages.
         method: if deck.stage.is_empty() {
             method
         } else {
@@ -73,9 +73,10 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     stretch.time(scope)
 }
 
-/// Validates the stages of the run, whose time axis is `whole`.
+/// Validate the stages of the run, whose time axis is `whole`.
 ///
-/// # Errors On ends that do not increase up to the end of the run, on unknown names and on wrong numbers.
+/// # Errors
+/// On ends that do not increase or exceed the end of the run, on unknown names, and on invalid numbers.
 pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;
@@ -118,7 +119,8 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
     Ok(stages)
 }
 
-/// The method of each stage, its own or that of `[time]`, and the section that gives it. Without stages there is one method.
+/// Return the method of each stage, and the section that gives it: `[[stage]]` or `[time]`. Without stages,
+/// return the method of `[time]`.
 pub fn methods(deck: &Deck) -> Vec<(&'static str, &Spanned<grammar::Method>)> {
     let of_time = ("[time]", &deck.time.get_ref().method);
     if deck.stage.is_empty() {
@@ -134,7 +136,7 @@ pub fn methods(deck: &Deck) -> Vec<(&'static str, &Spanned<grammar::Method>)> {
     each.collect()
 }
 
-/// When a stage ends (s), after its start and at most at the end of the run.
+/// Return the end of a stage, s. The end must be after the start of the stage and at most the end of the run.
 fn stage_end(
     scope: &Scope,
     table: &Spanned<grammar::Stage>,
@@ -167,7 +169,7 @@ fn stage_end(
     Err(scope.error(number.span(), message))
 }
 
-/// Whether each condition acts in a stage.
+/// Return for each condition whether it acts in the stage.
 fn acting(scope: &Scope, deck: &Deck, stage: &grammar::Stage) -> Result<Vec<bool>> {
     let (names, key, named): (&[Text], _, _) = match (&stage.on, &stage.off) {
         (None, None) => return Ok(vec![true; deck.condition.len()]),
@@ -223,7 +225,7 @@ impl TimeSegment<'_> {
         })
     }
 
-    /// A fixed step, s.
+    /// Validate a fixed step, s.
     fn step(&self, scope: &Scope, number: &Number) -> Result<f64> {
         let key = format!("{} step", self.key);
         let step = scope.positive(number, &key)?;
@@ -309,7 +311,7 @@ impl TimeSegment<'_> {
         })
     }
 
-    /// The settings of Newton's method; `shared` has the values of keys that are missing in the table.
+    /// Return the settings of Newton's method; `shared` supplies the values of missing keys.
     fn newton(
         &self,
         scope: &Scope,
@@ -340,7 +342,8 @@ impl TimeSegment<'_> {
     }
 }
 
-/// An error if anything moves at the start of a method that computes equilibria.
+/// Return an error if the deck has initial velocities, and the run begins with a method that computes
+/// equilibria.
 fn at_rest(scope: &Scope, deck: &Deck, method: grammar::Method) -> Result<()> {
     for (name, table) in &deck.initial {
         if let Some(velocity) = &table.get_ref().velocity {

@@ -1,4 +1,4 @@
-//! The errors of the TOML reader in a user's words: which key, what it must be and what it is.
+//! Errors of the TOML parser in terms of the deck: the key, the expected value and the given value.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::material::declarations;
 use crate::message::suggestion;
 use crate::problem::law;
 
-/// The error that the deck deserves for what the TOML reader found.
+/// Translate an error of the TOML parser into an error about the deck.
 pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
     let span = error.span().unwrap_or(0..0);
     let message = error.message().trim();
@@ -29,7 +29,7 @@ pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
     }
 }
 
-/// What is wrong in a text that is not TOML.
+/// Return the message about a text that is not TOML.
 fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String {
     let marked = source.text.get(span.clone()).unwrap_or_default();
     let rest = source.text.get(span.end..).unwrap_or_default();
@@ -53,7 +53,7 @@ fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String 
     }
 }
 
-/// What is wrong in a text that is TOML but not a deck.
+/// Return the error about a text that is TOML but not a deck.
 fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &str) -> Error {
     let place = find(tree, &span, &mut Vec::new()).unwrap_or_default();
     let mut quoted = message.split('`').skip(1).step_by(2);
@@ -63,7 +63,7 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
         let colon = if key.is_empty() { "" } else { ": " };
         source.error(span.clone(), format!("{key}{colon}{words}"))
     };
-    // A key of [output] that is not known is read as a further output.
+    // An unknown key of [output] is parsed as the name of a further output.
     if let ([section, key], Some(value)) = (&place.path[..], place.value)
         && section == "output"
         && !OUTPUT_KEYS.contains(&key.as_str())
@@ -157,13 +157,13 @@ struct Place<'t> {
 }
 
 impl Place<'_> {
-    /// The path of the table that holds the key.
+    /// Return the path of the table that contains the key.
     fn parent(&self) -> &[String] {
         self.path.split_last().map_or(&[], |(_, parent)| parent)
     }
 }
 
-/// The key or value that has this span; `path` leads to the table.
+/// Find the key or value with this span in a table; `path` is the path of the table.
 fn find<'t>(
     table: &'t DeTable<'t>,
     span: &Range<usize>,
@@ -208,7 +208,7 @@ fn find_value<'t>(
     }
 }
 
-/// A path as the deck's sections have it: `[body.plate] shape box`.
+/// Format a path with section header and keys: `[body.plate] shape box`.
 fn label(path: &[String]) -> String {
     let section = Section::containing(path);
     let count = section.map_or(0, |section| section.header_length(path));
@@ -223,7 +223,7 @@ fn label(path: &[String]) -> String {
     [header, keys.to_vec()].concat().join(" ")
 }
 
-/// The names of the variants of an enumeration of the grammar.
+/// Return the names of the variants of a grammar enum, read from a deserialization error.
 fn kinds<'de, T: Deserialize<'de>>() -> Vec<String> {
     let nameless: StrDeserializer<NameError> = "".into_deserializer();
     let message = T::deserialize(nameless)
@@ -233,7 +233,7 @@ fn kinds<'de, T: Deserialize<'de>>() -> Vec<String> {
     quoted.map(str::to_owned).collect()
 }
 
-/// The keys of a table, for an error.
+/// List the keys of a table for an error message.
 fn keys(value: Option<&DeValue>) -> String {
     let keys: Vec<String> = value
         .and_then(DeValue::as_table)
@@ -247,7 +247,7 @@ fn keys(value: Option<&DeValue>) -> String {
     }
 }
 
-/// What serde expected, in the words of a deck's user.
+/// Translate serde's description of the expected value into deck terms.
 fn wanted(expected: &str) -> &str {
     match expected {
         "a sequence" => "a list in brackets",
@@ -261,7 +261,7 @@ fn wanted(expected: &str) -> &str {
     }
 }
 
-/// What the key of a law must be, if the path leads to one.
+/// Describe the allowed values of a law's key; `None` if the path does not lead to such a key.
 fn wanted_of_law(path: &[String]) -> Option<String> {
     let [section, _, name, key] = path else {
         return None;
@@ -270,7 +270,7 @@ fn wanted_of_law(path: &[String]) -> Option<String> {
     law?.key(key).map(law::wanted)
 }
 
-/// What stands in the deck, in the words of its user.
+/// Describe the given value in deck terms.
 fn given(value: &DeValue, written: &str) -> String {
     match value {
         DeValue::Table(_) => "a table".to_owned(),
@@ -287,7 +287,7 @@ mod tests {
     use super::*;
     use crate::deck;
 
-    /// A deck with every section that the grammar has.
+    /// A deck with every section of the grammar.
     const DECK: &str = "title = 'all'
 dimension = 'plane-stress'
 thickness = 1
@@ -372,7 +372,7 @@ times = [0, 1]
 values = [0, 1]
 ";
 
-    /// The first line of the error of a deck.
+    /// Return the first line of the error of a deck.
     fn error_of(text: String) -> String {
         let source = Source::new("a.toml", text);
         let error = deck::parse(&source).err();
@@ -380,7 +380,7 @@ values = [0, 1]
         error.message.lines().next().unwrap_or_default().to_owned()
     }
 
-    /// [`DECK`] with another text in place of the line with this number, from 0.
+    /// Return [`DECK`] with one line replaced; line numbers start from 0.
     fn with_line(number: usize, other: &str) -> String {
         let lines = DECK.lines().enumerate();
         let lines = lines.map(|(k, line)| if k == number { other } else { line });
@@ -402,7 +402,7 @@ values = [0, 1]
             if !line.starts_with('[') {
                 continue;
             }
-            // A value of the wrong kind, and a key that is none.
+            // Try a value of the wrong type, then an unknown key.
             let key = lines[number + 1].split(' ').next().unwrap_or_default();
             let error = error_of(with_line(number + 1, &format!("{key} = 1979-05-27")));
             assert!(
@@ -413,7 +413,7 @@ values = [0, 1]
             let error = error_of(with_line(number + 1, &more));
             let expected = match *line {
                 "[parameters]" => ": [parameters] wrong_key: must be ".to_owned(),
-                // The keys of a law are those of its declaration, and checked after the names.
+                // Keys of a law are checked against its declaration, after the names of tables.
                 "[material.NAME.pmb]" => ": [".to_owned(),
                 _ => format!(": {line}: unknown key `wrong_key`"),
             };
@@ -436,7 +436,7 @@ values = [0, 1]
         }
     }
 
-    /// What is told of a wrong deck depends on these words of the reader.
+    /// The messages about wrong decks depend on these words of the TOML parser.
     #[test]
     fn the_reader_says_what_is_looked_for() {
         let grid = "dimension = 'plane-stress'\ngrid = { spacing = 1, horizon = 3 }\n";

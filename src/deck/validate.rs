@@ -1,4 +1,4 @@
-//! From the grammar to the problem: every value checked, every name resolved.
+//! Validation of a deck: convert the grammar to the problem, check every value and resolve every name.
 
 use super::grammar::{ConstraintName, Deck, DimensionName, Family, Grid, VolumeCorrection};
 use super::number::{Edges, Number};
@@ -13,10 +13,10 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{self, Problem};
 
-/// Validates a parsed deck, whose values are resolved against `scope`.
+/// Validate a parsed deck; `scope` has its parameters and tables.
 ///
 /// # Errors
-/// The first mistake, with its place in the deck, the key and what would be right.
+/// The first mistake, with its location in the deck, the key and the allowed values.
 pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let dimension = dimension(scope, deck)?;
     let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;
@@ -124,7 +124,8 @@ fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
     })
 }
 
-/// The edges of a lattice cell (m), at most the horizon (m); 1 beyond the dimension.
+/// Return the edges of a lattice cell, m, with 1 beyond the dimension. An edge above the horizon (m) is an
+/// error.
 pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -> Result<[f64; 3]> {
     let written = match edges.get_ref() {
         Edges::Same(edge) => vec![Spanned::new(edges.span(), edge.clone()); scope.dimension],
@@ -147,7 +148,7 @@ pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -
     Ok(spacing)
 }
 
-/// The spacing of the grid (m) where one number holds for all directions.
+/// Return the spacing of the grid, m, if one number applies to all directions.
 fn single(grid: &Spanned<Grid>, spacing: Option<[f64; 3]>) -> Option<f64> {
     match grid.get_ref().spacing.as_ref()?.get_ref() {
         Edges::Same(_) => Some(spacing?[0]),
@@ -198,7 +199,7 @@ fn volume_correction(
     Err(scope.error(given.span(), message))
 }
 
-/// The random displacement of points.
+/// Validate the random displacement of points.
 fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option<problem::Jitter>> {
     let grid = deck.grid.get_ref();
     let Some(share) = &grid.jitter else {
@@ -214,7 +215,7 @@ fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option
     if deck.refinement.is_some() {
         return error("is not available with [refinement], whose points lie on grids");
     }
-    // Points of two cells that touch cannot meet below a half.
+    // Below 0.5, the points of adjacent cells cannot coincide.
     let words = "at least 0 and below 0.5";
     Ok(Some(problem::Jitter {
         share: scope.within(share, "[grid] jitter", 0.0..0.5, words)?,

@@ -1,4 +1,4 @@
-//! The commands that need no MPI launch, used as a newcomer would.
+//! The commands that need no MPI launch, in the order of a first use.
 
 use crate::support::command::{Folder, finish, fissure, succeed, text};
 use fissure::output::ResultReader;
@@ -274,7 +274,7 @@ fn the_benchmark_counts_what_it_does() {
         let figures: serde_json::Value = serde_json::from_str(json).unwrap();
         figures[name].as_f64().unwrap()
     };
-    // In a 5 × 4 × 4 block every offset (x, y, z) within 3.015 has (5 − x)(4 − y)(4 − z) bonds.
+    // In a 5 × 4 × 4 block, every offset (x, y, z) within 3.015 has (5 − |x|)(4 − |y|)(4 − |z|) bonds.
     let mut bonds = 0;
     for x in -3_i32..=3 {
         for y in -3_i32..=3 {
@@ -308,7 +308,7 @@ fn the_benchmark_counts_what_it_does() {
             let rate = figure(&json, "updates_per_second");
             let rate = rate * figure(&json, "loop_seconds_slowest");
             assert!((rate / f64::from(7 * bonds) - 1.0).abs() < 1e-9, "{json}");
-            // Three numbers of each ghost in each step; a fourth where there are states.
+            // Each step sends three numbers per ghost; a state-based law sends a fourth.
             let numbers = if law[1] == "lps" { 4.0 } else { 3.0 };
             let sent = figure(&json, "halo_bytes_per_step");
             assert_eq!(sent, 8.0 * numbers * figure(&json, "ghosts"), "{json}");
@@ -320,7 +320,7 @@ fn the_benchmark_counts_what_it_does() {
             }
         }
     }
-    // Two faces of 4 × 4 points of 8 layers.
+    // Two surface layers of 4 × 4 points touch, out of 8 layers.
     let mut command = fissure(1);
     command.args(["bench", "--points", "8,4,4", "--steps", "3", "--json"]);
     let json = succeed(command.args(["--no-limits", "--contact", "0.25"]));
@@ -354,7 +354,7 @@ fn an_output_that_is_full_is_an_error() {
         assert_eq!(run("/dev/full"), Some(1), "{command}");
         assert_eq!(run("/dev/null"), Some(0), "{command}");
     }
-    // A reader that has seen enough is no mistake.
+    // A reader that closes the pipe early is not an error.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let mut command = fissure(1)
@@ -412,7 +412,7 @@ fn too_many_points_to_make_are_counted_by_formula() {
     ] {
         assert!(text(&output).contains(words), "{words}\n{}", text(&output));
     }
-    // One rank cannot hold them.
+    // One rank cannot hold so many points.
     let output = finish(fissure(1).arg("check").arg(&deck));
     assert_eq!(output.status.code(), Some(2));
     assert!(
@@ -553,7 +553,7 @@ fn a_path_need_not_be_utf_8() {
     succeed(&mut run(&out));
     let result = out.join("result.vtkhdf");
     assert!(ResultReader::open(&result).is_ok());
-    // The HDF5 library takes no other paths.
+    // The HDF5 library accepts only UTF-8 paths.
     let moved = name(b"re\xdfult.vtkhdf");
     let refused = |command: &mut std::process::Command, words: &str| {
         let output = finish(command);
@@ -600,7 +600,7 @@ fn a_point_file_without_line_ends_is_not_read_into_memory() {
     }
 }
 
-/// The tensile test of Peridigm's examples on a bar of its own: E = 9 k G/(3 k + G) = 180 GPa, in cgs.
+/// The tensile test of Peridigm's examples, with a smaller bar: E = 9 k G/(3 k + G) = 180 GPa, in cgs units.
 const TENSILE_TEST: &str = r#"
 Peridigm:
   Discretization:
@@ -686,7 +686,7 @@ fn an_imported_tensile_test_has_youngs_modulus() {
     ] {
         assert!(printed.contains(line), "{printed}");
     }
-    // The list can be piped.
+    // The list is printed to standard output, so that it can be piped.
     let listed = String::from_utf8_lossy(&output.stdout);
     assert!(listed.contains("what became of the keys"), "{listed}");
     let new = folder.join("tensile.toml");
@@ -749,7 +749,7 @@ fn an_imported_tensile_test_has_youngs_modulus() {
         "{force:e} {reaction:e}"
     );
     let strain = (gage("upper") - gage("lower")) / 7.0;
-    // A strain of 0.1 % is not small to the last digit: its square counts in this law.
+    // At a strain of 0.1 %, terms of second order in the strain are visible.
     let modulus = value("reaction_block_3_y") / 16.0 / strain;
     let expected = 9.0 * 1.5e12 * 6.923e11 / (3.0 * 1.5e12 + 6.923e11);
     assert!(
@@ -758,7 +758,7 @@ fn an_imported_tensile_test_has_youngs_modulus() {
     );
 }
 
-/// The deck of `fissure init` in a folder.
+/// Write the deck of `fissure init` into a folder, and return its path.
 fn example(folder: &Folder) -> std::path::PathBuf {
     let deck = folder.join("plate.toml");
     succeed(fissure(1).arg("init").arg(&deck));
@@ -807,7 +807,7 @@ fn an_overlay_goes_over_the_deck() {
         assert!(explained.contains(line), "{line}: {explained}");
     }
     assert!(!explained.contains("pmb"), "{explained}");
-    // Later ones over earlier ones, and --set over all.
+    // Later overlays override earlier overlays; --set overrides all.
     let explained = explain(&[
         "--with",
         "slow.toml",
@@ -827,7 +827,7 @@ fn an_overlay_goes_over_the_deck() {
         assert!(explained.contains(line), "{line}: {explained}");
     }
 
-    // The result has the merged deck, which alone makes the same run.
+    // The result contains the merged deck, and this deck alone gives the same run.
     let out = folder.join("out");
     let run = |deck: &std::path::Path, out: &std::path::Path, options: &[&str]| {
         let mut command = fissure(1);
@@ -943,7 +943,7 @@ fn errors_in_an_overlay_name_its_line() {
         );
         assert!(!printed.contains("note: "), "{printed}");
     }
-    // The deck's own errors have its lines, however many the overlay adds before them.
+    // Errors in the deck name lines of the deck, even if an overlay adds lines before them.
     let whole = std::fs::read_to_string(&deck).unwrap();
     let wrong = whole.replace("at = [0.06, \"dx/2\"]", "at = [0.06, \"dy/2\"]");
     assert_ne!(whole, wrong);
@@ -962,7 +962,7 @@ fn errors_in_an_overlay_name_its_line() {
         "{printed}"
     );
     assert!(!printed.contains("note: "), "{printed}");
-    // What --set gives stands in no file.
+    // A value of --set is in no file.
     let printed = check(&deck, overlay, &["time.safety=4"]);
     let note = "note: lines are those of the deck as changed by --with and --set";
     assert!(

@@ -6,7 +6,7 @@ use std::process::Output;
 use crate::support::command::{Folder, finish, fissure, succeed, text};
 use fissure::output::ResultReader;
 
-/// A bar that is pulled; its right half is the set `right`.
+/// A pulled bar; its right half is the set `right`.
 const DECK: &str = "
 dimension = 'plane-stress'
 parameters = { pull = 1, end = 2e-6 }
@@ -111,7 +111,7 @@ fn a_difference_is_found_with_its_point_and_time() {
     );
     expect(&output, 1, &["kinetic_energy"]);
 
-    // Energies differ by twice as much as displacements.
+    // The relative difference of energies is twice the difference of displacements.
     expect(
         &compare(&first, &other, &["--tolerance", "0.0015"]),
         1,
@@ -159,7 +159,7 @@ fn what_only_one_result_has_is_named() {
         .replace("every_steps = 50,", "every_steps = 50, set = 'right',");
     let deck = runs.folder.write("part.toml", &text);
     let part = runs.run("part", &deck, &[]);
-    // Of the points on the right all are found by their ids, and equal.
+    // The points of the right half are matched by their ids, and are equal.
     let output = compare(&whole, &part, &[]);
     expect(
         &output,

@@ -1,5 +1,5 @@
-//! What goes wrong on one rank ends all of them, soon, with one message and the right exit code; what
-//! was written before stays readable.
+//! An error on one rank ends all ranks soon, with one message and the right exit code. Files written before
+//! stay readable.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -10,7 +10,7 @@ use crate::support::command::{
 };
 use fissure::output::ResultReader;
 
-/// A bar with the given time table; small enough to be quick, with an output at every step.
+/// Return the deck of a small bar with the given `[time]` table and an output at every step.
 fn bar(time: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -24,7 +24,7 @@ fn bar(time: &str) -> String {
     )
 }
 
-/// Runs the deck and returns exit code and output; the message must be there once.
+/// Run a command that must fail with this exit code and print the message once; return its output.
 fn failing(command: &mut Command, message: &str, code: i32) -> String {
     let output = finish(command);
     let printed = text(&output);
@@ -65,7 +65,7 @@ fn a_wrong_row_that_one_rank_reads() {
 #[test]
 fn a_value_that_is_not_finite() {
     let folder = Folder::new("nan");
-    // The history would see the energy grow before.
+    // Frequent rows of the history would detect the growth of the energy earlier.
     let text = bar("end = 400, step = 4") + "history.every_steps = 1000";
     let deck = folder.write("deck.toml", &text);
     let mut messages = Vec::new();
@@ -81,7 +81,7 @@ fn a_value_that_is_not_finite() {
                 .unwrap()
                 .to_owned(),
         );
-        // The last output shows where.
+        // The last output contains the values that are not finite.
         let reader = ResultReader::open(&out.join("result.vtkhdf")).unwrap();
         let last = reader.times().unwrap().len() - 1;
         let velocity = reader.field("velocity", last).unwrap();
@@ -94,7 +94,7 @@ fn a_value_that_is_not_finite() {
     assert_eq!(messages.len(), 1, "the same point on any number of ranks");
 }
 
-/// A run that ends because its disc is full; says so once.
+/// Run a deck until the disc is full; the run must print one error.
 fn fill(ranks: usize, deck: &Path, out: &Path) {
     let mut command = fissure(ranks);
     command.arg("run").arg(deck).arg("--output").arg(out);
@@ -115,7 +115,7 @@ fn a_full_disc() {
     for ranks in [1, 2, 3] {
         let out = disc.join(format!("out{ranks}"));
         fill(ranks, &deck, &out);
-        // Room for the whole result is made before the run, so that nothing is computed in vain.
+        // Space for the whole result is allocated before the run, so that the error comes before any step.
         assert!(!out.join("result.vtkhdf").exists());
         std::fs::remove_dir_all(&out).unwrap();
     }
@@ -173,7 +173,7 @@ fn a_killed_run_leaves_its_complete_steps() {
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        // mpirun's ranks end a moment after it.
+        // The ranks end a moment after mpirun.
         std::thread::sleep(Duration::from_secs(1));
         let reader = ResultReader::open(&result).unwrap();
         let times = reader.times().unwrap();
@@ -187,7 +187,7 @@ fn a_killed_run_leaves_its_complete_steps() {
 #[test]
 fn ranks_end_soon_after_one_of_them_or_mpirun_is_killed() {
     const RANKS: usize = 7;
-    /// Open MPI sends SIGTERM, waits a second, and sends SIGKILL; the machine may be busy.
+    /// Open MPI sends SIGTERM, waits a second, and sends SIGKILL. The limit allows for a busy machine.
     const SOON: Duration = Duration::from_secs(30);
 
     let kills: usize = std::env::var("FISSURE_KILLS").map_or(2, |text| text.parse().unwrap());
@@ -206,7 +206,7 @@ fn ranks_end_soon_after_one_of_them_or_mpirun_is_killed() {
         command.arg("--output").arg(&out).stdout(Stdio::null());
         let child = command.stderr(Stdio::piped()).spawn().unwrap();
         let begin = Instant::now();
-        // Every other pair of trials kills while MPI and the run start.
+        // Every other pair of trials sends the kill during the start of MPI and of the run.
         let is_time = || match trial % 4 {
             0 | 1 => outputs() > 3,
             _ => begin.elapsed() > Duration::from_millis(100 * (trial as u64 % 13)),
@@ -255,7 +255,7 @@ fn a_result_is_never_replaced_without_being_asked_to() {
     let first = std::fs::read(out.join("result.vtkhdf")).unwrap();
     failing(&mut run(2, &[]), "exists already; --restart", 2);
     assert_eq!(std::fs::read(out.join("result.vtkhdf")).unwrap(), first);
-    // A wrong deck is found before anything is replaced.
+    // An invalid deck is rejected before any file is replaced.
     std::fs::write(&deck, bar("end = -3")).unwrap();
     failing(
         &mut run(2, &["--overwrite"]),
@@ -283,7 +283,7 @@ fn a_launcher_of_another_mpi_does_not_run_the_deck_several_times() {
         command.envs(variables.iter().copied());
         command
     };
-    // What the launchers of MPICH and of Slurm set.
+    // Environment variables that the launchers of MPICH and Slurm set.
     for (variables, name) in [
         (&[("PMI_SIZE", "3"), ("PMI_RANK", "0")][..], "PMI_SIZE"),
         (
@@ -295,7 +295,7 @@ fn a_launcher_of_another_mpi_does_not_run_the_deck_several_times() {
         failing(&mut run(variables), &message, 2);
         assert!(!out.exists());
     }
-    // Only the first rank speaks, and ends no sooner than it has.
+    // Only the first rank prints the error, and it exits only after printing.
     let other = finish(&mut run(&[("PMI_SIZE", "3"), ("PMI_RANK", "1")]));
     assert_eq!(other.status.code(), Some(2));
     assert_eq!(text(&other), "");
@@ -356,7 +356,7 @@ fn a_load_that_loses_its_value_is_named() {
 
 #[test]
 fn energy_that_breaking_seems_to_give_hides_no_gain() {
-    // Four times the stable step tears all to dust, and bonds that are far beyond equilibrium break.
+    // With four times the stable step all bonds break, and they break far beyond equilibrium.
     let folder = Folder::new("torn");
     let deck = folder.write(
         "deck.toml",
@@ -411,7 +411,7 @@ fn a_run_that_blows_up_is_an_error_while_its_numbers_are_still_finite() {
         assert!(velocity.iter().all(|value| value.is_finite()));
     }
     assert_eq!(errors[0], errors[1]);
-    // A step that is stable, and one that is only just, are left alone.
+    // No warning for a stable step, nor for a step just below the limit.
     for share in [0.8, 0.99] {
         let output = finish(&mut run(share, 400, 1));
         let printed = text(&output);
@@ -437,7 +437,7 @@ fn a_motion_that_jumps_is_no_blow_up() {
     succeed(&mut command);
 }
 
-/// A strip at rest that is held at one end and pulled at the other.
+/// Return the deck of a strip at rest, held at one end and pulled at the other.
 fn pulled(pull: &str, more: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -453,7 +453,7 @@ fn pulled(pull: &str, more: &str) -> String {
     )
 }
 
-/// Loads and motions that set in while a body is at rest.
+/// Loads and motions that begin while the body is at rest.
 const PULLS: [&str; 6] = [
     "traction = ['1e5*step(t - 1e-4)', 0]",
     "traction = ['1e5*min(t/5e-4, 1)', 0]",
@@ -466,7 +466,7 @@ const PULLS: [&str; 6] = [
 #[test]
 fn a_load_that_sets_in_is_no_blow_up() {
     let folder = Folder::new("sets-in");
-    // With a row at every step, one sees the load before it has done any work.
+    // With a row at every step, a row contains the load before the load has done any work.
     let each = PULLS.map(|pull| (pull, "history.every_steps = 1"));
     for (k, (pull, rows)) in each.into_iter().chain([(PULLS[0], "")]).enumerate() {
         let deck = pulled(pull, &format!("time.end = 3e-4\n{rows}"));
@@ -504,7 +504,7 @@ fn a_load_that_sets_in_hides_no_blow_up() {
 #[test]
 fn families_that_do_not_fit_in_memory() {
     let folder = Folder::new("memory");
-    // A law that keeps numbers of bonds, of which a point has some thousands: they take about 1 GB.
+    // A law with a bond history and some thousands of bonds per point; the history takes about 1 GB.
     let deck = folder.write(
         "deck.toml",
         "dimension = '3d'

@@ -1,4 +1,4 @@
-//! What the command prints for other programs.
+//! Output of the commands for other programs.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -13,7 +13,7 @@ fn json(printed: &str) -> Value {
 #[test]
 fn the_schema_is_json_and_the_same_each_time() {
     let print = || {
-        // More than a pipe holds.
+        // The schema is larger than the buffer of a pipe.
         let output = fissure(1).arg("schema").output().unwrap();
         assert!(output.status.success(), "{}", text(&output));
         String::from_utf8(output.stdout).unwrap()
@@ -87,7 +87,7 @@ fn job_scripts_are_valid_for_bash() {
         let path = folder.write(name, &script);
         let output = Command::new("bash").arg("-n").arg(&path).output().unwrap();
         assert!(output.status.success(), "{name}: {}", text(&output));
-        // Outside of a job, and without arguments, it says what is missing.
+        // Outside of a job and without arguments, the script prints what is missing.
         let output = Command::new("bash")
             .arg(&path)
             .stdin(Stdio::null())
@@ -141,7 +141,7 @@ fn check_prints_figures_as_json() {
         "{bad}"
     );
 
-    // Too large for a dry run.
+    // The points are too many for a dry run.
     let printed = succeed(
         fissure(1)
             .args(["check", "--json", "--set", "dx=1e-5"])

@@ -1,4 +1,4 @@
-//! Runs started from Rust: what the command does, with and without a deck.
+//! Runs started from Rust, with and without a deck, behave as runs of the command.
 
 use std::path::Path;
 use std::time::Duration;
@@ -37,7 +37,7 @@ const PLATE: &str = "title = 'A plate built in Rust'
     history.every_steps = 50
     ";
 
-/// Notes what it is shown.
+/// Observer that records its calls.
 #[derive(Default)]
 struct Notes {
     messages: Vec<Message>,
@@ -45,7 +45,7 @@ struct Notes {
     steps: Vec<u64>,
     rows: Vec<(u64, f64, f64)>,
     complete: Option<bool>,
-    /// Displacement of a point that is pulled, m.
+    /// Displacement of a point of the pulled end, m.
     top: f64,
 }
 
@@ -124,7 +124,7 @@ fn a_plan_built_in_rust_gives_the_bits_of_its_deck() {
         notes.messages[..],
         [Message::Started, Message::SetUp { .. }, Message::Decided(_)]
     ));
-    // The top goes up, from 10 µs on at 1 m/s.
+    // The top moves up, at 1 m/s after 10 µs.
     assert!((notes.top - 2.5e-5).abs() < 1e-7, "{}", notes.top);
     assert_eq!(notes.rows[1].0, 50);
     let (number, kinetic, work) = *notes.rows.last().unwrap();
@@ -170,7 +170,7 @@ fn a_run_from_rust_that_was_stopped_goes_on() {
         "{error}"
     );
 
-    // Other intervals are no other physics.
+    // Other intervals do not change the physics.
     problem.checkpoint = fissure::problem::CheckpointRule::Simulation(Interval::Steps(100));
     let mut notes = Notes::default();
     let continued = attempt(&problem, Existing::Continue, &mut notes).unwrap();

@@ -7,7 +7,7 @@ use std::process::Output;
 
 use crate::support::command::{Folder, finish, fissure, succeed, text};
 
-/// A plate without damage that swings.
+/// A vibrating plate without damage.
 const PLATE: &str = "
 dimension = 'plane-stress'
 parameters = { pull = 1 }
@@ -56,7 +56,7 @@ fn expect(output: &Output, code: i32, words: &[&str]) {
     }
 }
 
-/// Share of the pixels of a PNG file that are white.
+/// Return the fraction of white pixels of a PNG file.
 fn white(path: &Path) -> f64 {
     let file = BufReader::new(File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
@@ -67,7 +67,7 @@ fn white(path: &Path) -> f64 {
     pixels.filter(|pixel| *pixel == [255; 3]).count() as f64 / all
 }
 
-/// Width, height and number of frames of a PNG file; a still picture has none.
+/// Return width, height and number of frames of a PNG file; 0 frames for a still picture.
 fn png(path: &Path) -> (u32, u32, u32) {
     let file = BufReader::new(File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
@@ -89,7 +89,7 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
     let folder = Folder::new("pictures");
     let out = run(&folder, "plate", PLATE, &[]);
     let plot = |options: &[&str]| command("plot", &[&out], options);
-    // The result has no damage.
+    // The result has no field `damage`, so the stress is drawn.
     expect(
         &plot(&[]),
         0,
@@ -107,7 +107,7 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
         &["velocity, magnitude"],
     );
     assert_eq!(png(&out.join("velocity.png")).0, 401);
-    // The cells of the points fill the plate.
+    // Each point is drawn as its cell, so that the plate has no gaps.
     assert!(white(&out.join("stress.png")) < 0.6);
     for (options, words) in [
         (
@@ -173,7 +173,7 @@ fn curves_of_histories() {
         "-o",
         runs.to_str().unwrap(),
     ];
-    // A folder, and a result that holds the history as well.
+    // A folder, and the path of a result, which also contains the history.
     let second = two.join("result.vtkhdf");
     expect(
         &command("plot", &[&one, &second], &options),
@@ -327,7 +327,7 @@ fn scattered_points_are_cells_without_gaps_and_holes_stay_open() {
         expect(&command("plot", &[&out], &options), 0, &[]);
         white(&picture)
     };
-    // A sixth of the plate, which takes about half of the picture.
+    // The hole is a sixth of the plate, and the plate takes about half of the picture.
     assert!(with_hole - scattered > 0.05, "{with_hole} {scattered}");
 }
 
@@ -343,7 +343,8 @@ time = { end = 2e-6, method = 'static', static.load_steps = 1 }
 output = { every_steps = 1, fields = ['displacement', 'velocity'] }
 ";
 
-/// Equilibria have no velocity, so the displacement is drawn; where points move, the velocity is.
+/// Equilibria have no velocity, so the default picture of an equilibrium shows the displacement. The default
+/// for moving points is the velocity.
 #[test]
 fn equilibria_show_their_displacement() {
     let folder = Folder::new("equilibria");

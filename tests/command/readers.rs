@@ -1,4 +1,4 @@
-//! The result as other programs see it: VTK's own reader and h5py find the same numbers.
+//! Results in other programs: the reader of VTK and h5py return the same values.
 
 use std::process::Command;
 
@@ -123,7 +123,7 @@ fn a_result_of_some_points_in_single_precision() {
         assert!(side_car.contains(r#"NumberType="Float" Precision="4""#));
         assert_eq!(side_car.matches("<Time").count(), 5);
     }
-    // Other points or other numbers are not mixed with those that are there.
+    // Other points or another precision are not appended to an existing file.
     for (other, told) in [
         ("", "points"),
         (", set = 'strip'", "numbers of another length"),

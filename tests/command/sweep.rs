@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::command::{Folder, finish, fissure, succeed, text, wait};
 
-/// A plate that expands: its energy is proportional to the square of the speed.
+/// An expanding plate, whose energy is proportional to the square of the speed.
 const DECK: &str = "
 dimension = 'plane-stress'
 parameters = { dx = 1e-3, speed = 1 }
@@ -30,7 +30,7 @@ impl Sweep {
         Self { folder }
     }
 
-    /// The command in the folder of the deck.
+    /// Return the command `sweep` in the folder of the deck.
     fn command(&self, options: &[&str]) -> Command {
         let mut command = fissure(1);
         command.current_dir(&self.folder.0);
@@ -44,7 +44,7 @@ impl Sweep {
         expect(&output, code, words);
     }
 
-    /// Columns of a table, without units.
+    /// Read the columns of a table; names are without units.
     fn table(&self, name: &str) -> Vec<(String, Vec<String>)> {
         let text = std::fs::read_to_string(self.folder.join(name)).unwrap();
         let mut rows = text.lines().map(|row| row.split(','));
@@ -107,7 +107,7 @@ fn combinations_are_run_and_tabled() {
     assert_eq!(column(&table, "speed"), ["1", "1", "2", "2"]);
     assert_eq!(column(&table, "dx"), ["2e-3", "1e-3", "2e-3", "1e-3"]);
     assert_eq!(column(&table, "state"), ["complete"; 4]);
-    // Each value is that of the run's history.
+    // Each value equals the value of the run's history.
     let energies = numbers(column(&table, "max_kinetic_energy"));
     for (row, name) in ["speed=1,dx=2e-3", "speed=2,dx=1e-3"].iter().enumerate() {
         let history = sweep.table(&format!("here/{name}/history.csv"));
@@ -123,7 +123,7 @@ fn combinations_are_run_and_tabled() {
     assert_eq!(numbers(column(&table, "last_broken_bonds")), [0.0; 4]);
     assert!(sweep.folder.join("here/max_kinetic_energy.png").exists());
 
-    // The same command runs nothing; another value of a name runs what is missing.
+    // The same command runs nothing. Another value of a parameter runs only the missing runs.
     let history = sweep.folder.join("here/speed=1,dx=1e-3/history.csv");
     let before = modified(&history);
     let printed = succeed(&mut sweep.command(&options));
@@ -167,7 +167,7 @@ fn rates_and_errors_follow_from_a_reference() {
         "--value",
         "first:kinetic_energy",
     ];
-    // A speed is no resolution: only --x asks for its rate.
+    // The speed is not a resolution, so its rate is computed only with --x.
     succeed(&mut sweep.command(&options));
     let table = sweep.table("out/plate_sweep/sweep.csv");
     assert!(
@@ -401,7 +401,7 @@ fn a_signal_stops_the_runs_and_the_same_command_continues() {
     while rows() < 3 {
         std::thread::sleep(Duration::from_millis(20));
     }
-    // SAFETY: sends a signal to a child that has not been waited for.
+    // SAFETY: the child has not been waited for, so its process id is still valid.
     unsafe {
         libc::kill(child.id() as i32, libc::SIGTERM);
     }

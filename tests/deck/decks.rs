@@ -1,9 +1,9 @@
-//! Decks: wrong ones get the message that stands beside their mistake, right ones run and can be
-//! written out, and no text makes the reader panic.
+//! Decks: each bad deck gives the message written beside its mistake, good decks run and can be written out,
+//! and no text makes the reader panic.
 //!
-//! In a wrong deck the line below the mistake repeats what the error shows: carets below what is
-//! marked, then the message. Where the error stands elsewhere (at the end of the deck, in a point
-//! file, nowhere), a line that starts with `#!` has the whole first line of the error.
+//! In a bad deck, the line below the mistake repeats the marks of the error: carets below the marked text,
+//! then the message. If the error points elsewhere (the end of the deck, a point file, no file), a line that
+//! starts with `#!` has the whole first line of the error.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use fissure::survey::dry_run;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
-/// The decks of a folder, in the order of their names.
+/// Return the decks of a folder, sorted by name.
 pub fn decks(folder: &str) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
     let mut paths: Vec<PathBuf> = entries
@@ -27,7 +27,7 @@ pub fn decks(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// All decks that are right.
+/// Return all valid decks.
 fn right_decks() -> Vec<Source> {
     let paths = [decks("tests/decks/good"), decks("inputs")].concat();
     let mut sources: Vec<Source> = paths
@@ -38,7 +38,8 @@ fn right_decks() -> Vec<Source> {
     sources
 }
 
-/// Number of points, and first step (s) and number of steps of each stage, of the run that a deck makes.
+/// Prepare the run of a deck. Return the number of points, and for each stage the first step (s) and the
+/// number of steps.
 pub fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
     let deck = Deck::new(source.clone())?;
     let problem = deck.problem()?;
@@ -47,7 +48,7 @@ pub fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
     Ok((look.points, look.steps))
 }
 
-/// What a wrong deck says its error must be.
+/// Return the expected error of a bad deck, read from its comments.
 fn expected(path: &Path, text: &str) -> String {
     let mut before = "";
     for (line, number) in text.lines().zip(0..) {
@@ -118,7 +119,7 @@ fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
     }
 }
 
-/// One change of a deck's text; places are shares of the text.
+/// A random change of a deck's text; positions are fractions of the text.
 #[derive(Debug, Clone)]
 enum Change {
     DeleteLine(Index),
@@ -129,15 +130,15 @@ enum Change {
     Insert(Index, String),
 }
 
-/// What a token is replaced by.
+/// The replacement of a token.
 #[derive(Debug, Clone)]
 enum Token {
-    /// Another token of the deck.
+    /// A copy of another token of the deck.
     Other(Index),
     Text(String),
 }
 
-/// LaneTuple at the borders of what numbers can be, and openings of everything.
+/// Numbers at the limits of their types, and opening delimiters.
 const ODD: &[&str] = &[
     "0",
     "-1",
@@ -221,7 +222,7 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
-/// The byte ranges of words, numbers and single symbols.
+/// Return the byte ranges of words, numbers and single symbols.
 fn tokens(text: &str) -> Vec<std::ops::Range<usize>> {
     let is_word = |c: char| c.is_alphanumeric() || "_-+.".contains(c);
     let mut tokens: Vec<std::ops::Range<usize>> = Vec::new();
@@ -276,7 +277,7 @@ fn apply(text: &mut String, change: &Change) {
     *text = lines.join("\n");
 }
 
-/// A place between two characters.
+/// Return a position between two characters.
 fn border(text: &str, at: &Index) -> usize {
     text.floor_char_boundary(at.index(text.len() + 1))
 }
@@ -296,7 +297,7 @@ proptest! {
         let explained = deck::explain(&source);
         match deck::parse(&source) {
             Err(error) => {
-                // Rows of a table are wrong in its file.
+                // Errors in the rows of a table name the file of the table.
                 let files = [source.path.clone(), source.path.with_file_name("pull.csv")];
                 let places = files.map(|file| format!("{}:", file.display()));
                 let mut messages = places.iter().map(|place| error.message.strip_prefix(place));
@@ -337,7 +338,7 @@ fn defaults_are_the_accurate_ones() {
     assert_eq!(problem.volume_correction, VolumeCorrection::Exact);
     assert_eq!(problem.bodies[0].damage.as_ref().unwrap().alpha, 0.0);
     assert!(full.contains("volume_correction = \"exact\""), "{full}");
-    // Points that are no centres of cells have no cells to share.
+    // Without a point at the centre of each square cell, the default is no volume correction.
     for (grid, body) in [
         ("spacing = [1e-3, 2e-3], horizon = 6e-3", shape),
         (
@@ -352,8 +353,8 @@ fn defaults_are_the_accurate_ones() {
     }
 }
 
-/// Number of points of each body, the places of all points (m), and whether all bonds are those of one lattice, of a deck in
-/// the plane with cells of 0.1 m.
+/// Build a plane deck with cells of 0.1 m. Return the number of points of each body, the positions of all
+/// points (m), and whether one lattice stores all bonds.
 fn filled(grid: &str, bodies: &str) -> (Vec<usize>, Vec<[f64; 3]>, bool) {
     let text = format!(
         "dimension = 'plane-stress'
@@ -402,10 +403,10 @@ fn a_body_of_whole_cells_is_filled_exactly() {
             .iter()
             .any(|place| place.iter().all(|x| x.abs() < 1e-12))
     );
-    // As before where an origin is given: points on all borders count.
+    // With a given origin, points on all borders of the shape are included.
     assert_eq!(filled(", origin = [0, 0]", &centred).0, [24]);
 
-    // From 0 on, where that fits.
+    // Cells start from 0 if this fits the body.
     let (counts, places, _) = filled(
         "",
         &body("a", "box = { lower = [-0.3, 0.1], upper = [0.3, 0.4] }"),
@@ -418,14 +419,15 @@ fn a_body_of_whole_cells_is_filled_exactly() {
         }
     }
 
-    // One grid for all bodies with the same cells: that of the first one whose faces are whole cells apart.
+    // Bodies with the same cells share a grid. The first body that is a whole number of cells long sets its
+    // origin.
     let disc = body("disc", "disc = { centre = [-0.6, 0], radius = 0.25 }");
     let other = body("b", "box = { lower = [0.25, -0.15], upper = [0.65, 0.15] }");
     let (counts, _, is_lattice) = filled("", &(disc + &centred + &other));
     assert_eq!(counts[1..], [15, 12]);
     assert!(is_lattice);
 
-    // Each other size of cells has its own.
+    // Bodies with cells of another size have another origin.
     let coarse = "body.b = { material = 'glass', spacing = 0.15, shape.box = { lower = [0.25, -0.15], upper = [0.7, 0.15] } }";
     assert_eq!(filled("", &(centred + coarse)).0, [15, 6]);
 

@@ -1,4 +1,5 @@
-//! Decks of other codes: what their numbers become, what is left out, wrong ones, and mutants.
+//! Import of decks of other codes: translated values, keys that are left out, invalid decks, and mutated
+//! decks.
 
 use std::path::PathBuf;
 
@@ -12,7 +13,7 @@ use fissure::survey::dry_run;
 
 use crate::support::{displace, force};
 
-/// A folder of its own, which is removed in the end.
+/// A temporary folder, removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -35,7 +36,7 @@ impl Folder {
         imported.map_err(|error| error.message.replace(&place, ""))
     }
 
-    /// The problem of a new deck of this folder.
+    /// Return the problem of an imported deck in this folder.
     fn problem(&self, imported: &Import) -> Problem {
         assert!(
             imported.fault.is_none(),
@@ -54,7 +55,7 @@ impl Drop for Folder {
     }
 }
 
-/// The fate of a key and its note.
+/// Return the fate of a key and its note.
 fn fate<'a>(imported: &'a Import, key: &str) -> (Fate, &'a str) {
     let entry = imported.entries.iter().find(|entry| entry.key == key);
     let entry = entry.unwrap_or_else(|| panic!("no {key} in {:#?}", imported.entries));
@@ -66,7 +67,7 @@ fn with<const D: usize, T>(problem: &Problem, body: impl FnOnce(Simulation<D>) -
     body(Simulation::new(problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Two points that move towards one another.
+/// Two points that move towards each other.
 const TWO_POINTS: &str = r#"
 Peridigm:
   Discretization:
@@ -126,7 +127,8 @@ Peridigm:
       Radius: true
 "#;
 
-/// Peridigm's two points: one bond of the solid has the force state of its dilatation and deviatoric extension.
+/// Two points with one bond of Peridigm's ordinary solid: the force state follows from dilatation and
+/// deviatoric extension.
 #[test]
 fn two_points_of_peridigm_oscillate() {
     let folder = Folder::new("two-points");
@@ -146,7 +148,7 @@ fn two_points_of_peridigm_oscillate() {
         let u = &simulation.fields.displacement[0];
         u[1] - u[0]
     });
-    // Amplitudes are so small that the bond is linear; the step is 1/115 of a period.
+    // At these small amplitudes the bond is linear. The step is 1/115 of a period.
     assert!(
         (found - expected).abs() < 2e-3 / frequency,
         "{found} {expected}"
@@ -191,7 +193,7 @@ fn two_points_of_peridigm_oscillate() {
     assert_eq!(listed, values, "{}", imported.text);
 }
 
-/// A bar of points with two pre-cracks, given by a text file.
+/// A bar with two pre-cracks; its points come from a text file.
 const BAR: &str = r#"<ParameterList>
   <ParameterList name="Discretization">
     <Parameter name="Type" type="string" value="Text File"/>
@@ -268,7 +270,7 @@ const BAR: &str = r#"<ParameterList>
 </ParameterList>
 "#;
 
-/// A file of Peridigm without header: 4 × 2 × 2 points of two blocks.
+/// Return a point file of Peridigm without a header: 4 × 2 × 2 points in two blocks.
 fn bar_points() -> String {
     let mut text = "# x y z block volume\n".to_owned();
     for index in 0..16 {
@@ -301,7 +303,8 @@ fn an_xml_deck_of_peridigm_has_its_points_and_sets_from_files() {
     ] {
         assert!(imported.text.contains(line), "{line}\n{}", imported.text);
     }
-    // A correspondence law breaks by energy: s0² δ (3 G + (3/4)⁴ (k − 5 G/3)), with k = 5 G/3 for ν = 1/4.
+    // Bonds of a correspondence law break by work. Fracture energy: s0² δ (3 G + (3/4)⁴ (k − 5 G/3)), with k
+    // = 5 G/3 for ν = 1/4.
     let energy = 0.01_f64.powi(2) * 2.1 * 3.0 * 0.8e12;
     let written = imported
         .text
@@ -395,7 +398,7 @@ PeriLab:
         Temperature: True
 "#;
 
-/// PeriLab has a Poisson's ratio of 1/3 in plane strain too, so a bulk modulus is Young's modulus.
+/// PeriLab uses a Poisson's ratio of 1/3 in plane strain too, so the bulk modulus equals Young's modulus.
 #[test]
 fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
     let folder = Folder::new("bulk");
@@ -425,7 +428,7 @@ fn a_bond_of_perilab_has_its_micromodulus() {
     let imported = folder.import("strip.yaml", STRIP).unwrap();
     assert_eq!(imported.code, Code::PeriLab);
     let problem = folder.problem(&imported);
-    // c = 9 E/(π δ³ h) and the force density c s V of the one bond.
+    // Force density c s V of the only bond, with c = 9 E/(π δ³ h).
     let stretch = 1e-6;
     let expected = 9.0 * 7e4 / (std::f64::consts::PI * 1.2_f64.powi(3)) * stretch * 0.5;
     with::<2, _>(&problem, |mut simulation| {
@@ -455,7 +458,7 @@ fn a_bond_of_perilab_has_its_micromodulus() {
     );
     assert_eq!(key("Models > Thermal Models"), Fate::LeftOut);
     assert_eq!(key("Boundary Conditions > Warm"), Fate::LeftOut);
-    // A table that is left out is one line.
+    // A table that is left out has one line in the list.
     let mut keys = imported.entries.iter().map(|entry| entry.key.as_str());
     assert!(!keys.any(|key| key.contains("Warm > ") || key.contains("Heat")));
     assert_eq!(
@@ -468,7 +471,7 @@ fn a_bond_of_perilab_has_its_micromodulus() {
     );
 }
 
-/// A disc of LAMMPS that a sphere hits.
+/// Impact of a sphere on a disc, in LAMMPS.
 const DISC: &str = "# a disc
 units           si
 boundary        s s s
@@ -499,7 +502,8 @@ fix             3 all deform 1 x scale 2
 run             200
 ";
 
-/// The lattice of LAMMPS's example: its log counts 3487 atoms and 335 966 bonds, each at both ends.
+/// The lattice of the LAMMPS example. The log of LAMMPS counts 3487 atoms and 335 966 bonds, each at both
+/// ends.
 #[test]
 fn a_lattice_of_lammps_has_its_atoms_and_bonds() {
     let folder = Folder::new("disc");
@@ -529,8 +533,8 @@ fn a_lattice_of_lammps_has_its_atoms_and_bonds() {
 #[test]
 fn a_bond_of_lammps_has_its_force() {
     let folder = Folder::new("pair");
-    // A bond of length 2; the volume of a neighbour is scaled by 1 + (δ − 1 − 2)/2 where it is within half a spacing of the
-    // horizon δ (`vfrac_scale` of `pair_peri_pmb`).
+    // A bond of length 2. If the neighbour is within half a spacing of the horizon δ, its volume has the
+    // factor 1 + (δ − 1 − 2)/2 (`vfrac_scale` of `pair_peri_pmb`).
     for (horizon, share) in [(3.5, 1.0), (2.5, 0.75)] {
         let pair = format!(
             "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 0 0 0\ncreate_box 1 r\n\
@@ -549,7 +553,8 @@ fn a_bond_of_lammps_has_its_force() {
     }
 }
 
-/// `lps` and `ves` have the influence function 1/|ξ|; the plastic law here has no other one than 1, and the log says so.
+/// `lps` and `ves` have the influence function 1/|ξ|. The plastic law of Fissure has only the influence
+/// function 1, and the log says so.
 #[test]
 fn state_based_laws_of_lammps_have_their_influence_function() {
     let folder = Folder::new("influence");
@@ -577,7 +582,7 @@ fn state_based_laws_of_lammps_have_their_influence_function() {
     }
 }
 
-/// A deck of Peridigm with two blocks of a text file.
+/// Return a deck of Peridigm with two blocks from a text file and these interactions.
 fn with_contact(interactions: &str) -> String {
     BAR.replacen(
         "</ParameterList>\n  <ParameterList name=\"Solver1\">",
@@ -601,7 +606,8 @@ fn with_contact(interactions: &str) -> String {
     )
 }
 
-/// General contact acts between different blocks only; equilibria with contact are found by relaxation.
+/// General contact acts between different blocks only. With contact, a quasi-static solver becomes a
+/// relaxation.
 #[test]
 fn general_contact_of_peridigm_leaves_a_block_alone() {
     let folder = Folder::new("general-contact");
@@ -638,7 +644,7 @@ fn general_contact_of_peridigm_leaves_a_block_alone() {
     );
 }
 
-/// A bottom unit vector of 45° to the plane is turned into it, and both lengths grow by √2.
+/// A bottom unit vector at 45° to the plane is projected onto the plane, and both lengths grow by √2.
 #[test]
 fn a_slanted_bond_filter_cuts_as_in_peridigm() {
     let folder = Folder::new("slanted");
@@ -675,7 +681,7 @@ fn a_slanted_bond_filter_cuts_as_in_peridigm() {
             .all(|(f, e)| (f - e).abs() < 1e-12);
         assert!(near, "{found:?} {expected:?}");
     }
-    // Along the normal, no direction is left.
+    // A vector along the normal has no projection.
     let text = text.replacen(
         "Bottom_Unit_Vector_Y\" type=\"double\" value=\"1.0\"",
         "Bottom_Unit_Vector_Y\" type=\"double\" value=\"0.0\"",
@@ -685,7 +691,7 @@ fn a_slanted_bond_filter_cuts_as_in_peridigm() {
     assert!(!imported.text.contains("[crack."));
 }
 
-/// Prescribed temperatures of Peridigm: materials expand from those at the start.
+/// Prescribed temperatures of Peridigm: materials expand relative to the initial temperature.
 #[test]
 fn temperatures_of_peridigm_count_from_the_start() {
     let folder = Folder::new("warm");
@@ -719,12 +725,12 @@ fn temperatures_of_peridigm_count_from_the_start() {
         assert!(plain.contains(line), "{line}\n{}", imported.text);
     }
     assert!(imported.losses().is_empty());
-    // Where they differ at the start, each counts from its own.
+    // If initial temperatures differ, each point expands relative to its own initial temperature.
     let imported = warm(expands, &["x*t + 5*x"]);
     folder.problem(&imported);
     assert!(!imported.text.contains("reference_temperature"));
     assert!(imported.text.contains(") - ("), "{}", imported.text);
-    // Without expansion they do nothing.
+    // Without thermal expansion, temperatures have no effect.
     let imported = warm("", &["20*t"]);
     folder.problem(&imported);
     assert!(!imported.text.contains("temperature = "));
@@ -736,7 +742,7 @@ fn temperatures_of_peridigm_count_from_the_start() {
     );
 }
 
-/// Materials of PeriLab expand where the solver says so.
+/// Materials of PeriLab expand if the solver enables thermal models.
 #[test]
 fn materials_of_perilab_expand() {
     let folder = Folder::new("expansion");
@@ -776,7 +782,7 @@ fn materials_of_perilab_expand() {
     }
 }
 
-/// Steps of PeriLab: conditions of two steps, and what one step has and the other does not.
+/// Steps of PeriLab: conditions of two steps, and settings that only one step has.
 #[test]
 fn steps_of_perilab_share_damping_and_damage() {
     let folder = Folder::new("steps");
@@ -869,7 +875,8 @@ fn a_damage_model_without_a_counterpart_is_a_loss() {
     assert!(imported.losses().conditions.is_empty());
 }
 
-/// Computed quantities of Peridigm in front of the solver, and a second output with columns of the history only.
+/// Return a deck of Peridigm with computed quantities, and a second output that only has columns of the
+/// history.
 fn with_quantities(quantities: &str, variables: &str) -> String {
     let tables = format!("  Compute Class Parameters:\n{quantities}  Solver:\n");
     let output = format!(
@@ -1037,7 +1044,7 @@ fn computed_quantities_of_peridigm_are_columns_of_the_history() {
         assert_eq!(found, expected, "{name}: {text}");
         assert!(text.contains(note), "{name}: {text}");
     }
-    // A quantity is one line, and the interval of its output is that of the history.
+    // A quantity has one line in the list. The interval of its output becomes the interval of the history.
     let mut keys = imported.entries.iter().map(|entry| entry.key.as_str());
     assert!(!keys.any(|key| key.contains("Fastest > ")));
     assert!(
@@ -1057,7 +1064,8 @@ fn computed_quantities_of_peridigm_are_columns_of_the_history() {
     );
 }
 
-/// The sum of the forces on a supported set is a reaction too, and the values of the history are those of the fields.
+/// The sum of the forces on a supported set is also a reaction, and the values of the history equal those of
+/// the fields.
 #[test]
 fn sums_of_forces_are_opposite_to_reactions() {
     let folder = Folder::new("forces");
@@ -1202,7 +1210,7 @@ fn correspondence_has_no_influence_function() {
     assert_eq!(fate(&import("1.0/zeta", "Elastic"), key).0, Fate::Taken);
 }
 
-/// A comment stands in place of a load that is left out; a damage model without a block is no loss.
+/// A comment replaces a load that is left out. A damage model without a block is not a loss.
 #[test]
 fn what_is_left_out_has_a_comment_and_what_is_unused_no_warning() {
     let folder = Folder::new("left-out");
@@ -1244,7 +1252,7 @@ fn what_is_left_out_has_a_comment_and_what_is_unused_no_warning() {
     );
 }
 
-/// Twelve points of LAMMPS, of which the four with x = 2 are the group `top`.
+/// Twelve points of LAMMPS; the four points with x = 2 are the group `top`.
 const BLOCK: &str = "atom_style peri
 lattice sc 1.0
 region r block 0 2 0 1 0 1
@@ -1258,13 +1266,13 @@ set type 1 density 5
 timestep 1e-6
 ";
 
-/// The import of the block with further commands.
+/// Import the block with further commands.
 fn block(folder: &Folder, commands: &str) -> Import {
     let imported = folder.import("in.block", &format!("{BLOCK}{commands}"));
     imported.unwrap_or_else(|error| panic!("{commands}{error}"))
 }
 
-/// The lines of a new deck without comments.
+/// Return the lines of an imported deck without comments.
 fn lines(imported: &Import) -> Vec<&str> {
     let lines = imported.text.lines();
     lines.filter(|line| !line.starts_with('#')).collect()
@@ -1312,7 +1320,7 @@ create_atoms 1 region high
         let note = "changes after the first `run` are not followed";
         assert_eq!((entry.fate, &*entry.note), (Fate::LeftOut, note), "{entry}");
     }
-    // Each run has the step in force.
+    // Each run uses the time step set last.
     let whole = block(&folder, &format!("{before}{changes}run v_v\nrun 3\n"));
     let expected = lines(&first).into_iter().map(|line| match line {
         "end = 1e-5" => "end = 3e-5",
@@ -1493,7 +1501,7 @@ fn a_wrong_deck_names_file_and_line() {
     }
 }
 
-/// Every mutant of a deck is a deck or an error with its place, and never a panic.
+/// Every mutated deck is imported or gives an error with its location; none causes a panic.
 #[test]
 fn mutants_are_decks_or_errors() {
     let folder = Folder::new("mutants");

@@ -1,4 +1,4 @@
-//! Meshes of other programs: every type of element, encoding and set; damaged files; a run on several ranks.
+//! Meshes of other programs: all element types, encodings and sets; damaged files; a run on several ranks.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use fissure::problem::Problem;
 use crate::support::problem;
 use crate::support::recorded::record;
 
-/// A folder of its own, which is removed in the end.
+/// A temporary folder, removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -40,7 +40,7 @@ fn parse(name: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh, String> {
     mesh::parse(format, path, bytes.as_ref()).map_err(|error| error.message)
 }
 
-/// Positions, volumes and blocks of the points of a problem.
+/// Return positions, volumes and blocks of the points of a problem.
 fn points(problem: &Problem) -> Vec<([f64; 3], f64, u32)> {
     let comm = threads::alone();
     let (points, _) = generate(problem, &comm).unwrap_or_else(|error| panic!("{error}"));
@@ -50,7 +50,7 @@ fn points(problem: &Problem) -> Vec<([f64; 3], f64, u32)> {
         .collect()
 }
 
-/// Assert that points lie at some places, within rounding, and have the volume 1.
+/// Assert that points lie at these centres, up to rounding, and have the volume 1.
 fn assert_unit_cubes(found: &[([f64; 3], f64, u32)], centres: &[[f64; 3]]) {
     assert_eq!(found.len(), centres.len());
     for ((position, volume, _), centre) in found.iter().zip(centres) {
@@ -62,7 +62,7 @@ fn assert_unit_cubes(found: &[([f64; 3], f64, u32)], centres: &[[f64; 3]]) {
     }
 }
 
-/// A deck with a solid of the mesh and the sets of some groups.
+/// Return the problem of a solid from a mesh, with sets from these groups.
 fn solid(mesh: &Path, sets: &[&str]) -> Problem {
     let sets: String = sets
         .iter()
@@ -75,14 +75,15 @@ fn solid(mesh: &Path, sets: &[&str]) -> Problem {
     ))
 }
 
-/// Ids of the points of a set, of those from 0 to 99.
+/// Return the ids from 0 to 99 that belong to a set.
 fn ids(problem: &Problem, set: &str) -> Vec<u64> {
     let set = problem.sets.iter().find(|own| own.name == set).unwrap();
     let is_member = |id: &u64| fissure::points::set::contains(set, 1.0, *id, [0.0; 3], 0);
     (0..100).filter(is_member).collect()
 }
 
-/// A mesh to be written: elements are a type of Gmsh, a physical tag, the tag of the entity, and nodes from 1.
+/// A mesh to write. An element has a Gmsh type, a physical tag, the tag of its entity, and nodes counted from
+/// 1.
 #[derive(Clone, Default)]
 struct Written {
     nodes: Vec<[f64; 3]>,
@@ -99,10 +100,10 @@ fn dimension(kind: i32) -> i32 {
     }
 }
 
-/// Numbers as text or as bytes.
+/// Writer of numbers as text or as bytes.
 struct Numbers {
     bytes: Vec<u8>,
-    /// `None` for text.
+    /// Byte order; `None` for text.
     is_big: Option<bool>,
 }
 
@@ -242,7 +243,7 @@ impl Written {
         }
         out.line("\n$EndEntities\n$Nodes");
         let count = self.nodes.len();
-        // The nodes in two blocks, the first with parameters.
+        // Write the nodes in two blocks, the first with parametric coordinates.
         [2, count, 1, count]
             .into_iter()
             .for_each(|size| out.size(size));
@@ -278,7 +279,7 @@ impl Written {
         out.bytes
     }
 
-    /// Both versions, as text and in both orders of bytes.
+    /// Return the file in both versions, as text and in both byte orders.
     fn all(&self) -> Vec<(&'static str, Vec<u8>)> {
         vec![
             ("2.2", self.version_2(None)),
@@ -303,8 +304,8 @@ const CUBE: [[f64; 3]; 8] = [
     [0.0, 1.0, 1.0],
 ];
 
-/// The cube in hexahedra, tetrahedra, wedges or pyramids, each with another corner that moves inwards, so that
-/// elements of one type differ.
+/// Return the cube divided into hexahedra, tetrahedra, wedges or pyramids. In each mesh another corner is
+/// moved inwards, so that elements of one type differ.
 fn cubes() -> Vec<(&'static str, Written)> {
     let elements = |kind: i32, all: &[&[usize]]| {
         let element = |nodes: &&[usize]| (kind, 1, 1, nodes.to_vec());
@@ -372,7 +373,7 @@ fn a_cube_in_any_elements_has_its_volume_and_centre_in_any_encoding() {
     }
 }
 
-/// Nodes of Gmsh's second-order elements after the corners, as its manual draws them: pairs of corners, or faces.
+/// Second-order elements of Gmsh: type, nodes in the order of Gmsh's manual, and volume.
 const SECOND_ORDER: [(i32, &[[f64; 3]], f64); 7] = [
     (
         11,
@@ -540,7 +541,8 @@ fn second_order_elements_have_the_order_of_gmsh() {
     let folder = Folder::new("second-order");
     for (kind, nodes, volume) in SECOND_ORDER {
         let mut written = Written::default();
-        // Bent by a shear, which keeps the volume, so that a node out of order would be seen.
+        // Deform the element by a shear that keeps the volume; with a wrong order of nodes the volume would
+        // change.
         let bend = |[x, y, z]: [f64; 3]| [x + 0.2 * y * y, y, z];
         let nodes: Vec<[f64; 3]> = nodes.iter().map(|node| bend(*node)).collect();
         written.add_nodes(&nodes);
@@ -611,7 +613,8 @@ fn plane_elements_have_an_area_times_the_thickness_from_either_side() {
     }
 }
 
-/// Two cubes side by side along x, with a face between, a face at x = 0, an edge and a corner.
+/// Return two cubes side by side along x, with the face between them, the face at x = 0, an edge and a corner
+/// as elements.
 fn two_cubes() -> Written {
     let mut written = Written::default();
     written.add_nodes(&CUBE);
@@ -824,7 +827,7 @@ fn files_of_abaqus_include_others() {
     );
     let found = points(&solid(&path, &[]));
     assert!((found[0].1 - 1.0 / 6.0).abs() < 1e-16);
-    // The error of an element names the file that it stands in.
+    // The error of an element names the file that contains the element.
     folder.write("elements.inc", "*ELEMENT, TYPE=C3D4\n7, 1, 3, 2, 4\n");
     let comm = threads::alone();
     let error = generate(&solid(&path, &[]), &comm).unwrap_err().message;
@@ -940,7 +943,7 @@ fn damaged_lines_of_abaqus_have_their_message() {
     }
 }
 
-/// Numbers that look random; xorshift.
+/// Pseudo-random numbers (xorshift).
 struct Random(u64);
 
 impl Random {
@@ -952,7 +955,7 @@ impl Random {
     }
 }
 
-/// A copy with a few changes: bytes, cuts, repeats and numbers at the borders.
+/// Return a copy with a few random changes: bytes, cuts, repeats and extreme numbers.
 fn mutant(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut changed = bytes.to_vec();
     for _ in 0..=random.below(4) {
@@ -992,8 +995,8 @@ fn mutant(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     changed
 }
 
-/// Read `FISSURE_MUTANTS` mutants of a file, or some thousands: each is a mesh or an error, and what is read is
-/// not larger than what was there.
+/// Read `FISSURE_MUTANTS` mutants of a file, 2000 by default. Each is a mesh or an error, and a mesh is not
+/// larger than its file.
 fn survives_mutants(name: &str, bytes: &[u8], seed: u64) {
     let mutants = std::env::var("FISSURE_MUTANTS").map_or(2000, |count| count.parse().unwrap());
     let mut random = Random(seed);
@@ -1036,9 +1039,9 @@ fn a_plate_of_a_mesh_has_equal_bits_on_two_ranks() {
     let first = problem();
     let alone = record(&first, 1, 1);
     assert_eq!(record(&problem(), 2, 1).datasets, alone.datasets);
-    // Again with the points of an earlier run.
+    // Use the points of an earlier run again.
     assert_eq!(record(&first, 3, 1).datasets, alone.datasets);
-    // The square without the polygon of 48 sides that is its hole.
+    // The area is the square minus a regular polygon of 48 sides, the hole.
     let hole = 0.5 * 48.0 * 64.0 * (std::f64::consts::TAU / 48.0).sin();
     let expected = (1600.0 - hole) * 1e-9;
     let volume: f64 = points(&first).iter().map(|(_, volume, _)| volume).sum();
@@ -1062,7 +1065,7 @@ fn the_page_on_meshes_has_the_deck_that_is_tested() {
     assert_eq!(deck, code);
 }
 
-/// The two cubes of [`two_cubes`] as an unstructured grid, with the ways to write arrays.
+/// Encodings of the arrays in a VTK file of the two cubes of [`two_cubes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Arrays {
     Text,
@@ -1121,7 +1124,7 @@ fn unstructured(arrays: Arrays) -> Vec<u8> {
             }
             Arrays::AppendedCompressed => {
                 let offset = appended.len();
-                // Two blocks, the second one shorter.
+                // Compress the array in two blocks; the second block is shorter.
                 let size = bytes.len() / 2 + 1;
                 let blocks: Vec<Vec<u8>> = bytes.chunks(size).map(zlib).collect();
                 let last = bytes.len() - size * (blocks.len() - 1);
@@ -1215,7 +1218,7 @@ fn an_unstructured_grid_is_read_in_any_encoding() {
 
 #[test]
 fn an_array_of_many_values_in_all_pieces_has_no_groups() {
-    // A piece of vertices with the values of a range.
+    // A piece of a VTK file: vertices with the values of a range.
     let piece = |values: std::ops::Range<usize>| {
         let count = values.len();
         let join = |numbers: Vec<usize>| {
@@ -1345,7 +1348,7 @@ struct Exodus {
     texts: Vec<(&'static str, Vec<&'static str>)>,
 }
 
-/// Characters of a name.
+/// Length of a name in the file, characters.
 const NAME: usize = 33;
 
 fn exodus() -> Exodus {
@@ -1383,7 +1386,7 @@ fn exodus() -> Exodus {
 }
 
 impl Exodus {
-    /// As a classic netCDF file of version 1 or 2 (64-bit offsets).
+    /// Return a classic netCDF file of version 1 or 2 (64-bit offsets).
     fn classic(&self, version: u8) -> Vec<u8> {
         struct Variable {
             name: &'static str,
@@ -1446,7 +1449,7 @@ impl Exodus {
                 text(&mut out, &format!("d{length}"));
                 word(&mut out, *length);
             }
-            // No attributes of the file.
+            // The file has no global attributes.
             word(&mut out, 0);
             word(&mut out, 0);
             word(&mut out, 11);
@@ -1494,7 +1497,7 @@ impl Exodus {
         out
     }
 
-    /// As a netCDF-4 file.
+    /// Write a netCDF-4 file.
     fn hdf5(&self, path: &Path) {
         use hdf5_metno::types::FixedAscii;
         let file = hdf5_metno::File::create(path).unwrap();

@@ -1,4 +1,4 @@
-//! The messages that decks cause, listed in `docs/messages.md` for those who review their words.
+//! The messages of decks, listed in `docs/messages.md` for reviews of the wording.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -8,16 +8,16 @@ use fissure::deck::Source;
 use super::decks::{decks, prepare};
 use crate::support::command::{Folder, finish, fissure, text};
 
-/// The list.
+/// Path of the list of messages.
 const LIST: &str = "docs/messages.md";
 
-/// A message without the file that it is about.
+/// Return a message without the path of its file.
 fn without_path(message: &str, path: &Path) -> String {
     let path = format!("{}:", path.display());
     message.replace(&path, "")
 }
 
-/// The first line of the error of each wrong deck.
+/// Return the first line of the error of each bad deck.
 fn errors() -> impl Iterator<Item = (String, String)> {
     decks("tests/decks/bad").into_iter().map(|path| {
         let error = prepare(&Source::read(&path).unwrap()).unwrap_err();
@@ -26,7 +26,7 @@ fn errors() -> impl Iterator<Item = (String, String)> {
     })
 }
 
-/// The warnings of runs of decks that most likely do not mean what they say.
+/// Return the warnings of runs of decks with probable mistakes.
 fn warnings() -> impl Iterator<Item = (String, String)> {
     let folder = Folder::new("messages");
     decks("tests/decks/warned")

@@ -1,5 +1,5 @@
-//! What `check` and the start of a run say of a deck: figures of its bodies, and warnings about what it
-//! allows but most likely does not mean.
+//! The survey that `check` and the start of a run print: figures of the bodies, and warnings about probable
+//! mistakes.
 
 use crate::support::command::Folder;
 use crate::support::{problem, simulate, simulate_on};
@@ -8,7 +8,7 @@ use fissure::problem::VolumeCorrection;
 use fissure::solver::steps::even_clock;
 use fissure::survey::{Cost, Survey, dry_run, interior, size};
 
-/// A plate of 12 × 8 cells and what else is to be there.
+/// Return the deck of a plate of 12 × 8 cells, with further lines.
 fn plate(extra: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -22,7 +22,7 @@ fn plate(extra: &str) -> String {
     )
 }
 
-/// The warnings of a deck in the plane; the same on any number of ranks.
+/// Return the warnings of a plane deck; they must be equal on any number of ranks.
 fn warnings(text: &str) -> Vec<String> {
     let alone = simulate::<2, _>(text, |mut simulation| Survey::new(&mut simulation).warnings);
     for ranks in [2, 3] {
@@ -73,7 +73,7 @@ fn figures_of_bodies_cracks_and_probes() {
     assert_eq!(plate.centre, [6.0, 4.0, 0.0]);
     assert_eq!(block.centre, [13.0, 2.0, 0.0]);
     assert!((plate.shape_volume.unwrap() / 48.0 - 1.0).abs() < 1e-3);
-    // Between the columns x = 11.5 and 12.5 and farther ones, counted by hand for each row.
+    // Count the bonds between both bodies, and the bonds that cross the crack, without the solver.
     let mut joint = 0;
     let mut cut = [0; 2];
     let all: Vec<[i32; 2]> = (0..8)
@@ -87,7 +87,7 @@ fn figures_of_bodies_cracks_and_probes() {
                 continue;
             }
             joint += u64::from((a[0] < 12) != (b[0] < 12));
-            // Where the bond crosses y = 4, from the half-integer centres.
+            // Position x at which the bond crosses y = 4; centres of cells are at half-integers.
             let [ya, yb] = [a[1], b[1]].map(|y| f64::from(y) + 0.5 - 4.0);
             if ya * yb < 0.0 {
                 let x = f64::from(a[0]) + 0.5 + f64::from(offset[0]) * ya / (ya - yb);
@@ -255,7 +255,7 @@ fn volume_that_is_lost() {
         found[0].contains("are 3.22 % too small; choose a spacing"),
         "{found:?}"
     );
-    // A finer body takes 2.25 rows and columns of the other.
+    // A finer body overlaps 2.25 rows and columns of the plate.
     let overlap = plate(
         "body.fine = { material = 'glass', spacing = 0.75, shape.box = { lower = [0, 0], upper = [2.25, 2.25] } }",
     );
@@ -311,7 +311,7 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
         ))
     };
     let space = "lower = [0, 0, 0], upper = [1, 1, 1]";
-    // Σ |ξ| V over the 122 neighbours, against the integral over the ball, π δ⁴.
+    // Σ |ξ| V over the 122 neighbours, divided by the integral over the ball, π δ⁴.
     let mut sum = 0.0;
     for x in -3..=3_i32 {
         for y in -3..=3_i32 {
@@ -329,7 +329,7 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
     assert_eq!(found.neighbours, 122);
     assert!((found.exact[0] / (10.0 / 3.0) - 1.0).abs() < 1e-12);
     assert!((found.bulk / found.exact[0] / expected - 1.0).abs() < 1e-6);
-    // The ordinary law has the exact bulk modulus, and shear moduli 11 % above and 16.5 % below.
+    // The ordinary law has the exact bulk modulus, and shear moduli 11 % too high and 16.5 % too low.
     let found = interior(&body("3d", "ordinary", space, none), 0).unwrap();
     assert!((found.bulk / found.exact[0] - 1.0).abs() < 1e-6);
     let shear = found
@@ -338,7 +338,7 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
         .map(|modulus| modulus / found.exact[1] - 1.0);
     assert!((shear[0] - 0.11).abs() < 5e-3, "{shear:?}");
     assert!((shear[1] + 0.165).abs() < 5e-3, "{shear:?}");
-    // By default all are right within some per cent.
+    // With the default volume correction, all moduli are correct within some per cent.
     let plane = "lower = [0, 0], upper = [1, 1]";
     for (dimension, law, corners, most) in [
         ("plane-stress", "pmb", plane, 0.04),
@@ -366,7 +366,8 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
     ] {
         let exact = body(dimension, "pmb", corners, ", volume_correction = 'exact'");
         let found = interior(&exact, 0).unwrap();
-        // Σ |ξ| Ṽ against the integral.
+        // Σ |ξ| Ṽ over the family, divided by the integral of |ξ| over the ball, disc or interval of radius
+        // δ.
         let count = exact.dimension.count();
         let share = CellShare::new(VolumeCorrection::Exact, 3.0, 1.0, count);
         let range = |k: usize| if k < count { -5..=5 } else { 0..=0 };
@@ -384,7 +385,7 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
             (bulk / (sum / whole) - 1.0).abs() < 1e-6,
             "{dimension}: {bulk}"
         );
-        // In space the sum over three spacings is 1.8 % above the integral, in less dimensions nearer.
+        // In 3-D with m = 3 the sum is 1.8 % above the integral; in 1-D and 2-D the error is smaller.
         assert!((bulk - 1.0).abs() < 0.018, "{dimension}: {bulk}");
     }
 }
@@ -410,7 +411,7 @@ fn the_size_of_a_run_without_making_it() {
             );
         });
     }
-    // A horizon far beyond the body is no more work than the body.
+    // For a horizon larger than the body, each point is bonded to all other points.
     let wide = plate("").replace("horizon = 3", "horizon = 3e12");
     let found = size(&problem(&wide)).unwrap();
     assert_eq!(found.directed_bonds(), 96.0 * 95.0);
@@ -427,7 +428,7 @@ fn the_size_of_a_run_without_making_it() {
     );
 }
 
-/// Points in rows of ten, `count` of each block, block by block.
+/// Write a point file with rows of ten points, and `count` points in each block.
 fn blocks_of_points(folder: &Folder, count: i32, blocks: i32) -> std::path::PathBuf {
     let row = |k: i32| format!("{} {} 1 {}\n", k % 10, k / 10, k / count);
     let rows: String = (0..count * blocks).map(row).collect();
@@ -437,7 +438,7 @@ fn blocks_of_points(folder: &Folder, count: i32, blocks: i32) -> std::path::Path
 #[test]
 fn each_body_counts_its_own_rows_of_a_file() {
     let folder = Folder::new("blocks");
-    // The second file is long, so that pieces of it are read.
+    // The second file is long, so that only parts of it are read.
     for (count, blocks, off) in [(200, 3, 0.0), (120_000, 10, 0.02)] {
         let file = blocks_of_points(&folder, count, blocks);
         let body = |block: i32| {
@@ -466,7 +467,7 @@ fn each_body_counts_its_own_rows_of_a_file() {
             near(found.output_points[0], f64::from(count), off),
             "{found:?}"
         );
-        // The area within the horizon, less that of the point itself.
+        // Expected bonds: the area of the family minus the area of the point itself.
         let bonds = found.directed_bonds() / found.all_points();
         assert!(
             (bonds - (9.0 * std::f64::consts::PI - 1.0)).abs() < 1e-9,
@@ -560,7 +561,7 @@ fn points_of_two_bodies_at_one_position_are_told() {
     let mut points = String::from("x,y,volume,block\n");
     for block in [1, 2] {
         for k in 0..12 {
-            // Three points of the second body lie on those of the first.
+            // Three points of the second body coincide with points of the first body.
             let shift = if block == 2 && k > 2 { 0.4 } else { 0.0 };
             let (x, y) = (k % 4, k / 4);
             points += &format!("{x},{},1,{block}\n", f64::from(y) + shift);

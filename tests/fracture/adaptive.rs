@@ -1,5 +1,5 @@
-//! The adaptive step: no step breaks more bonds of a point than the rule has it, what it dissipates depends
-//! less on the step, and it can be stopped at any step and goes on to the same bits on any ranks.
+//! The adaptive step. No step breaks more bonds of a point than allowed. The dissipated energy depends less
+//! on the step. A restart at any step, on any number of ranks, gives the same bits.
 
 use crate::support::command::{Folder, finish, fissure, text};
 use crate::support::history::{column, rows_to_the_end};
@@ -9,7 +9,7 @@ use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
-/// A notched plate that is torn fast.
+/// Return the deck of a notched plate that is pulled apart fast.
 fn torn(time: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -56,7 +56,7 @@ fn no_step_breaks_more_bonds_of_a_point_than_it_may() {
             after[size]
         );
     }
-    // It was shorter, and was raised again.
+    // The step was reduced, and raised again.
     let smallest = rows.iter().map(|row| row[size]).fold(f64::MAX, f64::min);
     assert!(smallest <= 0.25 * largest, "{smallest} of {largest}");
     let raises = rows.windows(2).filter(|pair| pair[1][size] > pair[0][size]);

@@ -1,4 +1,4 @@
-//! Paths and lengths of cracks, as the history and the tables beside it have them.
+//! Paths and lengths of cracks in the history and in the tables beside the history.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};
@@ -7,7 +7,7 @@ use crate::support::command::{Folder, finish, fissure, succeed, text};
 use crate::support::history::column;
 use crate::support::{simulate, simulate_on};
 
-/// The branches of the only crack, and its columns of the history.
+/// Return the branches of the only crack, and its columns of the history.
 fn crack(simulation: &mut Simulation<2>) -> (Vec<Branch>, [f64; 2]) {
     let mut observer = HistoryObserver::new(simulation).unwrap_or_else(|error| panic!("{error}"));
     let snapshot = Snapshot::new(simulation);
@@ -18,7 +18,7 @@ fn crack(simulation: &mut Simulation<2>) -> (Vec<Branch>, [f64; 2]) {
     (branches, columns)
 }
 
-/// A plate of unit cells with cuts, whose crack starts at the first place of the first cut.
+/// Return the deck of a plate of unit cells with cuts; the crack starts at the first point of the first cut.
 fn plate(cuts: &[[[f64; 2]; 2]], width: f64) -> String {
     let [x, y] = cuts[0][0];
     let cut = |(k, [from, to]): (usize, &[[f64; 2]; 2])| {
@@ -36,7 +36,7 @@ fn plate(cuts: &[[[f64; 2]; 2]], width: f64) -> String {
     )
 }
 
-/// Distance of a place from the line through two others.
+/// Return the distance of a position from the line through two positions.
 fn beside(place: [f64; 3], [from, to]: [[f64; 2]; 2]) -> f64 {
     let way = [to[0] - from[0], to[1] - from[1]];
     let cross = (place[0] - from[0]) * way[1] - (place[1] - from[1]) * way[0];
@@ -50,7 +50,8 @@ fn the_path_of_a_notch_is_the_notch_on_any_number_of_ranks() {
         let (branches, [length, count]) = simulate::<2, _>(&deck, |mut s| crack(&mut s));
         assert_eq!(count, 1.0, "{to:?}");
         let whole = to[0].hypot(to[1]);
-        // At the tip less than half of a family is cut off: it is seen a bit behind.
+        // At the tip the cut separates less than half of a family, so the found tip is slightly behind the
+        // true tip.
         assert!(
             (whole - 1.8..whole + 0.6).contains(&length),
             "{to:?}: {length}"
@@ -85,7 +86,7 @@ fn a_band_is_as_long_as_a_cut_and_its_points_are_apart() {
     });
     let whole = f64::hypot(35.0, 10.0);
     assert!((length - whole).abs() < 1.5, "{length} {whole}");
-    // The tip may hang on a single point.
+    // A single damaged point may determine the tip, so its tolerance is larger.
     let (tip, others) = branches[0].split_last().unwrap();
     assert!(beside(tip.place, cut) < 1.0, "{tip:?}");
     for vertex in others {
@@ -154,7 +155,7 @@ fn the_branches_of_the_benchmark_are_found_written_and_drawn() {
         .collect();
     let branch = |number: f64| rows.iter().filter(move |row| row[0] == number);
     assert_eq!(rows.last().unwrap()[0], 1.0, "two branches: {rows:?}");
-    // Straight to the fork, then apart to the far edge, mirror images of one another.
+    // The crack runs straight to the fork; then the branches run to the far edge, symmetric to each other.
     let fork = branch(1.0).next().unwrap();
     assert!(
         (0.053..0.08).contains(&fork[1]) && fork[2].abs() < 1e-3,

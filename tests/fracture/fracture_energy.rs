@@ -1,8 +1,7 @@
-//! Pulling a body apart along a plane costs the fracture energy: every failure law in every dimension.
+//! Separating a body along a plane dissipates the fracture energy: every damage law in every dimension.
 //!
-//! The way of the halves grows by a factor a step, so a bond breaks late by up to that share; what it holds above
-//! its criterion then is not counted. What is left is the quadrature error of the lattice, which falls as the
-//! horizon holds more spacings.
+//! The opening grows by a factor per step, so a bond breaks late by up to this factor. Its overshoot energy
+//! is not counted. The remaining error is the quadrature error of the lattice, which decreases with m.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -16,15 +15,15 @@ use crate::support::{displace, problem, simulate};
 /// G0, J/m².
 const FRACTURE_ENERGY: f64 = 2.0;
 
-/// The deck of a body of unit spacing that is cut along a plane between two layers of points; families
-/// of the points above and below the middle of the cut, and of their neighbours, are whole.
+/// Return the deck of a body with unit spacing and a cut plane between two layers of points. Families of the
+/// points above and below the middle of the cut, and of their neighbours, are complete.
 fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     let (rule, more) = rule.split_once(' ').unwrap_or((rule, ""));
     let (dimension, constraint) = match dimension {
         "uniaxial-stress" | "uniaxial-strain" => ("1d", format!("constraint = '{dimension}'")),
         _ => (dimension, String::new()),
     };
-    // Only the ends of bonds that cross matter, and where laws sum over families, those families.
+    // Only the ends of bonds across the cut matter; for state-based laws also the families of these ends.
     let reach = f64::from(ratio);
     let alone = ["pmb", "elastic_plastic_pmb", "softening_pmb"];
     let wide = if alone.iter().any(|name| law.starts_with(name)) {
@@ -43,7 +42,7 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
         "3d" => "[0.5, 0, 0.5]",
         _ => "[0.5, 0]",
     };
-    // Bonds that soften break by their own law.
+    // Bonds of a softening law break without a damage law.
     let (damage, of_body) = if law.starts_with("softening_pmb") {
         (String::new(), "")
     } else {
@@ -76,19 +75,19 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     )
 }
 
-/// How the upper half of a body moves off.
+/// Motion of the upper half of a body.
 #[derive(Debug, Clone, Copy)]
 enum Mode {
     /// Along the normal of the cut.
     Opening,
-    /// So far along the cut (m), and then along its normal.
+    /// First this distance along the cut (m), then along the normal of the cut.
     SlideAndOpening(f64),
-    /// At this angle (degrees) to the normal.
+    /// At this angle to the normal, degrees.
     Slanted(f64),
 }
 
-/// The energy per area that pulling the upper half off takes, as a share of G0; the opening grows by
-/// this share a step.
+/// Return the energy per area that separates the upper half, divided by G0. The opening grows by the fraction
+/// `growth` per step.
 fn cost<const D: usize>(dimension: &str, ratio: u32, law: &str, rule: &str, growth: f64) -> f64 {
     cost_in::<D>(Mode::Opening, dimension, ratio, law, rule, growth)
 }
@@ -105,11 +104,11 @@ fn cost_in<const D: usize>(
     cost_of_deck::<D>(mode, &text(dimension, ratio, law, rule), growth)
 }
 
-/// As [`cost_in`], of the body or bodies of a deck as [`text`] writes it.
+/// As [`cost_in`], for the body or bodies of a deck in the form of [`text`].
 fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
     let pulled_only = !deck.contains("tension_only = false");
     simulate::<D, _>(deck, |mut simulation| {
-        // The direction of the cut's normal; slides are along the first axis of the others.
+        // Axis of the normal of the cut. Slides are along the first of the other axes.
         let axis = if D == 1 { 0 } else { 1 };
         let horizon = simulation.problem.horizon;
         let mut grow = |end: f64, moved: &dyn Fn(f64) -> [f64; 2]| {
@@ -127,14 +126,15 @@ fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
             }
         };
         match mode {
-            // Softening bonds bear something up to larger stretches.
+            // Softening bonds carry force up to larger stretches.
             Mode::Opening if deck.contains("softening_pmb") => grow(20.0, &|size| [0.0, size]),
             Mode::Opening => grow(0.5, &|size| [0.0, size]),
             Mode::SlideAndOpening(slide) => {
                 grow(slide, &|size| [size, 0.0]);
                 grow(1.0, &|size| [slide, size]);
             }
-            // Bonds that lean against it are shorter at first.
+            // Bonds inclined against the motion become shorter at first, so they need a longer motion to
+            // break.
             Mode::Slanted(angle) => {
                 let (sin, cos) = angle.to_radians().sin_cos();
                 let end = horizon * if pulled_only { 2.2 } else { 0.4 };
@@ -148,7 +148,7 @@ fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
             (0..D).all(|k| k == axis || place[k].abs() < 1e-9)
         };
         let line = (0..model.owned()).filter(on_line);
-        // Of bonds that yield, only what they have not dissipated before is set free.
+        // A bond that has yielded releases only the energy that it has not dissipated before.
         let fields = &simulation.fields;
         let [freed, overshoot] =
             [&fields.freed_energy, &fields.overshoot_energy].map(|field| field.as_ref().unwrap());
@@ -174,8 +174,8 @@ fn ordinary(ratio: f64, influence: &str) -> String {
     )
 }
 
-/// The costs at two ratios of horizon and spacing lie this near the expected share of G0, and the
-/// second nearer than the first.
+/// Assert that the costs at two values of m have at most these relative errors, and that the second error is
+/// smaller. `expected` is a fraction of G0.
 fn compare(case: &str, costs: [f64; 2], expected: f64, [coarse, fine]: [f64; 2]) {
     let errors = costs.map(|cost| (cost / expected - 1.0).abs());
     assert!(errors[0] < coarse && errors[1] < fine, "{case}: {costs:?}");
@@ -215,20 +215,20 @@ fn of_the_prototype_law() {
 
 #[test]
 fn of_the_elastic_plastic_law() {
-    // The bonds of the coarsest lattice would break at a stretch of about 0.02 without yielding.
+    // Without yielding, the bonds of the coarsest lattice would break at a stretch of about 0.02.
     let law = "elastic_plastic_pmb = { density = 1, youngs_modulus = 3e3, yield_stretch = 0.008 }";
     in_a_bar(law);
     in_the_plane(law, 1.0);
     in_space(law, [2, 4]);
-    // Bonds that break before they yield.
+    // With this yield stretch, bonds break before they yield.
     let law = "elastic_plastic_pmb = { density = 1, youngs_modulus = 3e3, yield_stretch = 0.05 }";
     in_the_plane(law, 1.0);
 }
 
 #[test]
 fn of_the_softening_law() {
-    // The bonds of the coarsest lattice would break at a stretch of about 0.02 without softening. What they have dissipated
-    // follows from their largest stretch, so that steps may be long.
+    // Without softening, the bonds of the coarsest lattice would break at a stretch of about 0.02. The
+    // dissipated energy follows from the largest stretch, so that steps may be long.
     for curve in ["bilinear", "trilinear", "exponential"] {
         let law = format!(
             "softening_pmb = {{ density = 1, youngs_modulus = 3e3, strength_stretch = 0.005, \
@@ -279,12 +279,12 @@ fn of_the_ordinary_law_in_space() {
 const CORRESPONDENCE: &str =
     "correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }";
 
-/// With the control of Wan et al.
+/// Correspondence with the zero-energy control of Wan et al. (2019).
 const WAN: &str = "correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3, zero_energy = 'wan2019' }";
 
 #[test]
 fn by_the_energy_of_bonds_of_bond_based_laws() {
-    // What such a bond holds follows from its stretch.
+    // The energy of a bond of these laws follows from its stretch.
     let plastic =
         "elastic_plastic_pmb = { density = 1, youngs_modulus = 3e3, yield_stretch = 0.008 }";
     for law in [PMB, plastic, NORMALISED] {
@@ -294,8 +294,8 @@ fn by_the_energy_of_bonds_of_bond_based_laws() {
     }
 }
 
-/// The costs by the energy of bonds, in plane strain and plane stress at ratios of 3 and 6, in space at one of 2,
-/// lie in these ranges; the opening grows by this share a step.
+/// Assert that the costs of damage by work lie in these ranges: plane strain and plane stress with m = 3 and
+/// 6, 3-D with m = 2. The opening grows by `growth` per step.
 fn by_energy(law: &str, growth: f64, [strain, stress, space]: [Range<f64>; 3]) {
     for (dimension, range) in [("plane-strain", strain), ("plane-stress", stress)] {
         for ratio in [3, 6] {
@@ -309,8 +309,8 @@ fn by_energy(law: &str, growth: f64, [strain, stress, space]: [Range<f64>; 3]) {
 
 #[test]
 fn by_the_energy_of_bonds_of_correspondence() {
-    // A bond that breaks changes the deformation gradient that all others of its ends follow: these
-    // hold less than the sum of what broke.
+    // A broken bond changes the deformation gradient of both ends, and thus the energy of their other bonds.
+    // The total cost is less than the sum of the energies of the broken bonds.
     by_energy(CORRESPONDENCE, 0.01, [0.93..1.02, 0.95..1.01, 0.85..0.9]);
     by_energy(WAN, 0.01, [0.78..0.85, 0.77..0.85, 0.66..0.71]);
 }
@@ -318,14 +318,14 @@ fn by_the_energy_of_bonds_of_correspondence() {
 #[test]
 fn by_the_energy_of_bonds_of_bond_associated_correspondence() {
     let law = format!("bond_associated_{CORRESPONDENCE}");
-    // It sums over the bonds three times a step.
+    // This law has three passes over the bonds per step, so the steps are longer.
     by_energy(&law, 0.02, [0.96..1.03, 0.96..1.03, 0.98..1.06]);
 }
 
 #[test]
 fn by_the_energy_of_bonds_of_the_ordinary_law() {
-    // A bond that breaks changes what all others of its ends hold: more than the bonds themselves give
-    // is freed where the dilatation resists (ν above 1/4), less where it helps.
+    // A broken bond changes the energy of the other bonds of both ends. The released energy exceeds the
+    // energy of the broken bonds if the dilatation resists (ν above 1/4), and is smaller otherwise.
     let [low, high] = [0.1, 0.4].map(|ratio| ordinary(ratio, "constant"));
     by_energy(&low, 0.01, [0.94..0.96, 0.94..0.96, 0.9..0.93]);
     by_energy(&high, 0.01, [1.1..1.15, 1.0..1.02, 1.05..1.1]);
@@ -355,7 +355,7 @@ fn what_a_survey_says_of_parting() {
     let line = problem(&text("1d", 3, PMB, STRETCH));
     let wanted = cost::<1>("1d", 3, PMB, STRETCH, 0.01);
     assert!((separation_energy_ratio(&line, 0, 0.0).unwrap() / wanted - 1.0).abs() < 1e-3);
-    // A critical stretch is not measured by an energy.
+    // A given critical stretch has no fracture energy, hence no ratio.
     let stretch = text("1d", 3, PMB, STRETCH).replace("fracture_energy", "critical_stretch");
     assert_eq!(separation_energy_ratio(&problem(&stretch), 0, 0.0), None);
 }
@@ -363,7 +363,7 @@ fn what_a_survey_says_of_parting() {
 #[test]
 fn calibrated_by_opening() {
     let rule = "energy calibration = 'opening'";
-    // The order in which bonds of correspondence break moves its cost by some per cent.
+    // With correspondence, the cost varies by some per cent with the order in which bonds break.
     for (law, bound) in [(CORRESPONDENCE, 0.05), (&*ordinary(0.4, "constant"), 0.01)] {
         for (dimension, ratio) in [("plane-strain", 3), ("plane-stress", 4), ("3d", 2)] {
             let problem = problem(&text(dimension, ratio, law, rule));
@@ -372,7 +372,7 @@ fn calibrated_by_opening() {
             assert!((cost - 1.0).abs() < bound, "{law} {dimension}: {cost}");
         }
     }
-    // Nothing to do.
+    // A law without `calibration = 'opening'` needs no computation.
     let plain = problem(&text("plane-strain", 3, PMB, ENERGY));
     assert!(matches!(calibrated(&plain), Ok(Cow::Borrowed(_))));
     let large = problem(&text("3d", 9, CORRESPONDENCE, rule));
@@ -388,7 +388,7 @@ fn calibrated_by_opening() {
     assert!(error.message.contains("has not been measured"), "{error}");
 }
 
-/// The costs of a law in plane strain: of a slide and an opening, and of a slanted way.
+/// Return the costs of a law in plane strain: for a slide followed by an opening, and for a slanted motion.
 fn of_mixed_modes(law: &str, rule: &str) -> [f64; 2] {
     let of = |mode, growth| cost_in::<2>(mode, "plane-strain", 4, law, rule, growth);
     [
@@ -402,14 +402,14 @@ fn of_mixed_modes_by_stretch_and_by_energy() {
     let near = |cost: f64, wanted: f64, bound: f64| {
         assert!((cost - wanted).abs() < bound, "{cost} for {wanted}");
     };
-    // A bond of this law holds the same however it has come to its criterion.
+    // With this law, the energy of a bond at its criterion does not depend on the path.
     for rule in [STRETCH, ENERGY] {
         for cost in of_mixed_modes(PMB, rule) {
             near(cost, 1.0, 0.03);
         }
     }
-    // The critical stretch of the ordinary law counts on the dilatation of an opening, which resists or
-    // helps.
+    // The critical stretch of the ordinary law is calibrated for an opening, whose dilatation adds or
+    // releases energy.
     let [slide, slanted] = of_mixed_modes(&ordinary(0.1, "constant"), STRETCH);
     assert!(slide > 1.1 && slanted > 1.06, "{slide} {slanted}");
     let [slide, slanted] = of_mixed_modes(&ordinary(0.4, "constant"), STRETCH);
@@ -428,7 +428,8 @@ fn of_mixed_modes_of_correspondence() {
         let mode = Mode::SlideAndOpening(0.1);
         cost_in::<2>(mode, "plane-strain", 4, law, rule, 0.01)
     };
-    // What a slide shears is the gradient of the bonds that it presses: where these do not break, the others go late.
+    // In a slide, the compressed bonds determine the deformation gradient. If they cannot break, the other
+    // bonds break late.
     for (law, tension, both) in [
         (WAN, 0.44..0.54, 0.75..0.9),
         (CORRESPONDENCE, 0.98..1.1, 0.85..1.1),
@@ -438,7 +439,7 @@ fn of_mixed_modes_of_correspondence() {
         let either = of(law, "energy tension_only = false");
         assert!(both.contains(&either), "{law}: {either}");
     }
-    // It is less so where each bond has its own.
+    // The effect is smaller if each bond has its own deformation gradient.
     let associated = of(&format!("bond_associated_{CORRESPONDENCE}"), ENERGY);
     assert!((0.85..0.98).contains(&associated), "{associated}");
 }
@@ -446,7 +447,7 @@ fn of_mixed_modes_of_correspondence() {
 #[test]
 fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     let associated = format!("bond_associated_{CORRESPONDENCE}");
-    // The figures of docs/src/theory/damage.md; those of correspondence scatter by some per cent.
+    // Figures of docs/src/theory/damage.md; the figures of correspondence scatter by some per cent.
     for (law, plane, space) in [
         (ordinary(0.1, "constant"), 0.94..1.01, 0.9..0.97),
         (ordinary(0.4, "constant"), 0.97..1.14, 0.95..1.09),
@@ -454,7 +455,7 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
         (CORRESPONDENCE.to_owned(), 0.94..1.08, 0.84..1.02),
         (associated.clone(), 0.9..1.03, 0.85..1.06),
     ] {
-        // It sums over the bonds three times a step.
+        // This law has three passes over the bonds per step, so the steps are longer.
         let growth = if law == associated { 0.02 } else { 0.01 };
         for angle in [0.0, 45.0, 90.0] {
             let (mode, rule) = (Mode::Slanted(angle), "energy tension_only = false");
@@ -466,8 +467,8 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     }
 }
 
-/// The deck of [`text`] with the damage of the body for a pair of bodies alone, which meet at the cut; the bodies have the
-/// damage that is given as keys of `[damage.own.…]`, or none.
+/// Return the deck of [`text`] with two bodies that meet at the cut; the damage law applies to the pair only.
+/// `own` has the keys of `[damage.own.…]`, the damage law of the bodies; `None` for bodies without damage.
 fn pair_text(dimension: &str, ratio: u32, law: &str, rule: &str, own: Option<&str>) -> String {
     let whole = text(dimension, ratio, law, rule);
     let (before, body) = whole.split_once("[body.block]").unwrap();
@@ -523,7 +524,7 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
         (PMB, STRETCH, vec![None, Some(&tough), Some(&weak)]),
         (NORMALISED, STRETCH, vec![Some(&tough)]),
         (&*soft, STRETCH, vec![None]),
-        // The pair breaks by work and its bodies by stretch.
+        // The pair breaks by work, and its bodies break by stretch.
         (&*soft, ENERGY, vec![None, Some(&tough)]),
         (CORRESPONDENCE, ENERGY, vec![None, Some(&tough_by_work)]),
     ] {
@@ -546,22 +547,22 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
 
 #[test]
 fn in_the_bodies_of_a_pair_their_own_damage_counts() {
-    // The cut between the halves lies within the lower body, whose damage is as tough as that of the whole block; the pair
-    // above it is weak.
+    // The cut between the halves lies within the lower body, which has the same fracture energy as the whole
+    // block. The pair above the cut is weak.
     let within = |own: &str, pair: &str| {
         let deck = pair_text("plane-stress", 3, PMB, STRETCH, Some(own));
         let deck = deck.replace(
             &format!("fracture_energy = {FRACTURE_ENERGY}\n"),
             &format!("{pair}\n"),
         );
-        // The border of the bodies, all others stay.
+        // Move only the border of the bodies.
         let deck = deck.replace("upper = [3.5, 0]", "upper = [3.5, 2]");
         let deck = deck.replace("lower = [-3.5, 0]", "lower = [-3.5, 2]");
         cost_of_deck::<2>(Mode::Opening, &deck, 0.02)
     };
     let own = format!("{STRETCH} = {{ fracture_energy = {FRACTURE_ENERGY} }}");
     let whole = cost::<2>("plane-stress", 3, PMB, STRETCH, 0.02);
-    // Bonds across the cut that reach the upper body have the toughness of the pair.
+    // Bonds across the cut that end in the upper body have the fracture energy of the pair.
     let same = within(&own, &format!("fracture_energy = {FRACTURE_ENERGY}"));
     let weak = within(&own, "fracture_energy = 0.02");
     assert!((same / whole - 1.0).abs() < 1e-6, "{same} for {whole}");
@@ -587,7 +588,7 @@ fn in_a_pair_that_never_breaks() {
         let mut broken = 0;
         simulation.forces.for_each_broken(|_, _| broken += 1);
         assert_eq!(broken, 0);
-        // Within the bodies they do.
+        // Bonds within the bodies break.
         displace(&mut simulation, |[x, y, z]| [x, 1.2 * y, z]);
         let mut within = [0, 0];
         let model = &simulation.model;
@@ -601,7 +602,7 @@ fn in_a_pair_that_never_breaks() {
 
 #[test]
 fn in_a_pair_of_unlike_bodies() {
-    // Moduli and horizons of their own; the bodies alone would cost 100 times as much.
+    // Bodies of different moduli and horizons. Within the bodies, the cost would be 100 times as large.
     let cost = |law: [&str; 2], rule: &str, spacing: f64| {
         let text = format!(
             "dimension = 'plane-strain'
@@ -638,8 +639,8 @@ fn in_a_pair_of_unlike_bodies() {
     assert!((0.8..1.05).contains(&by_work), "{by_work}");
 }
 
-/// The energy per area that opening costs at a height in two bodies that meet at y = 7, as a share of G0; the upper one has
-/// half the horizon and half the spacing of the lower one, which is given.
+/// Return the energy per area of an opening at a height in two bodies that meet at y = 7, divided by G0.
+/// `spacing` is the spacing of the lower body; the upper body has half its spacing and half its horizon.
 fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
     let (rule, more) = rule.split_once(' ').unwrap_or((rule, ""));
     let text = format!(
@@ -661,7 +662,7 @@ fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
     opening_cost(&text, height)
 }
 
-/// The energy per area that opening costs at a height in a plate 24 m wide, as a share of G0.
+/// Return the energy per area of an opening at a height in a plate 24 m wide, divided by G0.
 fn opening_cost(text: &str, height: f64) -> f64 {
     simulate::<2, _>(text, |mut simulation| {
         let mut opening = 1e-2;
@@ -695,8 +696,8 @@ fn between_bodies_of_different_horizons_by_energy() {
         let inside = 0.5 * (coarse + fine);
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        // Across the border the points do not lie where the midpoint rule has them, and the order in which bonds of
-        // correspondence break moves the cost by some per cent.
+        // Across the border, the points are not those of the midpoint rule. With correspondence, the cost
+        // also varies by some per cent with the order in which bonds break.
         assert!((border / inside - 1.0).abs() < 0.12, "{case}");
     }
 }
@@ -718,14 +719,15 @@ fn between_bodies_of_different_horizons_by_stretch() {
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         println!("{case}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        // With spacings of 1 and 0.5 the border costs 12 % more than the inside: the coarse body is a poor quadrature for the
-        // small horizon.
+        // With spacings of 1 and 0.5 the border costs 12 % more than the inside: the coarse points are a poor
+        // quadrature of the small horizon.
         assert!((border / inside - 1.0).abs() < 0.06, "{case}");
     }
 }
 
-/// The work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1 % of its extension, so
-/// the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the plane.
+/// Return the work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1
+/// % of its extension, so the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the
+/// plane.
 fn work_at_breaking<const D: usize>(dimension: &str, calibration: &str) -> f64 {
     let thickness = if D == 2 { "thickness = 0.5" } else { "" };
     let corner = |at: f64| {

@@ -1,18 +1,18 @@
-//! Fronts along lines and crack tips, as the history has them.
+//! Fronts along lines and crack tips in the history.
 
 use crate::support::history::{column, row};
 use crate::support::{displace, simulate, simulate_on};
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
-/// The last entries of the present row: those of the fronts and tips.
+/// Return the last entries of the current row, which belong to the fronts and tips.
 fn last<const D: usize, const N: usize>(simulation: &mut Simulation<D>) -> [f64; N] {
     let mut observer = HistoryObserver::new(simulation).unwrap_or_else(|error| panic!("{error}"));
     let values = row(&mut observer, simulation).values;
     values[values.len() - N..].try_into().unwrap()
 }
 
-/// A bar of 20 points at 0.5, 1.5, …, with a front.
+/// Return the deck of a bar of 20 points at 0.5, 1.5, …, with a front.
 fn bar(front: &str) -> String {
     format!(
         "dimension = '1d'
@@ -29,7 +29,7 @@ fn bar(front: &str) -> String {
 fn a_front_is_where_the_field_crosses_the_threshold_between_two_points() {
     let deck = bar("from = [1], direction = [2], field = 'displacement', threshold = 0.43");
     simulate::<1, _>(&deck, |mut simulation| {
-        // A field that falls along the line and moves on, over and between points.
+        // A field that decreases along the line; the front moves over points and between points.
         for k in 0..150 {
             let reach = 7.0 + 0.1 * f64::from(k);
             displace(&mut simulation, |[x, y, z]| {
@@ -39,7 +39,7 @@ fn a_front_is_where_the_field_crosses_the_threshold_between_two_points() {
             let expected = (reach - 4.3).min(19.5) - 1.0;
             assert!((front - expected).abs() < 1e-12, "{front} {expected}");
         }
-        // The size counts, not the sign; and nothing may be above.
+        // The threshold applies to the absolute value. Without a point above it, the front is NaN.
         displace(&mut simulation, |[x, y, z]| [x + 0.01 * x, y, z]);
         assert!(last::<1, 1>(&mut simulation)[0].is_nan());
     });
@@ -62,16 +62,17 @@ fn a_front_looks_at_the_points_near_its_line() {
     let front = |radius, component| {
         simulate::<3, _>(&deck(radius, component), |mut s| last::<3, 1>(&mut s)[0])
     };
-    // Points at x = 3.5 are above, those at 2.5 stand still: 4.5 + (value − 0.5)/value.
+    // Near the line, points at x = 3.5 exceed the threshold, and points at 2.5 do not move: 4.5 + (value −
+    // 0.5)/value.
     let length = (0.2_f64.powi(2) + 0.3_f64.powi(2) + 0.6_f64.powi(2)).sqrt();
     assert!((front("0.1", "") - (4.5 + (length - 0.5) / length)).abs() < 1e-12);
     assert!((front("1.5", ", component = 'z'") - (4.5 + 0.1 / 0.6)).abs() < 1e-12);
     assert!(front("1.5", ", component = 'x'").is_nan());
-    // As far as z < 1; and no farther than the line, whose last point is at x = 2.5.
+    // With radius 2, points with z < 1 count. The last point of the line is at x = 2.5.
     assert!((front("2", "") - 5.5).abs() < 1e-12);
 }
 
-/// A plate with a cut along `direction` from its centre to a length, in spacings.
+/// Return the deck of a plate with a cut from its centre along `direction`; `length` in spacings.
 fn cut(direction: [f64; 2], length: f64) -> String {
     let [x, y] = direction.map(|entry| entry / direction[0].hypot(direction[1]));
     format!(
@@ -99,7 +100,8 @@ fn a_tip_follows_a_cut_in_any_direction_on_any_number_of_ranks() {
             let deck = cut(direction, end);
             let [x, y, length, speed] = simulate::<2, _>(&deck, |mut s| last(&mut s));
             assert!(length >= before, "{direction:?} {end}: {length} {before}");
-            // At the very tip less than half of a family is cut off: it is seen a bit behind.
+            // At the tip the cut separates less than half of a family, so the found tip is slightly behind
+            // the true tip.
             assert!((end - 1.5..end + 0.5).contains(&length), "{end}: {length}");
             before = length;
             let size = direction[0].hypot(direction[1]);
@@ -134,12 +136,14 @@ fn the_tip_of_a_running_crack() {
         }
         let of = |row: &[f64], name: &str| row[column(&observer, name)];
         for row in &rows {
-            // The box around the cracked points knows nothing of the tip.
+            // The bounding box of the cracked points has no interpolation, so it ends slightly behind the tip
+            // or at it.
             let ahead = of(row, "tip_crack_length") - of(row, "cracked_upper_x");
             assert!((0.0..1e-3).contains(&ahead), "{ahead}");
             assert_eq!(of(row, "tip_crack_x"), of(row, "tip_crack_length"));
         }
-        // At rest until the load arrives over 20 mm, then slower than Rayleigh waves, 3.1 km/s.
+        // The tip is at rest until the load arrives over 20 mm, and then slower than Rayleigh waves, 3.1
+        // km/s.
         let speeds: Vec<f64> = rows[1..]
             .iter()
             .map(|row| of(row, "tip_crack_speed"))

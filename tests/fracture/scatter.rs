@@ -1,8 +1,9 @@
-//! Scatter: points moved from the centres of their cells, and strengths that follow Weibull.
+//! Scatter: points displaced from the centres of their cells, and strengths with a Weibull distribution.
 
 use crate::support::simulate;
 
-/// A bar of 20 000 points whose bonds join neighbours alone, which is pulled apart evenly: by a stretch of 0.001 a step.
+/// Return the deck of a bar of 20 000 points with bonds between nearest neighbours only. The bar is stretched
+/// uniformly by 0.001 per step.
 fn bar(damage: &str) -> String {
     format!(
         "dimension = '1d'
@@ -23,7 +24,7 @@ fn bonds_break_as_weibull_says() {
         let mut intermediate = 0;
         while !simulation.is_over() {
             simulation.advance();
-            // Every other bond: those that share a point are not independent.
+            // Count every other bond, because bonds with a common point are not independent.
             let mut broken = 0.0;
             simulation.forces.for_each_broken(|here, there| {
                 let [here, there] = [here, there].map(|point| simulation.model.ids[point]);
@@ -32,7 +33,7 @@ fn bonds_break_as_weibull_says() {
                 }
             });
             let stretch = 1e-3 * simulation.clock.time();
-            // A bond holds as long as both of its ends do.
+            // A bond is intact as long as the strength of both ends is not reached.
             let expected = 1.0 - libm::exp(-2.0 * libm::pow(stretch / 0.01, modulus));
             // The difference that is exceeded once in a million samples (Dvoretzky, Kiefer & Wolfowitz).
             let bound = (libm::log(2e6) / (2.0 * bonds)).sqrt();
@@ -60,7 +61,8 @@ fn a_high_modulus_is_no_scatter() {
             broken
         })
     };
-    // The weakest of 20 000 points has 20000^(−1/5000) = 0.998 of the strength, the strongest 1.0005.
+    // Of 20 000 points, the weakest has a strength of about 20000^(−1/5000) = 0.998, and the strongest
+    // 1.0005.
     for (stretch, all) in [(0.00995, 0), (0.01005, 2 * 19_999)] {
         assert_eq!(broken("weibull_modulus = 5000", stretch), all);
         assert_eq!(broken("alpha = 0", stretch), all);
@@ -79,7 +81,7 @@ fn points_are_moved_by_up_to_the_jitter() {
             "
         )
     };
-    // By id.
+    // Positions of the points, sorted by id.
     let places = |grid: &str| {
         simulate::<3, _>(&deck(grid), |simulation| {
             assert_eq!(simulation.forces.lattice_bonds() > 0, grid.is_empty());

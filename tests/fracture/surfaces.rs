@@ -1,5 +1,5 @@
-//! A strained body breaks at its surfaces where bonds go by their work, for fewer bonds hold the energy of a point
-//! there; with `family_correction = 1` hardly sooner than inside.
+//! Damage by work in a strained body begins at surfaces, where fewer bonds store the energy of a point. With
+//! `family_correction = 1`, surfaces break hardly earlier than the inside.
 
 use crate::support::{displace, simulate};
 use fissure::solver::Simulation;
@@ -14,23 +14,23 @@ const LAWS: [&str; 3] = [
 struct Block {
     law: &'static str,
     correction: f64,
-    /// Where bonds never break.
+    /// Condition on the points whose bonds never break.
     held: Option<String>,
-    /// Half its height, in rows.
+    /// Half of the height, in rows of points.
     half_height: u32,
 }
 
-/// What may break of a block.
+/// Part of a block whose bonds can break.
 #[derive(Clone, Copy)]
 enum Part {
     All,
-    /// Its sides along x, without corners.
+    /// The surfaces along x, without corners.
     Sides,
-    /// Bonds between points with whole families.
+    /// Bonds between points with complete families.
     Inside,
 }
 
-/// Half the length of a block and its horizon.
+/// Return half of the length of a block, and its horizon.
 fn size<const D: usize>() -> (u32, u32) {
     if D == 3 { (6, 2) } else { (10, 3) }
 }
@@ -96,13 +96,14 @@ impl Block {
         )
     }
 
-    /// The strain along x at which the first bond breaks; that across is `across` of it.
+    /// Return the strain along x at which the first bond breaks; the strain across x is `across` times this
+    /// strain.
     fn strength<const D: usize>(&self, across: f64) -> f64 {
         strength::<D>(&self.text::<D>(), across, |_| true)
     }
 }
 
-/// As [`Block::strength`], of the bonds of a body between whose ends `counts` holds; strains grow by 1 % a step.
+/// As [`Block::strength`], for the bonds whose ends satisfy `counts`. Strains grow by 1 % per step.
 fn strength<const D: usize>(
     text: &str,
     across: f64,
@@ -128,20 +129,21 @@ fn strength<const D: usize>(
     })
 }
 
-/// The strains at which the sides and all of a block break, over that at which it breaks inside without the correction; and that
-/// of its inside with this correction.
+/// Return the breaking strains of the sides, the whole block and the inside with this correction. They are
+/// divided by the breaking strain of the inside without correction.
 fn strengths<const D: usize>(law: &'static str, correction: f64, across: f64) -> [f64; 3] {
     let of = |correction, part| Block::new::<D>(law, correction, part).strength::<D>(across);
     let inside = of(0.0, Part::Inside);
     [Part::Sides, Part::All, Part::Inside].map(|part| of(correction, part) / inside)
 }
 
-/// Holds the figures of docs/src/theory/damage.md; strains grow by 1 % a step, and surfaces are known to 2 %.
+/// Check the figures of docs/src/theory/damage.md. Strains grow by 1 % per step, and the strength of surfaces
+/// is known to 2 %.
 fn check<const D: usize>(law: &'static str, across: f64) {
     let [sides, all, _] = strengths::<D>(law, 0.0, across);
     assert!(sides < 0.88 && all < 0.75, "{law}: {sides} {all} without");
     let [sides, all, inside] = strengths::<D>(law, 1.0, across);
-    // Inside, families of a lattice are not quite those of the continuum.
+    // Families of a lattice differ slightly from those of the continuum.
     assert!((0.93..1.01).contains(&inside), "{law}: {inside} inside");
     let [sides, all] = [sides, all].map(|one| one / inside);
     assert!((0.95..1.02).contains(&sides), "{law}: {sides} at sides");
@@ -170,7 +172,7 @@ fn a_strip_of_four_rows_is_as_strong_as_a_block() {
     }
 }
 
-/// Families that go on in the other body are whole, whatever its moduli.
+/// A family that extends into another body is complete, whatever the moduli of that body.
 #[test]
 fn an_interface_of_a_soft_and_a_stiff_body_is_no_surface() {
     let across = |[a, b]: [[f64; 3]; 2]| (a[0] > 0.0) != (b[0] > 0.0);
@@ -195,7 +197,8 @@ fn an_interface_of_a_soft_and_a_stiff_body_is_no_surface() {
             ";
         strength::<2>(&text, -0.3, across)
     });
-    // As inside, where families of a lattice are not quite those of the continuum; a side is weaker by a fifth.
+    // The interface is as strong as the inside, up to the quadrature of the lattice; a free side would be
+    // weaker by a fifth.
     let share = with / without;
     assert!((0.93..1.01).contains(&share), "{with} {without}");
 }

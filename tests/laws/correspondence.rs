@@ -1,5 +1,4 @@
-//! Correspondence laws: strains and stresses to rounding, also where families are cut, and motions that the
-//! deformation gradient does not see.
+//! Correspondence laws: strains and stresses up to rounding, also in incomplete families; zero-energy modes.
 
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -37,7 +36,7 @@ fn deck_of(name: &str, dimension: &str, law: &str, size: usize, horizon: f64) ->
     )
 }
 
-/// Hooke's matrix by Voigt's order, and the law that has it.
+/// Return laws with their Hooke matrices in Voigt order.
 fn laws(dimension: &str) -> Vec<(String, Matrix6<f64>)> {
     let (young, ratio) = (5.0, 0.3);
     let shear = young / (2.0 * (1.0 + ratio));
@@ -93,7 +92,7 @@ fn laws(dimension: &str) -> Vec<(String, Matrix6<f64>)> {
 
 const VOIGT: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
 
-/// S of E, Pa.
+/// Return the stress S for a strain E, Pa.
 fn stress(hooke: &Matrix6<f64>, strain: &Matrix3<f64>) -> Matrix3<f64> {
     let mut stress = Matrix3::zeros();
     for (a, (i, j)) in VOIGT.into_iter().enumerate() {
@@ -106,7 +105,8 @@ fn stress(hooke: &Matrix6<f64>, strain: &Matrix3<f64>) -> Matrix3<f64> {
     stress
 }
 
-/// Found by turning the strain into the material's axes, and its stress back.
+/// Return the Hooke matrix of a material with rotated axes: rotate the strain to the axes of the material,
+/// and rotate the stress back.
 fn turned(own: &Matrix6<f64>, [a, b, c]: [f64; 3]) -> Matrix6<f64> {
     let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
     let turn = about(Vector3::z_axis(), a) * about(Vector3::x_axis(), b);
@@ -122,8 +122,8 @@ fn turned(own: &Matrix6<f64>, [a, b, c]: [f64; 3]) -> Matrix6<f64> {
     })
 }
 
-/// Every point, those at corners and surfaces too, has the deformation gradient, energy and stress of a
-/// homogeneous motion.
+/// Assert that every point, also at corners and surfaces, has the deformation gradient, energy and stress of
+/// a homogeneous deformation.
 fn check_affine<const D: usize>(
     mut simulation: Simulation<D>,
     hooke: &Matrix6<f64>,
@@ -149,7 +149,7 @@ fn check_affine<const D: usize>(
     let stresses = snapshot.field(&mut simulation, Field::Stress);
     let gradients = snapshot.field(&mut simulation, Field::DeformationGradient);
     if D == 2 {
-        // What is across the plane is not the law's.
+        // The law does not define the stress across the plane.
         kirchhoff[(2, 2)] = 0.0;
     }
     for point in 0..simulation.model.owned() {
@@ -199,8 +199,8 @@ fn homogeneous_strains_are_exact_at_every_point() {
     }
 }
 
-/// Kirchhoff and Cauchy stress (xx, yy, zz, xy, yz, xz) and von Mises stress of a point under a homogeneous motion,
-/// which all points have.
+/// Return Kirchhoff and Cauchy stress (xx, yy, zz, xy, yz, xz) and von Mises stress of the points under a
+/// homogeneous deformation; all points must have equal stresses.
 fn stresses<const D: usize>(text: &str, motion: &Matrix3<f64>) -> [Vec<f64>; 3] {
     simulate::<D, _>(text, |mut simulation| {
         displace(&mut simulation, |x| (motion * Vector3::from(x)).into());
@@ -255,7 +255,7 @@ fn the_stress_across_a_slice_is_that_of_the_solid_without_strain_there() {
             assert_close(&format!("{name} {law}"), &found, &wanted, 1e-11);
         }
     }
-    // The closed form for neo-Hooke: λ ln J.
+    // Closed form of the neo-Hookean stress across the plane: λ ln J.
     let law = format!("{ISOTROPIC}, stress = 'neo-hooke'");
     let [kirchhoff, ..] = stresses::<2>(&deck("plane-strain", &law, 6, 2.5), &motion);
     let lambda = 5.0 * 0.3 / (1.3 * 0.4);
@@ -264,7 +264,8 @@ fn the_stress_across_a_slice_is_that_of_the_solid_without_strain_there() {
         (kirchhoff[2] / wanted - 1.0).abs() < 1e-12,
         "{kirchhoff:?} {wanted}"
     );
-    // Entries of Hooke's matrix in the plane do not contain it: that of an isotropic solid with the same moduli.
+    // Plane entries of Hooke's matrix do not define the stress across the plane. It is that of an isotropic
+    // solid with the same moduli.
     let law = "c11 = 6, c22 = 8, c12 = 2, c66 = 3";
     let [kirchhoff, ..] = stresses::<2>(&deck("plane-strain", law, 6, 2.5), &motion);
     assert!(
@@ -283,7 +284,7 @@ fn a_sheet_has_the_cauchy_stress_of_the_solid_that_thins_freely() {
         for word in ["st-venant-kirchhoff", "neo-hooke"] {
             let law = format!("{ISOTROPIC}, stress = '{word}'");
             let solid = deck_of(name, "3d", &law, 6, 2.5);
-            // The stretch across at which the stress across is 0, between two that are too small and too large.
+            // Find the stretch across the plane with zero stress across, by bisection.
             let mut thinned = motion;
             let [mut low, mut high] = [0.7, 1.0];
             while high - low > 1e-14 {
@@ -303,12 +304,13 @@ fn a_sheet_has_the_cauchy_stress_of_the_solid_that_thins_freely() {
 
 #[test]
 fn an_orthotropic_sheet_has_its_own_moduli() {
-    // Pulled along its own first axis, which is turned by 90 degrees: E_x of the sheet along y.
+    // Tension along the first material axis, which is rotated by 90 degrees: the stiffness along y is E_x of
+    // the sheet.
     let law = "youngs_modulus_x = 8, youngs_modulus_y = 2, poisson_ratio_xy = 0.4, \
                shear_modulus_xy = 1.5, angle_1 = 90";
     simulate::<2, _>(&deck("plane-stress", law, 7, 2.5), |mut simulation| {
         let strain = 1e-7;
-        // ν_yx = ν_xy E_y/E_x; along y by strain, along x by −ν_xy strain.
+        // Strain along y, and −ν_xy times this strain along x.
         displace(&mut simulation, |[x, y, z]| {
             [x * (1.0 - 0.4 * strain), y * (1.0 + strain), z]
         });
@@ -326,8 +328,8 @@ fn an_orthotropic_sheet_has_its_own_moduli() {
     });
 }
 
-/// The eigenvalues of the stiffness of a body at rest, by central differences of the forces, over the
-/// largest.
+/// Return the eigenvalues of the stiffness of a body at rest, divided by the largest eigenvalue. The
+/// stiffness is computed by central differences of the forces.
 fn spectrum<const D: usize>(mut simulation: Simulation<D>) -> Vec<f64> {
     let owned = simulation.model.owned();
     let count = D * owned;
@@ -355,7 +357,7 @@ fn spectrum<const D: usize>(mut simulation: Simulation<D>) -> Vec<f64> {
 
 #[test]
 fn only_rigid_motions_cost_nothing_where_zero_energy_modes_are_controlled() {
-    /// The motions that are not rigid, from the softest.
+    /// Return the eigenvalues without those of rigid motions, in ascending order.
     fn elastic(mut spectrum: Vec<f64>, rigid: usize) -> Vec<f64> {
         spectrum.sort_by(f64::total_cmp);
         let rest = spectrum.split_off(rigid);
@@ -386,7 +388,7 @@ fn only_rigid_motions_cost_nothing_where_zero_energy_modes_are_controlled() {
         for (controlled, free) in of(name, more).iter().zip(&free) {
             let softest = controlled[0];
             assert!(softest > 1e-3, "{name} {more}: {softest}");
-            // Families at the surface see to it that none of the motions without control costs quite nothing.
+            // Families at the surface give every zero-energy mode a small stiffness.
             let softer = free.iter().filter(|value| **value < softest).count();
             assert!(
                 softer >= 16,
@@ -396,7 +398,7 @@ fn only_rigid_motions_cost_nothing_where_zero_energy_modes_are_controlled() {
     }
 }
 
-/// 1 and −1 by turns, from cell to cell.
+/// Return 1 or −1 with alternating sign from cell to cell.
 fn board(x: [f64; 3]) -> f64 {
     let sum: f64 = x.iter().map(|x| x.floor()).sum();
     if sum % 2.0 == 0.0 { 1.0 } else { -1.0 }
@@ -404,8 +406,8 @@ fn board(x: [f64; 3]) -> f64 {
 
 #[test]
 fn a_checkerboard_is_not_seen_inside_without_control_and_resisted_with_it() {
-    // In the middle, where the families of a point and of its neighbours are whole; the lowest force of a point
-    // there, by that of a strain of the same size.
+    // Return the smallest force in the middle, where a point and its neighbours have complete families,
+    // divided by the force of a strain of the same size.
     let resisted = |name: &str, more: &str| {
         let law = format!("youngs_modulus = 5, poisson_ratio = 0.3{more}");
         simulate::<3, _>(&deck_of(name, "3d", &law, 11, 2.0), |mut simulation| {
@@ -436,7 +438,7 @@ fn a_checkerboard_is_not_seen_inside_without_control_and_resisted_with_it() {
 
 #[test]
 fn a_checkerboard_is_resisted_and_decays() {
-    /// Kinetic and strain energy, J.
+    /// Return the sum of kinetic and strain energy, J.
     fn energy(simulation: &mut Simulation<3>) -> f64 {
         let mut history = HistoryObserver::new(simulation).unwrap();
         let energies = row(&mut history, simulation).energies;
@@ -459,7 +461,8 @@ fn a_checkerboard_is_resisted_and_decays() {
             },
         )
     };
-    // The share of it that is left in the middle of a larger block when nothing has come there from the surface.
+    // Return the fraction of the checkerboard that is left in the middle of a larger block, before waves
+    // arrive from the surface.
     let left = |name: &str, more: &str| {
         simulate::<3, _>(
             &deck_of(name, "3d", &law(more), 15, 2.0),
@@ -488,19 +491,20 @@ fn a_checkerboard_is_resisted_and_decays() {
         assert!(start > least * free, "{name} {more}: {start} {free}");
         assert!(end < 0.7 * start, "{name} {more}: {start} {end}");
         let left = left(name, more);
-        // A damped oscillation is within exp(−½ r t), and t within a step.
+        // The amplitude of a damped oscillation is at most exp(−½ r t); the margin allows for the time step.
         assert!(left < (-1.0_f64).exp() + 0.05, "{name} {more}: {left}");
     }
 }
 
-/// How a plane wave is polarised.
+/// Polarisation of a plane wave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Wave {
     Pressure,
     Shear,
 }
 
-/// Relative error of the force in the crest of a plane wave along x whose wavelength is 4π horizons, inside a block.
+/// Return the relative error of the force in the crest of a plane wave along x inside a block; the wavelength
+/// is 4π horizons.
 fn dispersion<const D: usize>(dimension: &str, law: &str, wave: Wave, modulus: f64) -> f64 {
     let (size, horizon, amplitude) = (15, 3.0, 1e-6);
     let text = deck_of("correspondence", dimension, law, size, horizon);
@@ -552,7 +556,8 @@ fn shear_waves_have_no_dispersion_of_the_second_order_with_the_control_of_that_n
             };
             let [none, wan, found] = ["none", "wan2019", "dispersion"].map(of);
             let case = format!("{dimension} {ratio}: {none:?} {wan:?} {found:?}");
-            // About (κδ)²/7 in space and /6 in the plane without control; (3b/4M − 1) times that with B = b/k I.
+            // Without control, the error is about −(κδ)²/7 in 3-D and −(κδ)²/6 in the plane. With B = b/k I
+            // it is (3b/4M − 1) times (κδ)²/7 or (κδ)²/6.
             assert!(
                 none.iter().all(|error| (-0.048..-0.03).contains(error)),
                 "{case}"
@@ -586,7 +591,7 @@ fn waves_of_an_orthotropic_solid_disperse_less_with_control_than_without() {
     assert!(found.abs() < 0.1 * wan.abs(), "{found} {wan}");
 }
 
-/// Rows between two cracks, above and below, carry no force and are counted.
+/// Assert that rows between two cracks carry no force and are counted as singular points.
 fn check_singular_rows(name: &str, [below, above]: [f64; 2], size: usize, horizon: f64) {
     let cracks = format!(
         "crack.above.segment = {{ from = [-1, {above}], to = [20, {above}] }}
@@ -621,7 +626,8 @@ fn check_singular_rows(name: &str, [below, above]: [f64; 2], size: usize, horizo
 #[test]
 fn points_with_too_few_bonds_carry_no_force_and_are_counted() {
     for name in LAWS {
-        // A row with bonds along itself alone, and two that would be 15 times as stiff as whole families.
+        // One row, with bonds along the row only; then two rows, which would be 15 times as stiff as complete
+        // families.
         check_singular_rows(name, [4.0, 5.0], 9, 2.5);
         check_singular_rows(name, [5.0, 7.0], 13, 3.5);
     }
@@ -629,7 +635,8 @@ fn points_with_too_few_bonds_carry_no_force_and_are_counted() {
 
 #[test]
 fn a_plate_that_is_torn_keeps_its_energy_at_the_default_step() {
-    // Families that lose nearly all bonds would become many times as stiff as those that the step is for.
+    // Families that lose nearly all bonds would become much stiffer than the families that determine the
+    // step.
     let torn = |law: &str| {
         let text = format!(
             "dimension = 'plane-stress'
@@ -664,13 +671,14 @@ fn a_plate_that_is_torn_keeps_its_energy_at_the_default_step() {
     ] {
         let (energies, broken) = torn(&law);
         assert!(broken > 2000, "{law}: {broken}");
-        // One crack through costs 5.4 J at 0.8 of G0; these branch. What runs away is wrong by powers of ten.
+        // One crack through the plate costs 5.4 J at 0.8 of G0; the cracks here branch. An unstable run would
+        // be wrong by orders of magnitude.
         assert!(
             (5.4..15.0).contains(&energies.fracture),
             "{law}: {energies:?}"
         );
         let error = energies.error.abs() / energies.fracture;
-        // 0.1 to 0.5 %: of the second order in the step.
+        // The error is 0.1 to 0.5 %, of second order in the step.
         assert!(error < 0.01, "{law}: {error}");
     }
 }
@@ -680,7 +688,7 @@ fn a_point_with_a_bond_turned_inside_out_carries_no_force_and_is_counted() {
     let law = "youngs_modulus = 5, poisson_ratio = 0.3, stress = 'neo-hooke'";
     let text = deck_of(LAWS[1], "plane-strain", law, 9, 2.5);
     simulate::<2, _>(&text, |mut simulation| {
-        // One point goes past its neighbour, whose family as a whole is not turned over.
+        // One point passes its neighbour; the family of the neighbour as a whole is not inverted.
         displace(&mut simulation, |[x, y, z]| {
             let moved = [x, y] == [4.5, 4.5];
             [x + if moved { 1.5 } else { 0.0 }, y, z]

@@ -1,4 +1,4 @@
-//! J2 plasticity in correspondence: against one-dimensional curves, under rotation, and in motion.
+//! J2 plasticity in correspondence, compared with one-dimensional curves, under rotation, and in dynamics.
 
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -11,11 +11,11 @@ use crate::support::{forces, simulate};
 const YOUNG: f64 = 5.0;
 const RATIO: f64 = 0.3;
 const SHEAR: f64 = YOUNG / (2.0 * (1.0 + RATIO));
-// Small strains, at which Cauchy's stress is nearly that of the law.
+// At the small strains of this yield stress, the Cauchy stress is nearly the stress of the law.
 const YIELD: f64 = 1e-4;
 const HARDENING: f64 = 0.4;
 
-/// A cube or square with a law that yields.
+/// Return the deck of a cube or square with a plastic law.
 fn deck(dimension: &str, more: &str) -> String {
     let (upper, lower, thickness) = match dimension {
         "3d" => ("[5, 5, 5]", "[0, 0, 0]", ""),
@@ -32,7 +32,7 @@ fn deck(dimension: &str, more: &str) -> String {
     )
 }
 
-/// Takes all points where a gradient of displacement has them, row by row.
+/// Displace all points by a homogeneous displacement gradient, given by rows, and evaluate the forces.
 fn strain<const D: usize>(
     simulation: &mut Simulation<D>,
     gradient: [[f64; 3]; 3],
@@ -48,7 +48,7 @@ fn strain<const D: usize>(
     simulation.evaluate(evolution);
 }
 
-/// A field, of which all points of the body have the same; their first row.
+/// Return the values of a field at the first point; all points must have the same values.
 fn same<const D: usize>(simulation: &mut Simulation<D>, field: Field) -> Vec<f64> {
     let snapshot = Snapshot::new(simulation);
     let all = snapshot.field(simulation, field);
@@ -70,7 +70,7 @@ fn dissipated<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     Snapshot::new(simulation).stored.dissipated[0]
 }
 
-/// A bar or a sheared sheet with a yield stress and linear hardening, as the numbers of one dimension.
+/// One-dimensional model of a bar or a sheared sheet with a yield stress and linear hardening.
 struct Curve {
     modulus: f64,
     strength: f64,
@@ -81,7 +81,7 @@ struct Curve {
 }
 
 impl Curve {
-    /// The stress (Pa) at a strain.
+    /// Advance the model to a strain, and return the stress, Pa.
     fn stress(&mut self, strain: f64) -> f64 {
         let trial = self.modulus * (strain - self.plastic);
         let limit = self.strength + self.hardening * self.flowed;
@@ -93,7 +93,7 @@ impl Curve {
     }
 }
 
-/// A cycle of strains, in units of that at which the body yields.
+/// Return a cycle of strains, in units of the yield strain.
 fn cycle() -> impl Iterator<Item = f64> {
     let legs = [(0, 30), (30, -25), (-25, 40), (40, 10)];
     legs.into_iter().flat_map(|(from, to): (i32, i32)| {
@@ -102,8 +102,8 @@ fn cycle() -> impl Iterator<Item = f64> {
     })
 }
 
-/// Follows a cycle; `motion` is the gradient of a strain and of the one across it, at which the first normal
-/// stress across is 0 if `free`.
+/// Follow a cycle. `motion` returns the displacement gradient for a strain and a strain across. If `free`,
+/// the strain across is chosen so that the first normal stress across is 0.
 fn follow<const D: usize>(
     mut simulation: Simulation<D>,
     mut curve: Curve,
@@ -118,7 +118,7 @@ fn follow<const D: usize>(
     for share in cycle() {
         let wanted = curve.stress(share * yields);
         if free {
-            // By secants, with forces that are only looked at.
+            // Secant method, with force evaluations that do not change the bond history.
             let mut of = |across: f64| {
                 strain(
                     &mut simulation,
@@ -155,7 +155,8 @@ fn follow<const D: usize>(
             "{share}: {flowed} for {}",
             curve.flowed
         );
-        // Of Cauchy's stress, which differs by the strain.
+        // The von Mises stress uses the Cauchy stress, which differs from the stress of the law by terms of
+        // the strain.
         let mises = same(&mut simulation, Field::VonMisesStress)[0];
         let limit = YIELD + HARDENING * flowed;
         assert!(mises < 1.005 * limit, "{share}: {mises} beyond {limit}");
@@ -225,7 +226,7 @@ fn in_plane_strain_the_stress_across_is_that_of_the_body_that_has_flowed() {
             let flowed = same(&mut simulation, Field::PlasticStrainEquivalent)[0];
             let limit = YIELD + HARDENING * flowed;
             assert!(mises < 1.005 * limit, "{share}: {mises} beyond {limit}");
-            // The end of the first pull.
+            // End of the first leg of the cycle.
             if number == 29 {
                 assert!(
                     flowed > 0.0 && mises > 0.995 * limit,
@@ -259,7 +260,7 @@ fn forces_that_are_only_looked_at_change_nothing() {
         assert_eq!(state(&simulation), kept);
         strain(&mut simulation, pulled(9.0), BondUpdate::None);
         assert_eq!(forces(&simulation), before);
-        // Nor does a step that brings nothing new.
+        // A step at the same strain does not change the state either.
         strain(&mut simulation, pulled(9.0), BondUpdate::Step(0.0));
         assert_eq!(forces(&simulation), before);
         assert_eq!(state(&simulation), kept);
@@ -315,7 +316,7 @@ fn the_energy_of_a_body_that_flows_is_balanced() {
         };
         ["plane-strain", "plane-stress"].map(of)
     };
-    // It falls with the square of the step.
+    // The error decreases with the square of the step.
     for (coarse, fine) in error(0.4).into_iter().zip(error(0.1)) {
         assert!(fine < 1e-3 && fine < 0.1 * coarse, "{coarse} {fine}");
     }
@@ -323,7 +324,7 @@ fn the_energy_of_a_body_that_flows_is_balanced() {
 
 #[test]
 fn the_energy_of_large_plastic_strains_is_balanced() {
-    // Stretched along x by up to a half.
+    // The body is stretched along x by up to 50 %.
     let run = |safety: f64| {
         let more = format!(
             "initial.burst.velocity = ['0.06*(x - 3.5)', '-0.06*(y - 3.5) + 0.01*x']
@@ -357,7 +358,8 @@ fn the_energy_of_large_plastic_strains_is_balanced() {
 
 #[test]
 fn a_relaxed_body_yields_as_one_that_is_pulled() {
-    // Supports of two horizons: the families of all whom free points are bonded to reach no end of the bar.
+    // The supports are two horizons long, so that the neighbours of free points have families without an end
+    // of the bar.
     let text = format!(
         "dimension = 'plane-stress'
         thickness = 0.5
@@ -397,7 +399,8 @@ fn a_relaxed_body_yields_as_one_that_is_pulled() {
     });
 }
 
-/// What a bar without hardening carries at 1 % of strain over its yield load, and the error of the energy balance over the work.
+/// Pull a bar without hardening to 1 % strain. Return its load divided by the yield load, and the error of
+/// the energy balance divided by the work.
 fn limit_load(control: &str) -> [f64; 2] {
     let text = format!(
         "dimension = '3d'
@@ -429,7 +432,7 @@ fn limit_load(control: &str) -> [f64; 2] {
 fn a_control_does_not_harden_a_bar_that_yields() {
     let [free, _] = limit_load("zero_energy = 'none'");
     assert!((free - 1.066).abs() < 0.002, "{free}");
-    // An elastic control makes 1.37, 1.33 and 2.40 of it.
+    // With an elastic control, the values would be 1.37, 1.33 and 2.40.
     for (control, most) in [
         ("zero_energy = 'dispersion'", 1.05),
         (
@@ -440,7 +443,7 @@ fn a_control_does_not_harden_a_bar_that_yields() {
     ] {
         let [load, error] = limit_load(control);
         assert!(load > free && load < most * free, "{control}: {load}");
-        // That of load steps in which the body begins to yield; without control as well.
+        // The error comes from load steps in which the body begins to yield, also without control.
         assert!(error.abs() < 1e-3, "{control}: {error}");
     }
 }

@@ -1,4 +1,4 @@
-//! What follows from the laws' declarations: the table of laws in the book, and laws for problems made in Rust.
+//! Uses of the laws' declarations: the table of laws in the book, and laws in problems built in Rust.
 
 use fissure::comm::threads;
 use fissure::dimension::{Constraint, Dimension};
@@ -24,7 +24,7 @@ fn key(key: &Key) -> String {
     format!("`{}`{words}", key.name)
 }
 
-/// Keys with what they mean, said once for those in a row that mean the same.
+/// List keys with their meanings; consecutive keys with the same meaning share one entry.
 fn keys(all: &[Key]) -> Vec<String> {
     let same = all.chunk_by(|a, b| a.meaning == b.meaning);
     same.map(|keys| {
@@ -83,7 +83,7 @@ fn names_of_laws_and_keys_are_said_once_and_have_a_meaning() {
     }
 }
 
-/// A problem of a small body with a law, built in Rust.
+/// Build the problem of a small body with a law.
 fn body(dimension: Dimension, law: Law, damage: Option<Damage>) -> Problem {
     let mut problem = Problem::new(dimension, 3.0, 1.0);
     problem.time.step = StepRule::Fixed(0.01);
@@ -100,7 +100,7 @@ fn body(dimension: Dimension, law: Law, damage: Option<Damage>) -> Problem {
     problem
 }
 
-/// What is wrong with a problem in `D` dimensions.
+/// Return the error of a problem in `D` dimensions.
 fn fault<const D: usize>(problem: &Problem) -> Option<String> {
     let comm = threads::alone();
     let made = Simulation::<D>::new(problem, &comm);

@@ -1,12 +1,13 @@
-//! What the laws are calibrated to: stiffness, stress, wave speeds and dispersion, held against closed
-//! forms and against sums over lattice offsets made here.
+//! Calibration of the laws: stiffness, stress, wave speeds and dispersion, compared with closed forms and
+//! with sums over lattice offsets computed here.
 
 use crate::support::{displace, simulate};
 use fissure::problem::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 
-/// A body of unit spacing, `half` points to each side of a central one at the origin.
+/// Return the deck of a body of unit spacing, with `half` points to each side of a central point at the
+/// origin.
 fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -> String {
     let (lower, upper) = (-f64::from(half) - 0.5, f64::from(half) + 0.5);
     let (dimension, constraint) = match dimension {
@@ -41,7 +42,7 @@ fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -
     )
 }
 
-/// The trace of a strain in space by that in the plane or in space.
+/// Return the ratio of the 3-D trace of a strain to its trace over the axes of the setting.
 fn trace_share(dimension: &str, ratio: f64) -> f64 {
     match dimension {
         "plane-stress" => (1.0 - 2.0 * ratio) / (1.0 - ratio),
@@ -49,14 +50,14 @@ fn trace_share(dimension: &str, ratio: f64) -> f64 {
     }
 }
 
-/// The point at the origin.
+/// Return the index of the point at the origin.
 fn centre<const D: usize>(simulation: &Simulation<D>) -> usize {
     let model = &simulation.model;
     let at_origin = |point: &usize| model.position(*point).iter().all(|x| x.abs() < 1e-9);
     (0..model.owned()).find(at_origin).expect("a central point")
 }
 
-/// Strain energy density (J/m³) and stress (Pa) of the central point and its dilatation after a map.
+/// Return strain energy density (J/m³), stress (Pa) and dilatation of the central point after a deformation.
 fn response<const D: usize>(
     simulation: &mut Simulation<D>,
     map: impl Fn([f64; 3]) -> [f64; 3],
@@ -86,7 +87,7 @@ fn bulk_stiffness_of_the_prototype_law_on_a_cubic_lattice() {
 
 #[test]
 fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
-    // Two horizons from the surface, so that neighbours have the same constant.
+    // The central point is two horizons from the surface, so that its neighbours have the same constant.
     for (dimension, own) in [
         ("plane-stress", 1.0 / 3.0),
         ("plane-strain", 0.25),
@@ -151,7 +152,7 @@ fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
     }
 }
 
-/// Σ ω|ξ|², Σ ω ξx⁴/|ξ|² and Σ ω ξx²ξy²/|ξ|² over the offsets of a lattice within a horizon.
+/// Return Σ ω|ξ|², Σ ω ξx⁴/|ξ|² and Σ ω ξx²ξy²/|ξ|² over the offsets of a lattice within a horizon.
 fn moments(count: usize, horizon: f64, influence: impl Fn(f64) -> f64) -> [f64; 3] {
     let reach = horizon as i32;
     let range = |k: usize| if k < count { -reach..=reach } else { 0..=0 };
@@ -175,9 +176,9 @@ fn moments(count: usize, horizon: f64, influence: impl Fn(f64) -> f64) -> [f64; 
 
 #[test]
 fn the_ordinary_law_under_every_strain() {
-    // The law takes the fourth moments of the family for isotropic. On a square or cubic lattice they
-    // are not: an axis-parallel deviatoric strain meets the shear modulus G (A − B) a/2m and a shear
-    // along the axes G B a/m, with a = 8 in the plane, 15 in space. Dilatation and pressure are exact.
+    // The law assumes isotropic fourth moments of the family, which a square or cubic lattice does not have.
+    // The shear modulus is G (A − B) a/2m for an axis-parallel deviatoric strain and G B a/m for a shear
+    // along the axes, with a = 8 in the plane and 15 in 3-D. Dilatation and pressure are exact.
     type Named = (&'static str, fn(f64) -> f64);
     let influences: [Named; 3] = [
         ("constant", |_| 1.0),
@@ -222,7 +223,7 @@ fn the_ordinary_law_under_every_strain() {
                 "{case}: {}",
                 modulus / shear
             );
-            // Stretching one axis and shortening another.
+            // Extension along one axis and equal shortening along another.
             let (energy, stress, dilatation) = of(&|[x, y, z]| [x + tiny * x, y - tiny * y, z]);
             let modulus = shear * factor * (axial - mixed) / (2.0 * m);
             let expected = 2.0 * modulus * tiny * tiny;
@@ -235,7 +236,7 @@ fn the_ordinary_law_under_every_strain() {
                 "{case}"
             );
             assert!(dilatation.abs() < 1e-5 * tiny, "{case}: {dilatation}");
-            // One axis alone: the mean of the stresses is that of the classical solid.
+            // Extension along one axis: the mean stress is that of the classical solid.
             let (_, stress, dilatation) = of(&|[x, y, z]| [x + tiny * x, y, z]);
             let mean = stress[..count].iter().sum::<f64>() / f64::from(count as u32);
             let bulk = match dimension {
@@ -258,7 +259,7 @@ fn a_bar_without_strain_across_has_stress_there() {
     let map = |[x, y, z]: [f64; 3]| [1.001 * x, y, z];
     let deck = deck("uniaxial-strain", 3.0, 6, "exact", law);
     let (_, stress, dilatation) = simulate::<1, _>(&deck, |mut s| response(&mut s, map));
-    // σ = (λ + 2μ) ε with λ = μ = 2 Pa, along and λ ε across.
+    // σ = (λ + 2μ) ε along the bar and λ ε across, with λ = μ = 2 Pa.
     for (entry, modulus) in [(0, 6.0), (1, 2.0), (2, 2.0)] {
         let expected = modulus * 1e-3 * 1.001;
         assert!((stress[entry] / expected - 1.0).abs() < 1e-2, "{stress:?}");
@@ -310,7 +311,7 @@ fn a_bar_that_contracts_freely_has_youngs_modulus_and_no_stress_across() {
             (dilatation / wanted - 1.0).abs() < 1e-9,
             "{law}: {dilatation}"
         );
-        // The cross-section is smaller by the square of F^(−ν).
+        // The cross-section changes by the factor F^(−2ν).
         let volume = libm::pow(stretch, 1.0 - 2.0 * ratio);
         assert!(
             (cauchy * volume / stress[0] - 1.0).abs() < 1e-12,
@@ -320,8 +321,8 @@ fn a_bar_that_contracts_freely_has_youngs_modulus_and_no_stress_across() {
     }
 }
 
-/// Energy density and stress (xx, yy, zz, xy, yz, xz) of a bond-based law at a small strain, from the sum
-/// over the offsets within the horizon: W = ¼ Σ c (n·E n)² |ξ| V, σ = ½ Σ c (n·E n) |ξ| n⊗n V.
+/// Return energy density and stress (xx, yy, zz, xy, yz, xz) of a bond-based law at a small strain, from the
+/// sum over the offsets within the horizon: W = ¼ Σ c (n·E n)² |ξ| V, σ = ½ Σ c (n·E n) |ξ| n⊗n V.
 fn lattice_response(
     count: usize,
     horizon: f64,
@@ -366,7 +367,7 @@ fn bond_based_laws_under_every_strain() {
     let (horizon, modulus) = (3.0, 5.0);
     let pi = std::f64::consts::PI;
     for (dimension, count, section, c, energy, bulk_energy) in [
-        // E as c, classical energy at unit isotropic stretch, and 9K/4 for the printed form.
+        // For E = 1: c, the classical energy at unit isotropic stretch, and 9K/4 for the printed form.
         ("uniaxial-strain", 1, 1.0, 12.0 / (5.0 * 9.0), 0.6, 0.0),
         ("uniaxial-stress", 1, 1.0, 2.0 / 9.0, 0.5, 0.0),
         ("1d", 1, 1.0, 2.0 / 9.0, 0.5, 0.0),
@@ -390,7 +391,7 @@ fn bond_based_laws_under_every_strain() {
     ] {
         let (c, energy, bulk_energy) = (c * modulus, energy * modulus, bulk_energy * modulus);
         let sum = |of: fn(f64) -> f64| {
-            // Twice the energy at unit stretch with c = 2 of(r)/r is Σ of(r).
+            // Σ of(r) is the energy at unit stretch with c = 4 of(r)/r.
             let isotropic = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             section * lattice_response(count, horizon, isotropic, |r| 4.0 * of(r) / r).0
         };
@@ -433,9 +434,9 @@ fn bond_based_laws_under_every_strain() {
                 continue;
             }
             let thickness = if count == 2 { "thickness = 0.5\n" } else { "" };
-            // Two horizons to each side, so that neighbours have whole families.
+            // Two horizons to each side, so that the neighbours have complete families.
             let deck = format!("{thickness}{}", deck(dimension, horizon, 6, "none", law));
-            // Each component alone: a stretch of an axis or a shear between two.
+            // Each component alone: a stretch along an axis, or a shear of two axes.
             for (a, b) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] {
                 if b >= count {
                     continue;
@@ -474,7 +475,7 @@ fn bond_based_laws_under_every_strain() {
     }
 }
 
-/// The phase speed (m/s) of a plane wave along x, from the force on the central point.
+/// Return the phase speed (m/s) of a plane wave along x, from the force on the central point.
 fn phase_speed<const D: usize>(deck: &str, wave_number: f64, density: f64) -> f64 {
     simulate::<D, _>(deck, |mut simulation| {
         let amplitude = 1e-6 / wave_number;
@@ -534,7 +535,8 @@ fn waves_in_a_bar_disperse_as_the_integral_says() {
 
 #[test]
 fn gauss_points_integrate_a_cell() {
-    // Two points by direction integrate cubic polynomials exactly: ∫ x² and ∫ x²y² over [−3/2, 3/2]², half a metre thick.
+    // Two points per direction integrate cubic polynomials exactly: ∫ x² and ∫ x²y² over [−3/2, 3/2]²,
+    // thickness 0.5 m.
     let text = "dimension = 'plane-strain'
         thickness = 0.5
         [grid]

@@ -1,17 +1,17 @@
-//! Bonds between bodies: what each rule makes of their constants, pair by pair, and that whatever the
-//! rule action and reaction cancel.
+//! Bonds between bodies: the constants of each rule, for each pair; with every rule, the forces of a bond are
+//! equal and opposite.
 
 use crate::support::{displace, largest_force, simulate, simulate_on};
 use fissure::solver::Simulation;
 
-/// The micromodulus of a bar under uniaxial strain, 12E/(5δ²A) (N/m⁶).
+/// Return the micromodulus of a bar under uniaxial strain, 12E/(5δ²A), N/m⁶.
 fn micromodulus(modulus: f64, horizon: f64) -> f64 {
     12.0 * modulus / (5.0 * horizon * horizon)
 }
 
 #[test]
 fn each_pair_has_its_rule() {
-    // Three points a metre apart, each a body; the outer two of moduli and horizons of their own.
+    // Three points 1 m apart, each a body. The two outer bodies have other moduli and horizons.
     let text = |interface: &str| {
         format!(
             "dimension = '1d'
@@ -30,7 +30,7 @@ fn each_pair_has_its_rule() {
     };
     let found = |interface: &str| {
         simulate::<1, _>(&text(interface), |mut simulation| {
-            // The middle stays; both bonds have the stretch 0.1.
+            // The middle point stays in place; both bonds have the stretch 0.1.
             displace(&mut simulation, |[x, ..]| [1.5 + 1.1 * (x - 1.5), 0.0, 0.0]);
             [0, 2].map(|point| simulation.fields.internal_force[0][point].abs() / 0.1)
         })
@@ -72,7 +72,7 @@ fn each_pair_has_its_rule() {
 
 #[test]
 fn bodies_with_the_rule_none_do_not_feel_each_other() {
-    // Three blocks side by side, the last of a law whose bonds none of the others can have.
+    // Three blocks side by side; the law of the last block cannot share bonds with the others.
     let force = |family: &str, interface: &str| {
         let text = format!(
             "dimension = 'plane-strain'
@@ -87,7 +87,7 @@ fn bodies_with_the_rule_none_do_not_feel_each_other() {
             "
         );
         simulate::<2, _>(&text, |mut simulation| {
-            // Each moves as a whole; the middle one comes nearer to the left one.
+            // Each block moves as a rigid body; the middle block approaches the left block.
             displace(&mut simulation, |[x, y, z]| {
                 let shift = [0.0, -0.5, 0.7][(x / 5.0) as usize];
                 [x + shift, y, z]
@@ -104,7 +104,8 @@ fn bodies_with_the_rule_none_do_not_feel_each_other() {
     }
 }
 
-/// Three blocks of three moduli, horizons and spacings with a rule for each pair; two of them can break.
+/// Return the deck of three blocks with different moduli, horizons and spacings, and a rule for each pair.
+/// Two of the blocks can break.
 fn blocks(law: [&str; 3], correction: &str, rules: [&str; 3]) -> String {
     let [soft, firm, hard] = law;
     let [first, second, third] = rules;
@@ -182,9 +183,9 @@ fn momentum_is_kept_by_every_rule() {
 
 #[test]
 fn pieces_that_are_worked_on_between_messages_do_not_cut_vectors() {
-    // Points of the fine layers have bonds in two lists, then in a lattice, and the sum of three numbers depends on
-    // their order. Each rank has more points than are worked on in one piece, and the borders between pieces fall
-    // elsewhere in a vector of the lattice for each width.
+    // Points of the fine layers have bonds in two lists and in a lattice, and floating-point sums depend on
+    // the order of their terms. Each rank has more points than one piece of work. For each width, the borders
+    // between pieces cut the vectors of the lattice elsewhere.
     let piece = 4096 * rayon::current_num_threads();
     let layers = |below: usize, above: usize, width: usize| {
         let boxes = (0..piece / 280).map(|n| {
@@ -226,7 +227,7 @@ fn pieces_that_are_worked_on_between_messages_do_not_cut_vectors() {
     }
 }
 
-/// Bonds broken between the bodies and within them, on one rank without damage in the bodies.
+/// Return the numbers of bonds broken between the bodies and within the bodies, on one rank.
 fn broken_by_kind<const D: usize>(simulation: &Simulation<D>) -> [usize; 2] {
     let mut broken = [0, 0];
     let block = &simulation.model.block;
@@ -238,7 +239,7 @@ fn broken_by_kind<const D: usize>(simulation: &Simulation<D>) -> [usize; 2] {
 
 #[test]
 fn an_interface_opens_at_the_strain_of_its_strength() {
-    // Under a uniform strain the bonds along the normal reach their critical stretch first.
+    // Under a uniform strain, the bonds along the normal reach their critical stretch first.
     let strength = 0.02;
     for (dimension, law, modulus) in [
         (
@@ -284,8 +285,8 @@ fn an_interface_opens_at_the_strain_of_its_strength() {
 
 #[test]
 fn a_bar_opens_at_the_stress_of_its_strength() {
-    // Equilibria under a stress at its ends. Bodies of unlike stiffness open a little earlier, because most of a bond may lie
-    // in the softer one.
+    // Equilibria under a stress at the ends of the bar. Bodies of different stiffness open slightly earlier,
+    // because most of a bond may lie in the softer body.
     let opens = |modulus: f64, share: f64| {
         let deck = format!(
             "dimension = '1d'

@@ -1,6 +1,6 @@
-//! What every law must do in every dimension: nothing at rest, nothing under rigid motion, equal and
-//! opposite forces, forces that are the slope of the energy, both ends of a bond broken together, the same bits
-//! however it is run.
+//! Requirements on every law in every dimension. No force at rest or under rigid motion; equal and opposite
+//! forces that are the derivative of the energy. Both ends of a bond break together. Bits are equal on any
+//! ranks and after restarts.
 
 use crate::support::saved::{state, whole};
 use crate::support::{displace, force, forces, largest_force, problem, simulate, simulate_on};
@@ -12,14 +12,14 @@ use fissure::solver::bonds::BondUpdate;
 use fissure::solver::motion::{Kept, Saved, SavedBonds};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
-/// A law, and what stands in its table beside density and Young's modulus.
+/// A law with one of its examples: the keys beside density and Young's modulus.
 #[derive(Clone, Copy)]
 pub(super) struct Case {
     pub(super) law: &'static Declaration,
     pub(super) example: &'static str,
 }
 
-/// Every law with each of its examples.
+/// Return every law with each of its examples.
 pub(super) fn cases() -> impl Iterator<Item = Case> {
     declarations().flat_map(|law| {
         law.examples
@@ -29,7 +29,7 @@ pub(super) fn cases() -> impl Iterator<Item = Case> {
 }
 
 impl Case {
-    /// As the material `rubber`.
+    /// Return the table of the law for `[material.rubber]`.
     pub(super) fn table(self) -> String {
         let Self { law, example } = self;
         let comma = if example.is_empty() { "" } else { ", " };
@@ -37,7 +37,7 @@ impl Case {
         format!("{name} = {{ density = 2, youngs_modulus = 5{comma}{example} }}")
     }
 
-    /// Whether the law has a 1-D form.
+    /// Return whether the law has a 1-D form.
     pub(super) fn has_line(self) -> bool {
         let problem = problem(&deck("plane-stress", &self.table(), "none", ""));
         let line = Dimension::Line {
@@ -51,20 +51,22 @@ impl Case {
         !self.damages(0.0).is_empty()
     }
 
-    /// What its bonds can break by, with this α.
+    /// Return the damage laws that the law supports, with this α.
     pub(super) fn damages(&self, alpha: f64) -> Vec<String> {
         let stretch = self.law.critical_stretch.map(|_| damage(alpha));
-        // About the energy of a critical stretch of 0.02.
+        // The fracture energies correspond to a critical stretch of about 0.02.
         let energy = |fracture_energy: f64, more| {
             let text = format!("fracture_energy = {fracture_energy}, alpha = {alpha}{more}");
             format!("damage.brittle.energy = {{ {text} }}")
         };
-        // With an influence only where all volumes are whole.
+        // Damage by work does not support influence functions with volume corrections, so these laws are
+        // excluded.
         let influenced = ["influence", "diehl2016"];
         let influenced = influenced.iter().any(|word| self.example.contains(word));
         let by_energy = self.law.breaks_by_energy && !influenced;
         let pulled = by_energy.then(|| energy(0.004, ""));
-        // With more, for the motions here press bonds so that all would break.
+        // The fracture energy is larger here, because the motions of these tests compress bonds so much that
+        // all would break.
         let either = by_energy && self.law.any_poisson_ratio;
         let either = either.then(|| energy(0.02, ", tension_only = false, family_correction = 1"));
         stretch.into_iter().chain(pulled).chain(either).collect()
@@ -82,10 +84,10 @@ impl Case {
 
 const CORRECTIONS: [&str; 3] = ["none", "linear", "exact"];
 
-/// A law for tests that are about something else.
+/// A law for tests that do not depend on the law.
 const PMB: &str = "pmb = { density = 2, youngs_modulus = 5 }";
 
-/// A body of about 400 points with the law given, in each dimension.
+/// Return the deck of a body of about 400 points with a law.
 pub(super) fn deck(dimension: &str, law: &str, correction: &str, extra: &str) -> String {
     let (upper, thickness) = match dimension {
         "1d" => ("[40]", ""),
@@ -104,7 +106,7 @@ pub(super) fn deck(dimension: &str, law: &str, correction: &str, extra: &str) ->
     )
 }
 
-/// What distinguishes the cases of a test.
+/// Describe the case of a test for messages.
 fn description<const D: usize>(simulation: &Simulation<D>) -> String {
     let problem = simulation.problem;
     let (dimension, correction) = (problem.dimension, problem.volume_correction);
@@ -118,7 +120,7 @@ pub(super) fn damage(alpha: f64) -> String {
     format!("damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = {alpha} }}")
 }
 
-/// Applies a check to a simulation of each law, volume correction and dimension.
+/// Apply a check to a simulation of each law, volume correction and dimension.
 macro_rules! for_all_laws {
     ($check:ident) => {
         for_all_laws!($check, |_: &Case| true)
@@ -138,8 +140,7 @@ macro_rules! for_all_laws {
     };
 }
 
-/// The largest force density at one per cent of isotropic or of deviatoric strain, to measure others
-/// by.
+/// Return the largest force density at 1 % of isotropic or deviatoric strain, a scale for other forces.
 fn force_scale<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     displace(simulation, |x| x.map(|x| 1.01 * x));
     let isotropic = largest_force(simulation);
@@ -153,7 +154,7 @@ fn nothing_at_rest_and_under_translation() {
         let scale = force_scale(&mut simulation);
         displace(&mut simulation, |x| x);
         assert_eq!(largest_force(&simulation), 0.0);
-        // Displacements that are sums of powers of two are exact.
+        // Displacements that are sums of powers of two have no rounding errors.
         displace(&mut simulation, |x| [x[0] + 0.5, x[1] - 4.25, x[2] + 64.0]);
         assert_eq!(largest_force(&simulation), 0.0);
         displace(&mut simulation, |x| {
@@ -164,10 +165,10 @@ fn nothing_at_rest_and_under_translation() {
     for_all_laws!(check);
 }
 
-/// Angles (rad) that bodies are turned by.
+/// Angles of rotation, rad.
 const ANGLES: [f64; 3] = [0.3, 1.0, 2.5];
 
-/// Turns about z, then about x in 3-D.
+/// Rotate a position about z, and in 3-D also about x.
 fn turn<const D: usize>(angle: f64, x: [f64; 3]) -> [f64; 3] {
     let (sin, cos) = angle.sin_cos();
     let once = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
@@ -181,7 +182,7 @@ fn turn<const D: usize>(angle: f64, x: [f64; 3]) -> [f64; 3] {
 #[test]
 fn a_body_that_is_turned_has_its_forces_turned() {
     fn check<const D: usize>(mut simulation: Simulation<D>) {
-        // Bonds that remember must come to all from the same past.
+        // Laws with a bond history must start each rotation from the same history.
         let mut kept = Kept::default();
         simulation.keep(&mut kept);
         displace(&mut simulation, wave);
@@ -237,7 +238,7 @@ fn nothing_under_finite_rotation() {
 fn no_bond_breaks_under_rigid_rotation_of_any_size() {
     fn check<const D: usize>(mut simulation: Simulation<D>) {
         let before = count_intact(&mut simulation);
-        // A twentieth of the strain at which bonds break.
+        // This strain is 1/20 of the strain at which bonds break.
         let strained = |[x, y, z]: [f64; 3]| [1.001 * x, 0.9995 * y + 5e-4 * x, 0.9997 * z];
         for angle in [0.0, 0.01, 0.3, 1.0, 2.5, std::f64::consts::PI] {
             displace(&mut simulation, |x| turn::<D>(angle, strained(x)));
@@ -255,7 +256,7 @@ fn no_bond_breaks_under_rigid_rotation_of_any_size() {
             simulate(&breakable("3d"), check::<3>);
         }
     }
-    // Bonds between bodies of laws whose forces act along bonds and of others.
+    // Bonds between a law with forces along the bonds and a law with other directions.
     let text = "dimension = 'plane-strain'
         grid = { spacing = 1, horizon = 3 }
         material.soft.correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
@@ -268,7 +269,7 @@ fn no_bond_breaks_under_rigid_rotation_of_any_size() {
     simulate(text, check::<2>);
 }
 
-/// A smooth, uneven map with strains of several per cent.
+/// A smooth, non-uniform deformation with strains of several per cent.
 fn wave(x: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = x;
     [
@@ -278,8 +279,8 @@ fn wave(x: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// The moments of all forces about the axes, and the sums of their sizes, N m; arms are those of the
-/// bonds, deformed, except where forces act along undeformed ones.
+/// Return the moments of all forces about the axes, and the sums of their absolute values, N m. Lever arms
+/// are the deformed positions, except for linear laws, whose forces act along undeformed bonds.
 fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
     let bodies = &simulation.problem.bodies;
     let linear = (bodies.iter()).any(|body| body.material.law.declaration.linear);
@@ -304,7 +305,8 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
     sums
 }
 
-/// Forces add up to nothing, and do not turn the body where the law says so.
+/// Assert that the sum of the forces is zero; for laws that conserve angular momentum, also the sum of the
+/// moments.
 pub(super) fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
     displace(&mut simulation, wave);
     let laws = simulation
@@ -316,7 +318,7 @@ pub(super) fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
     let bound = if kept.all(|invariants| invariants.angular_momentum) {
         1e-12
     } else {
-        // The square of a strain, of the part that the family does not see.
+        // The bound is the square of the non-uniform part of the strain.
         1e-2
     };
     for [net, gross] in moments(&simulation) {
@@ -351,7 +353,7 @@ fn forces_are_equal_and_opposite() {
     }
 }
 
-/// Two blocks of different materials, horizons and spacings, one of which can break.
+/// Return decks of two blocks with different materials, horizons and spacings; one block can break.
 fn two_blocks() -> Vec<String> {
     let pmb = [
         "pmb = { density = 2, youngs_modulus = 5 }",
@@ -392,7 +394,7 @@ fn two_blocks() -> Vec<String> {
     decks
 }
 
-/// Strain energy of the whole body, J.
+/// Return the strain energy of the whole body, J.
 pub(super) fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     simulation.evaluate(BondUpdate::None);
     let stored = simulation.forces.stored(&simulation.model);
@@ -400,7 +402,7 @@ pub(super) fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f
     energy.map(|(density, volume)| density * volume).sum()
 }
 
-/// Forces are the slope of the strain energy.
+/// Assert that forces are the negative derivative of the strain energy.
 pub(super) fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
     displace(&mut simulation, wave);
     let before = forces(&simulation);
@@ -429,7 +431,7 @@ pub(super) fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
 #[test]
 fn the_force_is_the_slope_of_the_energy() {
     for_all_laws!(check_slope, Case::is_conservative);
-    // With bonds that the motion has broken.
+    // The same with bonds that the deformation has broken.
     let breakable = |case: &Case| case.can_break() && case.is_conservative();
     for case in cases().filter(breakable) {
         let body = |dimension| deck(dimension, &case.table(), "exact", ", damage = 'brittle'");
@@ -444,7 +446,7 @@ fn the_force_is_the_slope_of_the_energy() {
     }
 }
 
-/// Laws that dissipate: at a fixed history of bonds the force is the slope of what they store.
+/// Laws that dissipate: with a fixed bond history, the force is the derivative of the stored energy.
 #[test]
 fn with_a_fixed_history_the_force_is_the_slope_of_the_energy() {
     let names = [
@@ -470,7 +472,7 @@ fn with_a_fixed_history_the_force_is_the_slope_of_the_energy() {
     }
 }
 
-/// As [`check_slope`], after some time at smaller strains, in which bonds flow.
+/// As [`check_slope`], after loading at smaller strains during which bonds yield.
 fn check_slope_after_loading<const D: usize>(mut simulation: Simulation<D>) {
     for share in [0.25, 0.5, 0.75] {
         displace(&mut simulation, |x| {
@@ -512,7 +514,7 @@ fn the_mirror_image_has_the_mirrored_forces() {
             .iter()
             .fold(0.0_f64, |a, x| a.max(*x));
         let mirror = move |x: [f64; 3]| [upper + 0.5 - x[0], x[1], x[2]];
-        // Bonds that remember must come to both from the same past.
+        // Laws with a bond history must start both deformations from the same history.
         let mut kept = Kept::default();
         simulation.keep(&mut kept);
         displace(&mut simulation, wave);
@@ -579,7 +581,7 @@ fn together<const D: usize>(text: &str) {
     }
 }
 
-/// Steps of a run whose bits are compared.
+/// Number of steps of a run whose bits are compared.
 const STEPS: usize = 8;
 
 #[test]
@@ -644,7 +646,8 @@ pub(super) fn same_bits<const D: usize>(text: &str) {
     assert!(whole(continued) == wanted, "after a restart: {text}");
 }
 
-/// The same for pairs of bodies whose bonds have damage of their own, by stretch and by work, and unlike ends.
+/// The same for pairs of bodies with their own damage law, by stretch and by work, and with different laws at
+/// both ends.
 #[test]
 fn damage_of_a_pair_has_the_same_bits_on_any_ranks_and_after_a_restart() {
     let ordinary = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
@@ -690,7 +693,7 @@ fn damage_of_a_pair_has_the_same_bits_on_any_ranks_and_after_a_restart() {
     }
 }
 
-/// What several ranks have saved as if one had.
+/// Join the saved states of several ranks to the state of one rank.
 fn joined(parts: Vec<Saved>) -> Saved {
     let mut parts = parts.into_iter();
     let first = parts.next().unwrap();
@@ -704,7 +707,7 @@ fn joined(parts: Vec<Saved>) -> Saved {
     })
 }
 
-/// The part of some points of what one rank has saved.
+/// Return the part of a saved state that belongs to a range of points.
 fn part(all: &Saved, first: usize, count: usize) -> Saved {
     let SavedBonds { lengths, bytes } = &all.bonds;
     let end = |points: usize| lengths[..points].iter().sum::<u32>() as usize;
@@ -725,7 +728,7 @@ fn count_intact<const D: usize>(simulation: &mut Simulation<D>) -> u32 {
     stored.neighbours.iter().sum::<f64>() as u32
 }
 
-/// The ids at both ends of every intact bond of the rank's points.
+/// Return the ids at both ends of every intact bond of the rank's points.
 fn intact_bonds<const D: usize>(simulation: &mut Simulation<D>) -> Vec<(u64, u64)> {
     let mut bonds = Vec::new();
     simulation
@@ -755,11 +758,11 @@ fn a_bond_breaks_at_the_critical_stretch_and_not_before() {
         displace(&mut simulation, |x| [x[0] * 1.125, 0.0, 0.0]);
         assert_eq!(count_intact(&mut simulation), 0);
         assert_eq!(largest_force(&simulation), 0.0);
-        // What the bond held has been set free, half of it at each end.
+        // The energy of the bond has been released, half of it at each end.
         let set_free: f64 = simulation.fields.freed_energy.iter().flatten().sum();
         let held: f64 = stored.energy.iter().sum();
         assert!((set_free / held - 1.0).abs() < 1e-5);
-        // Broken for good.
+        // A broken bond does not heal.
         displace(&mut simulation, |x| x);
         assert_eq!(count_intact(&mut simulation), 0);
     });
@@ -767,7 +770,7 @@ fn a_bond_breaks_at_the_critical_stretch_and_not_before() {
 
 #[test]
 fn compression_of_a_neighbour_bond_raises_the_threshold() {
-    // Three points in a row; the left bond is compressed to s = −0.2, the right one stretched.
+    // Three points in a row. The left bond is compressed to s = −0.2, and the right bond is stretched.
     let text = |alpha: f64| {
         format!(
             "dimension = '1d'
@@ -789,8 +792,8 @@ fn compression_of_a_neighbour_bond_raises_the_threshold() {
             count_intact(&mut simulation)
         })
     };
-    // The right bond's far end has no compressed bond; it takes the smaller threshold of its ends:
-    // s0 − α·stretch there, which lies below s0.
+    // The right bond has the smaller threshold of its two ends. The right end has no compressed bond, so its
+    // threshold is s0 − α·stretch, below s0.
     assert_eq!(after(0.0, 0.099), 4);
     assert_eq!(after(0.0, 0.101), 2);
     assert_eq!(after(0.25, 0.079), 4);
@@ -821,7 +824,7 @@ fn bonds_of_a_no_failure_zone_hold() {
             intact_bonds(&mut simulation)
         });
         let bonds: Vec<_> = parts.into_iter().flatten().collect();
-        // x = (id mod 22) + ½: exactly the bonds with an end left of 8 are left.
+        // x = (id mod 22) + ½. Exactly the bonds with an end at x < 8 remain.
         let left = |id: u64| id % 22 < 8;
         assert!(bonds.iter().all(|(a, b)| left(*a) || left(*b)));
         let corner = bonds.iter().filter(|(a, _)| *a == 0).count();
@@ -854,7 +857,7 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
                 _ => {}
             }
         }
-        // Opening the crack pulls on no bond across it.
+        // Opening the crack stretches no intact bond.
         displace(&mut simulation, |x| match x {
             [a, b, c] if b > 9.0 => [a, b + 0.5, c],
             same => same,

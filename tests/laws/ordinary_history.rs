@@ -1,4 +1,4 @@
-//! Ordinary laws with memory: relaxation and yielding against closed forms.
+//! Ordinary laws with a bond history: relaxation and yielding, compared with closed forms.
 
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -8,7 +8,7 @@ use fissure::solver::observers::{HistoryObserver, Snapshot};
 use crate::support::history::{column, row};
 use crate::support::simulate;
 
-/// A block whose central point has a whole family of whole families.
+/// Return the deck of a block whose central point and its neighbours have complete families.
 fn deck(dimension: &str, law: &str) -> String {
     let (lower, upper, origin, horizon) = match dimension {
         "3d" => (
@@ -29,7 +29,7 @@ fn deck(dimension: &str, law: &str) -> String {
     )
 }
 
-/// Strains the body in a step (s); `over` has the displacement along x by strain.
+/// Strain the body in a step (s); `over` returns the displacement along x per strain.
 fn strain<const D: usize>(
     simulation: &mut Simulation<D>,
     strain: f64,
@@ -43,19 +43,20 @@ fn strain<const D: usize>(
     simulation.evaluate(BondUpdate::Step(step));
 }
 
-/// Shears the body to γ in a step (s).
+/// Shear the body to γ in a step (s).
 fn shear<const D: usize>(simulation: &mut Simulation<D>, gamma: f64, step: f64) {
     strain(simulation, gamma, |[_, y, _]| y, step);
 }
 
-/// The shear stress (Pa) of the central point, its strain energy density and what it has dissipated, J/m³.
+/// Return the shear stress (Pa), the strain energy density and the dissipated energy density (J/m³) of the
+/// central point.
 fn centre<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 3] {
     let ([.., xy, _, _], energies) = whole_centre(simulation);
     [xy, energies[0], energies[1]]
 }
 
-/// The stress (Pa) of the central point as xx, yy, zz, xy, yz, xz; its strain energy density and what it has
-/// dissipated, J/m³.
+/// Return the stress (Pa) of the central point as xx, yy, zz, xy, yz, xz, and its strain energy density and
+/// dissipated energy density, J/m³.
 fn whole_centre<const D: usize>(simulation: &mut Simulation<D>) -> ([f64; 6], [f64; 2]) {
     let model = &simulation.model;
     let at_origin = |point: &usize| model.position(*point).iter().all(|x| x.abs() < 1e-9);
@@ -79,7 +80,7 @@ fn stress_relaxes_as_that_of_a_standard_linear_solid() {
          relaxation_time = {time}, relaxing_share = {share} }}"
     );
     fn check<const D: usize>(mut simulation: Simulation<D>, time: f64, share: f64, gamma: f64) {
-        // Held after a sudden shear.
+        // The shear is applied suddenly and then held.
         shear(&mut simulation, gamma, 0.0);
         let [first, held, _] = centre(&mut simulation);
         assert!((first / (SHEAR * gamma) - 1.0).abs() < 0.01, "{first}");
@@ -92,7 +93,7 @@ fn stress_relaxes_as_that_of_a_standard_linear_solid() {
                 (stress / first / wanted - 1.0).abs() < 1e-6,
                 "{step}: {stress}"
             );
-            // What the spring beside the dashpot loses, the dashpot takes.
+            // The dashpot dissipates the energy that its spring loses.
             let spring = 1.0 - share + share * left * left;
             assert!(
                 (energy / held / spring - 1.0).abs() < 1e-4,
@@ -119,7 +120,7 @@ fn a_steady_shear_has_the_closed_form() {
          relaxation_time = {time}, relaxing_share = {share} }}"
     );
     simulate::<2, _>(&deck("plane-strain", &law), |mut simulation| {
-        // The modulus of this lattice, from a solid that has not relaxed yet.
+        // The modulus of this lattice, measured before the solid relaxes.
         shear(&mut simulation, rate, 0.0);
         let modulus = centre(&mut simulation)[0] / rate;
         shear(&mut simulation, 0.0, 0.0);
@@ -137,17 +138,17 @@ fn a_steady_shear_has_the_closed_form() {
     });
 }
 
-/// A way to strain a body, and what stands for it in the deviator: a stress that is elastic, perfectly plastic.
+/// A strain path, and the scalar stress that is elastic and perfectly plastic along this path.
 struct Way {
-    /// Displacement along x by strain.
+    /// Displacement along x per strain.
     over: fn([f64; 3]) -> f64,
-    /// The stress that yields.
+    /// The scalar stress, from the stress tensor.
     stress: fn(&[f64; 6]) -> f64,
-    /// It by the strain, Pa.
+    /// Ratio of the scalar stress to the strain, Pa.
     modulus: f64,
-    /// It by the yield stress where it yields.
+    /// Ratio of the scalar stress at yield to the yield stress.
     limit: f64,
-    /// Power by it and the rate of its plastic strain.
+    /// Ratio of the plastic power to the product of scalar stress and plastic strain rate.
     share: f64,
 }
 
@@ -155,7 +156,7 @@ struct Way {
 fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
     fn check<const D: usize>(mut simulation: Simulation<D>, way: &Way, strength: f64, bound: f64) {
         let limit = strength * way.limit;
-        // With the modulus of the lattice, which is the solid's to one per cent.
+        // The modulus of the lattice, which equals the modulus of the solid within 1 %.
         strain(&mut simulation, 1e-3 * limit, way.over, 0.0);
         let modulus = (way.stress)(&whole_centre(&mut simulation).0) / (1e-3 * limit);
         let error = (modulus / way.modulus - 1.0).abs();
@@ -168,7 +169,7 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
                 let left: f64 = target - now;
                 now += left.clamp(-0.1, 0.1);
                 strain(&mut simulation, now * yields, way.over, 0.0);
-                // Elastic, perfectly plastic.
+                // The elastic, perfectly plastic model.
                 let trial = (now - plastic).clamp(-1.0, 1.0);
                 let change = now - trial - plastic;
                 plastic += change;
@@ -186,7 +187,7 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
             );
         }
     }
-    // In pure shear von Mises' stress is √3 τ.
+    // In pure shear, the von Mises stress is √3 τ.
     let of_shear = 1.0 / 3_f64.sqrt();
     let shear = Way {
         over: |[_, y, _]| y,
@@ -195,7 +196,7 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
         limit: of_shear,
         share: 1.0,
     };
-    // The plane's deviator is a pure shear, at 45°.
+    // The deviator in the plane is a pure shear at 45°.
     let pull_in_the_plane = Way {
         over: |[x, ..]| x,
         stress: |stress| 0.5 * (stress[0] - stress[1]),
@@ -203,7 +204,7 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
         limit: of_shear,
         share: 1.0,
     };
-    // (σ_xx − σ_yy) ė_xx of plastic strain, and σ_xx − σ_yy = 2G (ε − 3/2 e_xx).
+    // Plastic power (σ_xx − σ_yy) ė_xx, with the plastic strain e and σ_xx − σ_yy = 2G (ε − 3/2 e_xx).
     let pull = Way {
         over: |[x, ..]| x,
         stress: |stress| stress[0] - stress[1],
@@ -218,7 +219,7 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
              yield_stress = {strength} {more} }}"
         )
     };
-    // The weighted volume of the lattice is that of a ball to some per cent only.
+    // The weighted volume of the lattice differs from the weighted volume of a ball by some per cent.
     for (more, bound) in [("", 0.01), (", calibration = 'continuum'", 0.05)] {
         let law = law(more);
         for way in [&shear, &pull_in_the_plane] {
@@ -232,8 +233,9 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
     }
 }
 
-/// A notched plate that is torn while its bonds flow or relax: the largest error of the energy balance as a share of the
-/// work put in, and the largest decrease of the freed energy between two rows as such a share.
+/// Simulate a notched plate that tears while its bonds yield or relax. Return the largest error of the energy
+/// balance and the largest decrease of the released energy between two rows, both divided by the external
+/// work.
 fn torn(law: &str, safety: f64) -> [f64; 2] {
     let deck = format!(
         "dimension = 'plane-strain'
@@ -286,7 +288,8 @@ fn a_plate_that_is_torn_while_it_flows_keeps_its_energy() {
         "ordinary_viscoelastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, relaxation_time = 1e-5, relaxing_share = 0.8 }",
     ] {
         let [coarse, fine] = [0.8, 0.2].map(|safety| torn(law, safety));
-        // Bonds that are seen late, at long steps, free less than a pressed family takes up by a few parts in ten thousand.
+        // At long steps, bonds break late, and the released energy may decrease by less than 1e-4 of the
+        // work.
         assert!(coarse[0] < 0.02 && coarse[1] < 1e-4, "{law}: {coarse:?}");
         assert!(fine[0] < 0.002 && fine[1] == 0.0, "{law}: {fine:?}");
     }

@@ -1,4 +1,5 @@
-//! The elastic–plastic law: one bond against its closed curve, work against energy and dissipation.
+//! The elastic–plastic law: one bond compared with its closed-form curve; work compared with energy and
+//! dissipation.
 
 use crate::support::history::row;
 use crate::support::{displace, force, forces, largest_force, simulate};
@@ -6,7 +7,7 @@ use fissure::solver::Simulation;
 use fissure::solver::motion::Kept;
 use fissure::solver::observers::HistoryObserver;
 
-/// Young's modulus (Pa) and the yield stretch of all bodies here.
+/// Young's modulus (Pa) and yield stretch of all bodies in these tests.
 const MODULUS: f64 = 5.0;
 const YIELD: f64 = 0.02;
 
@@ -16,16 +17,17 @@ fn law() -> String {
     )
 }
 
-/// Cross-section of the bar of two points (m²), which with a spacing of 1 m is their volume too.
+/// Cross-section of the bar of two points, m². With a spacing of 1 m, this is also the volume of a point in
+/// m³.
 const SECTION: f64 = 0.5;
 
-/// Horizon of that bar, m.
+/// Horizon of the bar of two points, m.
 const HORIZON: f64 = 1.5;
 
 /// c of the bar under uniaxial strain, 12E/(5δ²A), N/m⁶.
 const MICROMODULUS: f64 = 12.0 * MODULUS / (5.0 * HORIZON * HORIZON * SECTION);
 
-/// Two points 1 m apart with one bond, which breaks at this stretch.
+/// Return the deck of two points 1 m apart, whose bond breaks at this stretch.
 fn pair(critical: f64) -> String {
     format!(
         "dimension = '1d'
@@ -41,7 +43,7 @@ fn pair(critical: f64) -> String {
     )
 }
 
-/// Stretches a bond and returns the force (N/m³) on the first point.
+/// Stretch the bond, and return the force on the first point, N/m³.
 fn pull(simulation: &mut Simulation<1>, stretch: f64) -> f64 {
     displace(simulation, |x| x.map(|x| x * (1.0 + stretch)));
     let [[here], [there]] = [force(simulation, 0), force(simulation, 1)];
@@ -49,7 +51,7 @@ fn pull(simulation: &mut Simulation<1>, stretch: f64) -> f64 {
     here
 }
 
-/// Energy that all bonds hold, and what they have dissipated, J.
+/// Return the energy stored in all bonds and the energy dissipated by them, J.
 fn energies<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 2] {
     let stored = simulation.forces.stored(&simulation.model);
     let volume = &simulation.model.volume;
@@ -59,8 +61,8 @@ fn energies<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 2] {
 
 #[test]
 fn a_bond_follows_the_elastic_plastic_curve() {
-    // Stretch, s − s_p, and the way that s_p has gone: loaded, unloaded on lines of the first slope,
-    // pushed until it yields that way, and so on.
+    // Stretch, s − s_p, and accumulated |Δs_p|: the bond is loaded, unloaded with the elastic slope,
+    // compressed until it yields, and so on.
     let path = [
         [0.01, 0.01, 0.0],
         [0.02, 0.02, 0.0],
@@ -123,13 +125,13 @@ fn a_bond_breaks_at_the_critical_stretch_and_frees_what_it_held() {
         let work = square * YIELD * (critical - 0.5 * YIELD);
         assert!((freed / elastic - 1.0).abs() < 1e-2, "{freed} of {elastic}");
         assert!(((freed + dissipated) / work - 1.0).abs() < 1e-4);
-        // A broken bond yields no more.
+        // A broken bond does not yield.
         pull(&mut simulation, -0.5);
         assert_eq!(energies(&mut simulation), [0.0, dissipated]);
     });
 }
 
-/// A block of about 300 points in the plane or in space.
+/// Return the deck of a block of about 300 points, in the plane or in 3-D.
 fn block(dimension: &str, law: &str) -> String {
     let [lower, upper] = match dimension {
         "3d" => ["[0, 0, 0]", "[8, 7, 5]"],
@@ -145,7 +147,7 @@ fn block(dimension: &str, law: &str) -> String {
     )
 }
 
-/// A smooth, uneven map with strains up to about this size.
+/// Return a smooth, non-uniform deformation with strains up to about `size`.
 fn wave(size: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
     move |[a, b, c]| {
         [
@@ -158,8 +160,8 @@ fn wave(size: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
 
 #[test]
 fn below_the_yield_stretch_it_is_the_prototype_law_to_the_bit() {
-    // So that the force is the slope of the energy there; beyond, the slope is that of the energy and
-    // the dissipation together, as the next test shows.
+    // Hence the force is the derivative of the energy below the yield stretch. Above it, the force is the
+    // derivative of the sum of energy and dissipation; the next test checks this.
     let pmb = format!("pmb = {{ density = 2, youngs_modulus = {MODULUS} }}");
     for (size, same) in [(0.01, true), (0.1, false)] {
         let [elastic, yielding] = [pmb.as_str(), &law()].map(|law| {
@@ -174,7 +176,7 @@ fn below_the_yield_stretch_it_is_the_prototype_law_to_the_bit() {
 
 #[test]
 fn work_goes_into_energy_and_dissipation() {
-    /// Near the last of some states that a body is brought to.
+    /// Check the balance near the last of these states.
     fn near<const D: usize>(mut simulation: Simulation<D>, sizes: &[f64]) {
         for size in sizes {
             displace(&mut simulation, wave(*size));
@@ -204,7 +206,7 @@ fn work_goes_into_energy_and_dissipation() {
             }
         }
     }
-    // Beyond the yield stretch, and back on the line of the first slope.
+    // Beyond the yield stretch, and after unloading with the elastic slope.
     for sizes in [&[0.1][..], &[0.1, 0.08]] {
         simulate::<2, _>(&block("plane-stress", &law()), |body| near(body, sizes));
         simulate::<3, _>(&block("3d", &law()), |body| near(body, sizes));
@@ -238,7 +240,7 @@ fn a_body_that_has_yielded_turns_with_its_forces() {
     simulate(&block("3d", &law()), check::<3>);
 }
 
-/// A plate that is pulled and pushed beyond its yield stretch, back and forth.
+/// Return the deck of a plate that is cyclically stretched and compressed beyond its yield stretch.
 fn cycles(step: f64) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -261,7 +263,7 @@ fn energy_is_balanced_over_cycles_to_second_order() {
         simulate::<2, _>(&cycles(step), |mut simulation| {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
             let (mut largest, mut dissipated) = (0.0_f64, 0.0);
-            // Errors count from the first row, in which the support moves already.
+            // Errors are relative to the first row, in which the support already moves.
             let start = row(&mut observer, &mut simulation).energies.kinetic;
             while !simulation.clock.is_over() {
                 simulation.advance();

@@ -1,4 +1,4 @@
-//! Bars that are few points thick, under tension, in bending and in torsion: their stiffness against that of the beam.
+//! Stiffness of bars with few points across, in tension, bending and torsion, compared with beam theory.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
@@ -10,7 +10,7 @@ const YOUNG: f64 = 1e9;
 const RATIO: f64 = 0.25;
 const SHEAR: f64 = YOUNG / (2.0 * (1.0 + RATIO));
 
-/// How a bar along x is strained.
+/// Load case of a bar along x.
 #[derive(Debug, Clone, Copy)]
 enum Load {
     Torsion,
@@ -19,7 +19,8 @@ enum Load {
 }
 
 impl Load {
-    /// The displacement of both ends at a curvature or twist k, 1/m, or strain k, with the deflections across of a beam.
+    /// Return the displacement of both ends for a curvature or twist k (1/m) or a strain k, with the lateral
+    /// displacements of beam theory.
     fn displacement(self) -> &'static str {
         match self {
             Self::Torsion => "['free', '-k*x*z', 'k*x*y']",
@@ -28,7 +29,7 @@ impl Load {
         }
     }
 
-    /// The stiffness of a beam of a square section with this edge: G J and E I (N m²), E A (N).
+    /// Return the stiffness of a beam with a square section of this edge: G J and E I (N m²), E A (N).
     fn stiffness(self, edge: f64) -> f64 {
         match self {
             Self::Torsion => 0.140577 * SHEAR * edge.powi(4),
@@ -38,8 +39,9 @@ impl Load {
     }
 }
 
-/// Stiffness over that of the beam, of the middle of a square bar with this many points of unit spacing across: from the
-/// strain energies of two lengths, so that the ends have no part in it.
+/// Return the stiffness of the middle of a square bar divided by the stiffness of the beam. `across` is the
+/// number of points across, with unit spacing. The difference of the strain energies of two lengths
+/// eliminates the ends.
 fn stiffness((law, correction): (&str, &str), across: u32, load: Load) -> f64 {
     let curvature = 1e-4 / f64::from(across);
     let energy = |length: u32| {
@@ -71,7 +73,7 @@ fn stiffness((law, correction): (&str, &str), across: u32, load: Load) -> f64 {
     by_length / (0.5 * load.stiffness(f64::from(across)) * curvature * curvature)
 }
 
-/// Torsion and bending of correspondence bars with this many points across, by control.
+/// Check torsion and bending of correspondence bars with this many points across, for each control.
 fn check(across: u32, rows: &[(&str, [f64; 2])]) {
     for (control, wanted) in rows {
         let law = format!(
@@ -113,7 +115,8 @@ fn bars_of_six_and_ten_points() {
     check(10, &[("zero_energy = 'dispersion'", [1.00, 0.93])]);
 }
 
-/// Values of the section problem of an infinite bar, solved by programs of their own with m = 3.
+/// The expected values come from independent programs, which solve the cross-section problem of an infinite
+/// bar with m = 3.
 #[test]
 fn surface_corrections_of_bars() {
     for (law, correction, across, wanted) in [

@@ -1,5 +1,5 @@
-//! The softening law: one bond against its closed curve, energy against work, damage, strength and fracture energy of a
-//! plate.
+//! The softening law: one bond compared with its closed-form curve; energy compared with work; damage,
+//! strength and fracture energy of a plate.
 
 use std::f64::consts::PI;
 
@@ -13,10 +13,10 @@ use fissure::problem;
 use fissure::solver::Simulation;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
-/// Young's modulus (Pa) of the bodies made of one bond or a block.
+/// Young's modulus of the bodies with one bond and of the block, Pa.
 const MODULUS: f64 = 5.0;
 
-/// s0 and sc of these bodies.
+/// Stretches at which softening begins and at which bonds break, s0 and sc.
 const STRENGTH: f64 = 0.02;
 const CRITICAL: f64 = 0.1;
 
@@ -27,16 +27,17 @@ fn law(more: &str) -> String {
     )
 }
 
-/// Cross-section of the bar of two points (m²), which with a spacing of 1 m is their volume too.
+/// Cross-section of the bar of two points, m². With a spacing of 1 m, this is also the volume of a point in
+/// m³.
 const SECTION: f64 = 0.5;
 
-/// Horizon of that bar, m.
+/// Horizon of the bar of two points, m.
 const HORIZON: f64 = 1.5;
 
 /// c of the bar under uniaxial strain, 12E/(5δ²A), N/m⁶.
 const MICROMODULUS: f64 = 12.0 * MODULUS / (5.0 * HORIZON * HORIZON * SECTION);
 
-/// Two points 1 m apart with one bond.
+/// Return the deck of two points 1 m apart with one bond.
 fn pair(law: &str) -> String {
     format!(
         "dimension = '1d'
@@ -50,7 +51,7 @@ fn pair(law: &str) -> String {
     )
 }
 
-/// Stretches a bond and returns the force (N/m³) on the first point.
+/// Stretch the bond, and return the force on the first point, N/m³.
 fn pull(simulation: &mut Simulation<1>, stretch: f64) -> f64 {
     displace(simulation, |x| x.map(|x| x * (1.0 + stretch)));
     let [[here], [there]] = [force(simulation, 0), force(simulation, 1)];
@@ -58,7 +59,7 @@ fn pull(simulation: &mut Simulation<1>, stretch: f64) -> f64 {
     here
 }
 
-/// Energy that all bonds hold, and what they have dissipated, J.
+/// Return the energy stored in all bonds and the energy dissipated by them, J.
 fn energies<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 2] {
     let stored = simulation.forces.stored(&simulation.model);
     let volume = &simulation.model.volume;
@@ -66,7 +67,8 @@ fn energies<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 2] {
         .map(|density| density.iter().zip(volume.iter()).map(|(w, v)| w * v).sum())
 }
 
-/// A bond is loaded, unloaded to the origin, pressed, loaded again and broken; F by hand for each stretch.
+/// Load a bond, unload it to the origin, compress it, load it again and break it. `path` has the stretches
+/// and the expected forces.
 fn follow(more: &str, path: &[[f64; 2]]) {
     simulate::<1, _>(&pair(&law(more)), |mut simulation| {
         let (mut before, mut force_before, mut work) = (0.0, 0.0, 0.0);
@@ -87,7 +89,7 @@ fn follow(more: &str, path: &[[f64; 2]]) {
                 (found - expected).abs() < 1e-12 * largest,
                 "{more} {stretch}: {found}, {expected}"
             );
-            // Secant: the energy held is half the force times the stretch.
+            // Unloading is along the secant, so the stored energy is half the force times the stretch.
             let [held, dissipated] = energies(&mut simulation);
             let unit = square * STRENGTH * STRENGTH;
             assert!((held - 0.5 * SECTION * found * stretch).abs() < 1e-12 * unit);
@@ -96,7 +98,7 @@ fn follow(more: &str, path: &[[f64; 2]]) {
                 "{more} {stretch}: {held} + {dissipated}, {work}"
             );
         }
-        // What broke held nothing any more.
+        // A bond breaks without stored energy.
         let freed: f64 = simulation.fields.freed_energy.iter().flatten().sum();
         assert_eq!(simulation.fields.broken_bonds.as_ref().unwrap(), &[1.0; 2]);
         assert!(freed.abs() < 1e-12 * square * STRENGTH * STRENGTH);
@@ -122,7 +124,7 @@ fn a_bond_follows_its_curve_and_unloads_to_the_origin() {
             [0.1, 0.0],
         ],
     );
-    // The kink is at 0.02 + 0.25 · 0.08 = 0.04, with a force of 0.4 · 0.02.
+    // The kink is at the stretch 0.02 + 0.25 · 0.08 = 0.04, with the force 0.4 · 0.02.
     follow(
         ", curve = 'trilinear', kink_force = 0.4, kink_stretch = 0.25",
         &[
@@ -175,7 +177,7 @@ fn damage_counts_the_stiffness_that_is_lost() {
     });
 }
 
-/// A block in the plane with the law given.
+/// Return the deck of a plane block with a law.
 fn block(law: &str) -> String {
     format!(
         "dimension = 'plane-strain'
@@ -209,13 +211,13 @@ fn below_the_strength_it_is_the_prototype_law() {
     }
 }
 
-/// Young's modulus (Pa), tensile strength (Pa) and fracture energy (J/m²) of the plate that is pulled in two: concrete.
+/// Young's modulus (Pa), tensile strength (Pa) and fracture energy (J/m²) of the notched concrete plate.
 const CONCRETE: [f64; 3] = [30e9, 3e6, 100.0];
 
-/// Area of the ligament of that plate, m².
+/// Area of the ligament of the notched plate, m².
 const LIGAMENT: f64 = 0.02;
 
-/// A plate with a notch at each side, between elastic grips that are pulled apart.
+/// Return the deck of a plate with a notch on each side, between elastic grips that move apart.
 fn plate(curve: &str, method: &str) -> String {
     let [modulus, strength, energy] = CONCRETE;
     let elastic = format!("density = 2400, youngs_modulus = {modulus}");
@@ -240,8 +242,8 @@ fn plate(curve: &str, method: &str) -> String {
     )
 }
 
-/// Largest mean stress of the ligament over the strength, and what pulling the plate in two took over the fracture energy
-/// of the ligament.
+/// Separate the notched plate. Return the largest mean stress of the ligament divided by the strength, and
+/// the dissipated energy divided by the fracture energy of the ligament.
 fn pull_in_two(curve: &str, method: &str) -> [f64; 2] {
     let [_, strength, energy] = CONCRETE;
     simulate::<2, _>(&plate(curve, method), |mut simulation| {
@@ -260,7 +262,7 @@ fn pull_in_two(curve: &str, method: &str) -> [f64; 2] {
             assert!(row.energies.dissipated >= last.dissipated);
             last = row.energies;
         }
-        // The work of a load step in which the plate jumps is that of the trapezoid.
+        // The work of each load step follows from the trapezoid rule, which is inaccurate for a jump.
         assert!(last.error.abs() < 0.05 * last.work, "{last:?}");
         let taken = last.dissipated + last.fracture;
         [largest / (strength * LIGAMENT), taken / (energy * LIGAMENT)]
@@ -269,7 +271,8 @@ fn pull_in_two(curve: &str, method: &str) -> [f64; 2] {
 
 #[test]
 fn a_plate_that_is_pulled_in_two_bears_its_strength_and_takes_its_fracture_energy() {
-    // Found: 1.015 to 1.024 of the strength, and 1.04 to 1.10 of the energy: some bonds beside the ligament soften too.
+    // Computed: 1.015 to 1.024 of the strength, and 1.04 to 1.10 of the energy, because some bonds beside the
+    // ligament also soften.
     for curve in CURVES {
         let found = ["static", "relaxation"].map(|method| pull_in_two(curve, method));
         for [stress, energy] in found {
@@ -284,7 +287,7 @@ fn a_plate_that_is_pulled_in_two_bears_its_strength_and_takes_its_fracture_energ
 
 const CURVES: [&str; 3] = ["bilinear", "trilinear", "exponential"];
 
-/// The law of concrete with a horizon of 0.03 m and two of its keys.
+/// Return the law of concrete with a horizon of 0.03 m and two given keys.
 fn concrete(dimension: Dimension, curve: &str, keys: [(&str, f64); 2]) -> SofteningPmb {
     let mut law = problem::Law::named("softening_pmb").unwrap();
     law = law.with("curve", curve).unwrap();
@@ -307,7 +310,7 @@ fn concrete(dimension: Dimension, curve: &str, keys: [(&str, f64); 2]) -> Soften
     }
 }
 
-/// Every setting, with the modulus of a bar that is pulled along its axis over Young's.
+/// Return every setting, with the modulus in tension along an axis divided by Young's modulus.
 fn settings() -> [(Dimension, f64); 5] {
     let line = |constraint| Dimension::Line {
         cross_section: 0.3,
@@ -367,7 +370,7 @@ fn all_bonds_across_an_area_take_the_fracture_energy_and_the_largest_stress_is_t
 
 #[test]
 fn how_much_more_than_its_first_bonds_a_body_bears() {
-    // Found with 200 directions by another program.
+    // The expected values were computed by an independent program with 200 directions.
     let plane = Dimension::PlaneStress { thickness: 1.0 };
     for (dimension, curve, ratio, expected) in [
         (plane, "bilinear", 3.0, 1.070),

@@ -1,5 +1,5 @@
-//! Thermal strain in every law: free expansion, forces as the derivative of the energy, equal bits; and stresses and
-//! curvatures that are known in closed form.
+//! Thermal strain in every law: free expansion, forces as the derivative of the energy, equal bits, and
+//! closed-form stresses and curvatures.
 
 use super::invariants::{Case, cases, check_momentum, check_slope, deck, same_bits, strain_energy};
 use crate::support::{displace, largest_force, problem, simulate, simulate_on};
@@ -8,7 +8,7 @@ use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::Snapshot;
 
-/// The deck of a law whose points have a temperature; α = 1e-4, T₀ = 20.
+/// Return the deck of a law with prescribed temperatures; α = 1e-4, T₀ = 20.
 fn heated(case: &Case, dimension: &str, temperature: &str) -> String {
     let table = case.table();
     let table = table.strip_suffix(" }").expect("a table");
@@ -25,7 +25,7 @@ fn free_expansion_has_no_force_and_no_energy() {
             assert!(column.iter().all(|stretch| *stretch == column[0]));
             column[0]
         };
-        // α (T − T₀) = 0.01, more where strain across is 0.
+        // α (T − T₀) = 0.01; the expansion is larger if the strain across is 0.
         let dimension = simulation.problem.dimension;
         let wanted = if dimension.is_confined() {
             0.006..0.02
@@ -33,13 +33,14 @@ fn free_expansion_has_no_force_and_no_energy() {
             0.009999..0.010001
         };
         assert!(wanted.contains(&stretch), "{stretch} in {dimension:?}");
-        // Held in its reference shape.
+        // Hold the body in its reference configuration.
         displace(&mut simulation, |x| x);
         let (scale, energy) = (largest_force(&simulation), strain_energy(&mut simulation));
         assert!(scale > 0.0 && energy > 0.0);
         displace(&mut simulation, |x| x.map(|x| (1.0 + stretch) * x));
         let law = &simulation.problem.bodies[0].material.law;
-        // Rounding of places of up to 40 bonds, over a strain of 1 %: some 1e-12; squared in the energy.
+        // Rounding errors of the positions of up to 40 bonds, divided by a strain of 1 %, are some 1e-12; the
+        // energy has the square of this error.
         assert!(largest_force(&simulation) < 1e-10 * scale, "{law:?}");
         assert!(
             strain_energy(&mut simulation).abs() < 1e-15 * energy,
@@ -51,7 +52,7 @@ fn free_expansion_has_no_force_and_no_energy() {
             simulate(&heated(&case, "1d", "120"), check::<1>);
         }
         simulate(&heated(&case, "plane-stress", "120"), check::<2>);
-        // Laws without a potential are refused where strain across the setting is 0.
+        // Laws without a potential are rejected in settings with zero strain across.
         if case.is_conservative() {
             simulate(&heated(&case, "plane-strain", "120"), check::<2>);
         }
@@ -114,7 +115,7 @@ fn temperatures_that_are_those_of_the_reference_change_no_bit() {
     assert!(run("") == heated);
 }
 
-/// Values of a field at all points, after the run.
+/// Return the values of a field at all points after the run.
 fn at_the_end<const D: usize>(text: &str, field: Field) -> Vec<f64> {
     simulate::<D, _>(text, |mut simulation| {
         while !simulation.is_over() {
@@ -126,10 +127,10 @@ fn at_the_end<const D: usize>(text: &str, field: Field) -> Vec<f64> {
     })
 }
 
-/// A held body of E = 200 GPa, α = 1e-6, heated by 100 K.
+/// A clamped body with E = 200 GPa and α = 1e-6, heated by 100 K.
 #[test]
 fn a_clamped_body_has_the_stress_of_hookes_law() {
-    // That of `pmb` under uniaxial strain, too.
+    // This is also Poisson's ratio of `pmb` under uniaxial strain.
     let ratio = 0.25;
     let (young, free) = (200e9_f64, 1e-4);
     let held = |dimension: &str, constraint: &str| {
@@ -158,18 +159,18 @@ fn a_clamped_body_has_the_stress_of_hookes_law() {
             "
         )
     };
-    // Of points inside: those of `pmb` near an end miss bonds.
+    // Check interior points only: points of `pmb` near an end have incomplete families.
     let check = |found: Vec<f64>, wanted: [f64; 3]| {
         let count = found.len() / 6;
         for entries in found.chunks_exact(6).skip(count / 3).take(count / 3) {
             for (found, wanted) in entries.iter().zip(wanted) {
                 let error = (found - wanted).abs() / (young * free);
-                // Terms of second order are 3e-4 where three directions are held.
+                // With three clamped directions, terms of second order are 3e-4.
                 assert!(error < 1e-3, "{entries:?}, wanted {wanted:?}");
             }
         }
     };
-    // σ = −E α ΔT times 1, 1/(1 − ν), 1/(1 − 2ν) for one, two, three directions that are held.
+    // σ is −E α ΔT times 1, 1/(1 − ν) or 1/(1 − 2ν) for one, two or three clamped directions.
     let [one, two, three] = [1.0, 1.0 - ratio, 1.0 - 2.0 * ratio].map(|part| -young * free / part);
     for field in [Field::Stress, Field::CauchyStress] {
         check(at_the_end::<1>(&held("1d", ""), field), [one, 0.0, 0.0]);
@@ -209,7 +210,8 @@ fn a_bimaterial_strip_bends_with_timoshenkos_curvature() {
             simulation.advance();
         }
         simulation.check().unwrap();
-        // Second difference of the deflection of the middle rows, away from both ends.
+        // The curvature follows from the second difference of the deflection of the middle rows, away from
+        // both ends.
         let deflection = |place: f64| {
             let (mut sum, mut count) = (0.0, 0.0);
             for point in 0..simulation.model.owned() {
@@ -232,7 +234,8 @@ fn a_bimaterial_strip_bends_with_timoshenkos_curvature() {
     );
 }
 
-/// Where no condition acts in a stage, the temperature is that of the reference; the last condition counts.
+/// Without a condition in a stage, points have the reference temperature. Of several conditions, the last one
+/// applies.
 #[test]
 fn temperatures_follow_conditions_and_stages() {
     let text = "dimension = 'plane-stress'

@@ -1,22 +1,22 @@
-//! The first benchmark: Dipasquale et al. 2014, section 4. The deck is run as it stands, and what must
-//! come out is read from its result.
+//! The first benchmark: Dipasquale et al. 2014, section 4. The test runs the deck unchanged, and checks its
+//! result.
 
 use std::path::Path;
 
 use crate::support::command::{Folder, fissure, succeed};
 use fissure::output::ResultReader;
 
-/// Points with more damage than this are on a crack: a face of a straight cut has 0.4 and more.
+/// Points with more damage than this are on a crack; points at the face of a straight cut have 0.4 or more.
 const CRACKED: f64 = 0.38;
 
 /// Columns and rows of the deck's lattice.
 const COLUMNS: usize = 100;
 const ROWS: usize = 40;
 
-/// Rayleigh speed of soda-lime glass, m/s (benchmarks of the paper's field).
+/// Rayleigh speed of soda-lime glass as used in branching benchmarks, m/s.
 const RAYLEIGH_SPEED: f64 = 3100.0;
 
-/// Which points are cracked at an output, by column and row; ids run along x first.
+/// Return which points are cracked at an output, by column and row; ids run along x first.
 fn cracked(reader: &ResultReader, output: usize) -> Vec<Vec<bool>> {
     let damage = reader.field("damage", output).unwrap();
     let mut cracked = vec![vec![false; ROWS]; COLUMNS];
@@ -27,13 +27,13 @@ fn cracked(reader: &ResultReader, output: usize) -> Vec<Vec<bool>> {
     cracked
 }
 
-/// Number of separate runs of cracked points in a column.
+/// Return the number of separate sequences of cracked points in a column.
 fn cracks_in(column: &[bool]) -> usize {
     let starts = column.windows(2).filter(|pair| !pair[0] && pair[1]).count();
     starts + usize::from(column[0])
 }
 
-/// The column of the foremost cracked point.
+/// Return the column of the foremost cracked point.
 fn tip(cracked: &[Vec<bool>]) -> usize {
     cracked
         .iter()
@@ -41,7 +41,7 @@ fn tip(cracked: &[Vec<bool>]) -> usize {
         .unwrap()
 }
 
-/// The slope of the line through some (time, place) pairs, by least squares.
+/// Return the slope of the least-squares line through (time, position) pairs.
 fn slope(pairs: &[(f64, f64)]) -> f64 {
     let count = pairs.len() as f64;
     let mean_t = pairs.iter().map(|pair| pair.0).sum::<f64>() / count;

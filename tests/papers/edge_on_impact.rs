@@ -1,5 +1,5 @@
-//! Edge-on impact on ALON, Diehl & Schweitzer (2016): variants of the deck that are cheap enough here.
-//! What its fronts do at finer spacings stands in docs/src/verification/eoi_alon.md.
+//! Edge-on impact on ALON, Diehl & Schweitzer (2016): cheap variants of the deck.
+//! docs/src/verification/eoi_alon.md has the fronts at finer spacings.
 
 use crate::support::history::{column, row};
 use crate::support::{simulate, simulate_input};
@@ -8,12 +8,12 @@ use fissure::solver::observers::HistoryObserver;
 
 const DENSITY: f64 = 3690.0;
 
-/// √(1.8 K/ρ), m/s.
+/// Return the classical wave speed √(1.8 K/ρ), m/s.
 fn classical() -> f64 {
     (1.8_f64 * 210e9 / DENSITY).sqrt()
 }
 
-/// The deck with some of its lines changed.
+/// Return the deck with some texts replaced.
 fn deck(changes: &[(&str, &str)]) -> String {
     let mut text = include_str!("../../inputs/eoi_alon.toml").to_owned();
     for (old, new) in changes {
@@ -26,7 +26,7 @@ fn deck(changes: &[(&str, &str)]) -> String {
 /// Time (s), wave front (m), damage front (m) and length of the farthest crack (m).
 type Row = [f64; 4];
 
-/// A row after every step.
+/// Return a row for each step.
 fn run(deck: &str) -> Vec<Row> {
     simulate::<3, _>(deck, |simulation| {
         rows(
@@ -36,7 +36,7 @@ fn run(deck: &str) -> Vec<Row> {
     })
 }
 
-/// Columns of the history after every step.
+/// Return columns of the history after each step.
 fn rows<const N: usize>(mut simulation: Simulation<'_, 3>, names: [&str; N]) -> Vec<[f64; N]> {
     let mut observer = HistoryObserver::new(&simulation).unwrap();
     let columns = names.map(|name| column(&observer, name));
@@ -49,7 +49,7 @@ fn rows<const N: usize>(mut simulation: Simulation<'_, 3>, names: [&str; N]) -> 
     rows
 }
 
-/// Speed (m/s) of the wave or damage front between two places (m), by least squares.
+/// Return the speed (m/s) of the wave or damage front between two positions (m), by least squares.
 fn speed(rows: &[Row], front: usize, from: f64, to: f64) -> f64 {
     let inside = rows.iter().filter(|row| (from..to).contains(&row[front]));
     let pairs: Vec<(f64, f64)> = inside.map(|row| (row[0], row[front])).collect();
@@ -70,16 +70,16 @@ const TIP: usize = 3;
 
 #[test]
 fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
-    // A block that is struck all over one side. What the other sides send does not catch up with the
-    // front in its middle: at 22 mm they are 7 mm behind.
+    // A block with a load on a whole side. Waves from the other sides do not reach the front in the middle:
+    // at 22 mm they are 7 mm behind.
     for (law, horizon, ratio) in [
         ("pmb", "3", 1.028),
         ("pmb", "4", 0.967),
         ("normalised_pmb", "3", 0.971),
     ] {
         let expected = ratio * classical();
-        // A step that disperses is ∫Ai at its front, a third of its height where the longest waves are;
-        // its height is p/(ρ c).
+        // A dispersing step has the shape ∫Ai at its front. It has a third of its height p/(ρ c) at the
+        // position of the longest waves.
         let pressure = 1.267e9;
         let third = pressure / (DENSITY * expected) / 3.0;
         let text = deck(&[
@@ -94,8 +94,8 @@ fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
             ("duration = 8.7e-6", "duration = 2.3e-6"),
         ]);
         let found = speed(&run(&text), WAVE, 8e-3, 22e-3);
-        // The front steps from point to point by linear interpolation, up to a tenth of a spacing off at
-        // both ends of 14 spacings.
+        // The front moves between points by linear interpolation, with an error of up to a tenth of a spacing
+        // at both ends of 14 spacings.
         assert!(
             (found / expected - 1.0).abs() < 0.01,
             "{law}, m = {horizon}: {} of the classical speed",
@@ -106,8 +106,8 @@ fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
 
 #[test]
 fn in_the_tile_a_wave_runs_ahead_of_damage() {
-    // The long waves of this lattice between free faces, from `long_waves` of scripts/eoi_study.py, which
-    // minimises the energy of the tile's layers.
+    // Speeds of long waves of this lattice between free faces, from `long_waves` of scripts/eoi_study.py.
+    // That function minimises the energy of the tile's layers.
     for (law, long_wave) in [
         ("pmb]", 8925.0),
         ("normalised_pmb]", 9760.0),
@@ -115,9 +115,9 @@ fn in_the_tile_a_wave_runs_ahead_of_damage() {
     ] {
         let rows = run(&deck(&[("dx = 1e-3", "dx = 2e-3"), ("pmb]", law)]));
         let wave = speed(&rows, WAVE, 30e-3, 90e-3);
-        // 1 m/s, of at most 38, lies ahead of the long waves by up to 2.1 widths of the front, which grow
-        // as (3βct)^⅓, with β = δ²/50 of the lattice and ν²h²/24(1 − ν)² of the tile, 1.2 mm² in all: by
-        // up to 7 % of ct at ct = 60 mm.
+        // The threshold of 1 m/s, of at most 38 m/s, is ahead of the long waves by up to 2.1 widths of the
+        // front. The width grows as (3βct)^⅓. β = δ²/50 + ν²h²/24(1 − ν)² for lattice and tile is 1.2 mm²,
+        // hence up to 7 % of ct at ct = 60 mm.
         assert!(
             (1.0..1.07).contains(&(wave / long_wave)),
             "{law}: {wave} m/s, long waves {long_wave} m/s"
@@ -131,7 +131,8 @@ fn in_the_tile_a_wave_runs_ahead_of_damage() {
         assert!(damaged.len() > 20);
         for row in &damaged {
             assert!(row[DAMAGE] < row[WAVE], "damage overtakes the wave");
-            // The middle of a face is part of the tile; 2 mm for the interpolation.
+            // The damage front in the middle of a face cannot be ahead of the farthest crack; 2 mm allow for
+            // the interpolation.
             assert!(row[DAMAGE] < row[TIP] + 2e-3, "{row:?}");
         }
         for pair in damaged.windows(2) {
@@ -142,9 +143,9 @@ fn in_the_tile_a_wave_runs_ahead_of_damage() {
 
 #[test]
 fn the_constant_of_equation_15_in_the_force_of_equation_4_gives_no_wave() {
-    // It lacks a length, and is too soft by a factor of about that of the bonds, 6 mm as a number: its
-    // long waves would come 4 mm far. What moves lies within a horizon of the struck layer, which the load
-    // drives up to 6 mm into the tile.
+    // The constant lacks a length. It is too small by a factor of about the length of a bond in m (0.006), so
+    // that long waves would travel 4 mm only. All moving points are within a horizon of the loaded layer,
+    // which the load pushes up to 6 mm into the tile.
     let rows = run(&deck(&[
         ("dx = 1e-3", "dx = 2e-3"),
         (
@@ -171,7 +172,7 @@ fn a_projectile_makes_the_fronts_of_the_prescribed_load() {
         [speed(rows, WAVE, 30e-3, 90e-3), damage]
     };
     let wanted = speeds(&prescribed);
-    // At 67 m/s the projectile presses as hard as the load, at 380 m/s five times as hard.
+    // At 67 m/s the force of the projectile equals the prescribed load; at 380 m/s it is five times as large.
     for (velocity, load) in [("67", 3.8e5), ("380", 1.9e6)] {
         let set = [("dx", "2e-3"), ("shot", "24e-3"), ("speed", velocity)];
         simulate_input::<3, _>("edge_on_impact", &set, |simulation| {
@@ -192,7 +193,7 @@ fn a_projectile_makes_the_fronts_of_the_prescribed_load() {
                 assert!((found / wanted - 1.0).abs() < 0.08, "{found} {wanted}");
             }
             assert!(found[1] < found[0], "{found:?}");
-            // On the projectile, against its motion; the mean after the first microsecond.
+            // Force on the projectile against its motion: the mean after the first microsecond.
             let late: Vec<f64> = all
                 .iter()
                 .filter(|row| row[0] > 1e-6)

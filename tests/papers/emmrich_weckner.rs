@@ -1,4 +1,4 @@
-//! The simulations of Emmrich & Weckner 2006, section 4: their decks, and what must come out.
+//! The simulations of Emmrich & Weckner 2006, section 4: their decks and the expected results.
 
 use std::collections::HashMap;
 
@@ -12,8 +12,8 @@ use fissure::solver::observers::{HistoryObserver, Snapshot};
 /// Points with more damage than this are on a crack.
 const CRACKED: f64 = 0.34;
 
-/// Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of the plate, its size (m), its cells, and
-/// the horizon (m): the values of the paper.
+/// Values of the paper: density (kg/m³), Young's modulus (Pa), Poisson's ratio, size (m) and cells of the
+/// plate, and horizon (m).
 const DENSITY: f64 = 8000.0;
 const YOUNG: f64 = 210e9;
 const POISSON: f64 = 0.25;
@@ -21,15 +21,15 @@ const SIZE: [f64; 2] = [1.0, 0.3];
 const CELLS: [u32; 2] = [24, 8];
 const HORIZON: f64 = 0.1;
 
-/// The plate as the paper's equations have it, in no more than they say: eq. 21 with the force of eq. 9,
-/// the constant of eq. 10 and the 4-point Gauss rule, every point asked whether it lies within the
-/// horizon, integrated by the classical Runge–Kutta method.
+/// Independent implementation of the paper's equations for the plate: eq. 21 with the force of eq. 9, the
+/// constant of eq. 10 and the 4-point Gauss rule. Neighbours are found by a check of all pairs; time
+/// integration is the classical Runge–Kutta method.
 struct Plate {
     places: Vec<[f64; 2]>,
     weight: f64,
-    /// Neighbours and their distances, of each point.
+    /// Neighbours of each point with their distances, m.
     families: Vec<Vec<(usize, f64)>>,
-    /// Displacement and velocity of each point.
+    /// Displacement (x, y) and velocity (x, y) of each point.
     state: Vec<[f64; 4]>,
 }
 
@@ -116,8 +116,8 @@ impl Plate {
     }
 }
 
-/// The largest difference (m) from the paper's equations over the run, and where and when (m, s) the
-/// first Gauss point turns back for the first time.
+/// Return the largest difference from the paper's equations over the run, m. Also return the displacement (m)
+/// and time (s) at which the first Gauss point reverses its motion.
 fn difference(step: &str) -> (f64, [f64; 2]) {
     let mut plate = Plate::new();
     assert_eq!(plate.places.len(), 768);
@@ -156,8 +156,8 @@ fn the_plate_moves_as_the_equations_of_the_paper_say() {
     // Displacements reach 0.3 mm.
     assert!(fine < 3e-7, "{fine} m");
     assert!((3.5..4.5).contains(&(coarse / fine)), "{coarse} {fine}");
-    // The end of a classical bar of modulus E/(1 − ν²) moves by −5t + 5ct²/L and turns back at −236 µm,
-    // 94.5 µs after the start. Points near edges miss a part of their families, so the plate is softer.
+    // The end of a classical bar of modulus E/(1 − ν²) moves by −5t + 5ct²/L, and reverses at −236 µm after
+    // 94.5 µs. Points near edges have incomplete families, so the plate is softer.
     assert!((turn[0] + 262e-6).abs() < 2e-6, "{turn:?}");
     assert!((turn[1] - 100e-6).abs() < 4.1e-6, "{turn:?}");
 }
@@ -183,7 +183,7 @@ fn the_plate_keeps_its_energy_and_symmetry() {
     assert!((3.8..4.2).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
-/// Displacements are mirror images about planes across some axes, at these places.
+/// Assert that displacements are symmetric about planes normal to these axes at these positions.
 fn symmetric<const D: usize>(simulation: &Simulation<D>, planes: &[(usize, f64)]) {
     let model = &simulation.model;
     let displacement = &simulation.fields.displacement;
@@ -191,7 +191,7 @@ fn symmetric<const D: usize>(simulation: &Simulation<D>, planes: &[(usize, f64)]
         let largest = displacement[axis]
             .iter()
             .fold(0.0_f64, |a, u| a.max(u.abs()));
-        // Positions to a micrometre.
+        // Positions are compared in whole micrometres.
         let key = |x: [f64; 3]| x.map(|x| (x * 1e6).round() as i64);
         let points = 0..model.owned();
         let known: HashMap<[i64; 3], usize> = points.map(|k| (key(model.position(k)), k)).collect();
@@ -211,7 +211,7 @@ fn symmetric<const D: usize>(simulation: &Simulation<D>, planes: &[(usize, f64)]
     }
 }
 
-/// The positions of the points on a crack.
+/// Return the positions of the points on a crack.
 fn cracked<const D: usize>(simulation: &mut Simulation<D>) -> Vec<[f64; 3]> {
     let snapshot = Snapshot::new(simulation);
     let damage = snapshot.field(simulation, Field::Damage);
@@ -221,7 +221,7 @@ fn cracked<const D: usize>(simulation: &mut Simulation<D>) -> Vec<[f64; 3]> {
 
 #[test]
 fn the_slit_opens_and_runs() {
-    // With steps four times as long as the deck's.
+    // The steps are four times as long as in the deck.
     let speed_of_sound = (1.2_f64 * 3e6 / 1000.0).sqrt();
     let rayleigh = 0.9194 * (0.4_f64 * 3e6 / 1000.0).sqrt();
     simulate_input::<3, _>("rubber_slit", &[("safety", "0.8")], |mut simulation| {
@@ -229,7 +229,7 @@ fn the_slit_opens_and_runs() {
         let faces = ["upper", "lower"]
             .map(|face| column(&observer, &format!("probe_{face}_face_displacement_y")));
         let broken = column(&observer, "broken_bonds");
-        // Half the length of the crack and its opening, over time.
+        // Time, half the length of the crack, its extent across, and its opening.
         let mut rows = Vec::new();
         while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
@@ -259,7 +259,7 @@ fn the_slit_opens_and_runs() {
             rows.windows(2).all(|pair| pair[0].3 <= pair[1].3 + 1e-6),
             "{rows:?}"
         );
-        // Straight, except where it breaks through the edge.
+        // The crack is straight, except where it reaches the edge.
         let inside = rows.iter().filter(|row| row.1 < 0.04);
         assert!(inside.clone().all(|row| row.2 < 0.004), "{rows:?}");
         let running: Vec<_> = inside.filter(|row| row.1 > 0.022).collect();
@@ -274,11 +274,11 @@ fn the_slit_opens_and_runs() {
 
 #[test]
 fn damage_grows_from_the_defect() {
-    // 20 × 40 × 20 points, with steps four times as long as the deck's.
+    // 20 × 40 × 20 points; the steps are four times as long as in the deck.
     let coarse = [("dx", "1.5e-3"), ("safety", "0.8")];
     simulate_input::<3, _>("steel_bar_defect", &coarse, |mut simulation| {
-        // Time, number of cracked points and how far from the defect's centre they reach: in its plane
-        // and across.
+        // Time, number of cracked points, and their largest distances from the centre of the defect: in its
+        // plane and across.
         let mut rows = Vec::new();
         while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
@@ -292,7 +292,8 @@ fn damage_grows_from_the_defect() {
         }
         let (first, last) = (rows[0], rows[rows.len() - 1]);
         assert!(first.2 < 0.0075, "the defect: {first:?}");
-        // The tension takes 5 µs to the defect and, doubled by the held edge, 15 µs; it then grows.
+        // The tension wave arrives at the defect after 5 µs, and after 15 µs again, doubled by the fixed
+        // edge. Then the defect grows.
         let start = rows.iter().find(|row| row.1 > first.1).unwrap();
         assert!((15e-6..25e-6).contains(&start.0), "{start:?}");
         assert!(

@@ -1,4 +1,4 @@
-//! Small variants of the decks of contact in `inputs/`.
+//! Small variants of the contact decks in `inputs/`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,7 +11,7 @@ use fissure::deck;
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
-/// The named columns at the end of a run, and at its middle.
+/// Run a simulation, and return the named columns at half of the time and at the end.
 fn ends(mut simulation: Simulation<'_, 3>, names: &[&str]) -> [Vec<f64>; 2] {
     let mut observer = HistoryObserver::new(&simulation).unwrap();
     let places: Vec<usize> = names.iter().map(|name| column(&observer, name)).collect();
@@ -33,7 +33,7 @@ fn ends(mut simulation: Simulation<'_, 3>, names: &[&str]) -> [Vec<f64>; 2] {
     [middle.unwrap(), look(&mut simulation)]
 }
 
-/// The named columns after every so many steps or load steps.
+/// Run a simulation, and return the named columns after every `every` steps or load steps.
 fn series<const D: usize>(
     mut simulation: Simulation<'_, D>,
     names: &[&str],
@@ -56,8 +56,8 @@ fn series<const D: usize>(
     rows
 }
 
-/// The force on the sphere at the end of `hertz.toml` over that of Hertz, with n spacings in the radius of contact and a
-/// layer of contact that is k times as stiff as the block.
+/// Return the force on the sphere at the end of `hertz.toml`, divided by the force of Hertz. The radius of
+/// contact has n spacings; the contact layer is k times as stiff as the block.
 fn over_hertz(n: &str, k: &str) -> f64 {
     simulate_input::<3, _>("hertz", &[("n", n), ("k", k)], |simulation| {
         let names = ["time", "rigid_sphere_force_z", "residual"];
@@ -70,10 +70,10 @@ fn over_hertz(n: &str, k: &str) -> f64 {
 
 #[test]
 fn a_rigid_sphere_on_a_half_space_has_the_force_of_hertz() {
-    // With a stiff layer the block alone is left.
+    // With a stiff layer, only the block deforms.
     let stiff = over_hertz("2", "50");
     assert!((stiff - 1.0).abs() < 0.05, "{stiff}");
-    // The default layer of contact, half a horizon of the same material, lies in series with it.
+    // The default contact layer, half a horizon of the same material, is in series with the block.
     let soft = over_hertz("2", "1");
     let [coarse, fine] = ["2", "3"].map(|n| over_hertz(n, "1.2*m"));
     assert!(
@@ -86,7 +86,7 @@ fn a_rigid_sphere_on_a_half_space_has_the_force_of_hertz() {
     assert!(ratio > 1.3, "{coarse} {fine}");
 }
 
-/// The points of `inputs/sphere.csv` with n spacings in the radius: `scripts/sphere_points`.
+/// Return the points of `inputs/sphere.csv` with n spacings in the radius, as `scripts/sphere_points` does.
 fn sphere_points(n: usize) -> String {
     let spacing = 1.0 / n as f64;
     let centre = |i: usize| (i as f64 + 0.5) * spacing - 1.0;
@@ -107,7 +107,7 @@ fn sphere_points(n: usize) -> String {
     text
 }
 
-/// The largest deviation from the force of Hertz at an approach of 0.02 to 0.04 radii, as a fraction of it.
+/// Return the largest relative deviation from the force of Hertz at an approach of 0.02 to 0.04 radii.
 fn sphere_error(n: usize, file: &Path) -> f64 {
     let n = n.to_string();
     let set = [
@@ -127,7 +127,8 @@ fn sphere_error(n: usize, file: &Path) -> f64 {
             let [time, upper, lower, residual] = row[..] else {
                 unreachable!()
             };
-            // The residual of 1e-4 of all forces lets those of the two plates differ by 0.6 %.
+            // A residual of 1e-4 of all forces permits a difference of 0.6 % between the forces of the two
+            // plates.
             assert!(residual <= 1e-4 && (upper + lower).abs() < 1e-2 * upper);
             // E = 1 Pa, ν = 1/4, R = 1 m.
             (upper / (4.0 / 3.0 / (1.0 - 0.0625) * (0.04 * time).powf(1.5)) - 1.0).abs()
@@ -149,12 +150,12 @@ fn an_elastic_sphere_between_rigid_plates_has_the_force_of_hertz() {
     assert!(fine < middle && middle < coarse, "{coarse} {middle} {fine}");
 }
 
-/// Angle (degrees) between the notch and the line from its tip to that of the crack 40 mm above, and the largest speed
-/// (m/s) of the crack over 10 mm.
+/// Return the angle of the crack to the notch (degrees) and the largest speed of the crack over 10 mm (m/s).
+/// The angle is that of the line from the tip of the notch to the crack tip 40 mm above.
 fn kalthoff(simulation: Simulation<'_, 3>) -> [f64; 2] {
     let names = ["time", "tip_upper_x", "tip_upper_y"];
     let rows = series(simulation, &names, 1);
-    // When the crack has come so far above the notch (m).
+    // Return the row in which the crack reaches a height above the notch (m).
     let passes = |height: f64| {
         let row = rows.iter().find(|row| row[2] >= 0.025 + height);
         row.expect("a crack leaves the notch")
@@ -179,7 +180,8 @@ fn a_projectile_and_its_prescribed_velocity_drive_the_same_crack_out_of_a_notch(
     let problem = deck.and_then(|deck| deck.problem()).unwrap();
     let comm = threads::alone();
     let [prescribed, prescribed_speed] = kalthoff(Simulation::new(&problem, &comm).unwrap());
-    // 62 degrees at half of the spacing, 70 in the experiment; the Rayleigh speed is 2800 m/s.
+    // The angle is 62 degrees with half of the spacing and 70 in the experiment. The Rayleigh speed is 2800
+    // m/s.
     for angle in [angle, prescribed] {
         assert!((52.0..70.0).contains(&angle), "{angle} {prescribed}");
     }
@@ -209,14 +211,14 @@ fn a_crack_whose_faces_slide_runs_at_the_load_of_a_beam() {
     let set = [("dx", "0.6e-3"), ("depth", "0.24e-3")];
     simulate_input::<2, _>("end_notched_flexure", &set, |simulation| {
         let rows = series(simulation, &names, 50);
-        // Those of a beam: see the deck.
+        // Compliance and critical load of beam theory; see the deck.
         let (half_span, half, crack, modulus) = (30e-3_f64, 3e-3_f64, 15e-3_f64, 72e9);
         let bending = (2.0 * half_span.powi(3) + 3.0 * crack.powi(3)) / (8.0 * half.powi(3));
         let shear = 0.3 * half_span / half * 2.0 * (1.0 + 1.0 / 3.0);
         let compliance = (bending + shear) / modulus;
         let critical = 4.0 * half / (3.0 * crack) * (100.0 * modulus * half).sqrt();
         let deflection = |row: &Vec<f64>| 0.5 * (row[2] + row[4]) - row[3];
-        // The mean between 0.4 and 0.9 of the critical load; the beam vibrates a little.
+        // Mean between 0.4 and 0.9 of the critical load, because the beam vibrates slightly.
         let before: Vec<&Vec<f64>> = rows
             .iter()
             .filter(|row| (0.4..0.9).contains(&(-row[1] / critical)) && row[5] < 0.016)
@@ -228,7 +230,7 @@ fn a_crack_whose_faces_slide_runs_at_the_load_of_a_beam() {
         for row in &before {
             assert!(row[6] > 0.0 && row[7] > 0.0, "{row:?}");
         }
-        // The crack runs at once, half a centimetre at least, and nowhere before.
+        // The crack jumps by at least 5 mm, and does not grow before.
         let runs = rows.iter().position(|row| row[5] > 0.02).unwrap();
         let load = -rows[..runs].iter().map(|row| row[1]).fold(0.0, f64::min) / critical;
         assert!((1.0..1.5).contains(&load), "{load}");
@@ -249,13 +251,15 @@ fn a_copper_bar_that_hits_a_wall_becomes_as_short_as_in_finite_elements() {
     ];
     simulate_input::<3, _>("taylor_bar", &[("n", "20")], |simulation| {
         let [_, last] = ends(simulation, &names);
-        // The length (mm), by the last layer of points. Finite elements have 21.4 to 21.5; a finer lattice comes nearer.
+        // Final length (mm), from the last layer of points. Finite elements give 21.4 to 21.5; a finer
+        // lattice is closer.
         let length = 32.4 + 1e3 * last[0];
         assert!((21.4..22.7).contains(&length), "{length}");
-        // The radius of the foot (mm), by its outermost points, 1.5 spacings from the middle: 7.0 to 7.2.
+        // Radius of the foot (mm), from the points 1.5 spacings from the axis. Finite elements give 7.0 to
+        // 7.2.
         let stretch = 1.0 + last[1] / (1.5 * 32.4e-3 / 20.0);
         assert!((6.4..7.6).contains(&(3.2 * stretch)), "{stretch}");
-        // Nearly all of the energy has become heat.
+        // Nearly all of the energy is dissipated.
         assert!(last[2] == 0.0 && last[5] < 0.01 * last[4], "{last:?}");
         assert!(last[3].abs() < 1e-3 * last[4], "{last:?}");
     });
@@ -276,7 +280,7 @@ fn an_indenter_breaks_glass_and_is_pulled_back() {
         let [middle, last] = ends(simulation, &names);
         assert!(last[3] > 0.01 * last[1], "{last:?}");
         assert!(last[0].abs() < 0.02 * last[1], "{last:?}");
-        // Deepest in the middle, back at the start in the end.
+        // The indenter is deepest at half of the time, and back at its initial position at the end.
         assert!(
             middle[4] < 0.0 && (last[4] - 1.5e-3).abs() < 1e-9,
             "{middle:?} {last:?}"
@@ -303,7 +307,7 @@ fn a_tube_breaks_alike_on_a_lattice_and_not_with_scatter() {
         "momentum_x",
         "momentum_y",
     ];
-    // As fractions: error of the energy, sideways momentum.
+    // Return the lateral momentum as a fraction.
     let run = |jitter, modulus| {
         simulate_input::<3, _>(
             "fragmenting_cylinder",
@@ -316,7 +320,7 @@ fn a_tube_breaks_alike_on_a_lattice_and_not_with_scatter() {
             },
         )
     };
-    // The tube has a momentum of 0.1 kg times 200 m/s in each direction, which cancels.
+    // The momenta of the tube, 0.1 kg times 200 m/s in each direction, cancel.
     let [lattice, scattered] = [run("0", "1e9"), run("0.1", "20")];
     assert!(lattice < 1e-12, "{lattice}");
     assert!((1e-6..0.1).contains(&scattered), "{scattered}");

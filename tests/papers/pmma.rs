@@ -1,5 +1,5 @@
-//! The PMMA plate of Willberg, Hesse & Heinecke (2022) on a grid so coarse that it takes a second. The
-//! path needs a finer one: scripts/pmma and docs/src/verification/pmma.md.
+//! The PMMA plate of Willberg, Hesse & Heinecke (2022) on a coarse grid, which takes a second. For the crack
+//! path on finer grids see scripts/pmma and docs/src/verification/pmma.md.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};
@@ -9,20 +9,20 @@ use crate::support::simulate_input;
 
 const SPACING: f64 = 2e-3;
 
-/// The notch's tip, m.
+/// Position of the notch tip, m.
 const TIP: [f64; 2] = [64.6e-3, 18.9e-3];
 
-/// What is looked at from time to time.
+/// Quantities recorded at intervals.
 struct Seen {
-    /// Of the right side, m.
+    /// Displacement of the right side, m.
     displacement: f64,
-    /// By which it is pressed, N.
+    /// Force that moves the right side, N.
     force: f64,
-    /// On the left side, N.
+    /// Reaction of the left side, N.
     held: f64,
-    /// Of the crack, m.
+    /// Length of the crack, m.
     length: f64,
-    /// Damaged places outside the notch, m.
+    /// Positions of damaged points outside the notch, m.
     damaged: Vec<[f64; 3]>,
     branches: Vec<Branch>,
 }
@@ -70,8 +70,8 @@ fn a_coarse_plate_cracks_from_the_tip_of_its_notch() {
         }
         assert_eq!(seen[0].length, 0.0);
 
-        // Before anything breaks it is as stiff as the whole plate is, 10.8 kN/mm, and what presses it is held
-        // on the other side, but for waves.
+        // Before the first bond breaks, the stiffness is that of the uncracked plate, 10.8 kN/mm. The forces
+        // on both sides are equal, except for waves.
         let elastic: Vec<&Seen> = seen
             .iter()
             .filter(|seen| (0.1e-3..0.2e-3).contains(&seen.displacement))
@@ -85,7 +85,7 @@ fn a_coarse_plate_cracks_from_the_tip_of_its_notch() {
         let ratio = mean(|seen| seen.held) / mean(|seen| seen.force);
         assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
 
-        // Damage starts within two horizons of the tip, and the crack runs to the left and up.
+        // Damage begins within two horizons of the tip, and the crack grows to the left and up.
         let first = seen.iter().find(|seen| !seen.damaged.is_empty()).unwrap();
         for [x, y, _] in &first.damaged {
             let distance = (x - TIP[0]).hypot(y - TIP[1]);

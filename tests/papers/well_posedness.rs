@@ -12,8 +12,8 @@ const HORIZON: f64 = 3.0;
 const END: f64 = 2.0;
 const STEPS: usize = 400;
 
-/// A plate of 8 × 4 cells with initial displacements and velocities of which translations are the larger part, damping
-/// r (1/s) and a body force along x of `push` (N/m³) times sin(2t).
+/// Return the deck of a plate of 8 × 4 cells with damping r (1/s) and the body force `push` sin(2t) along x
+/// (N/m³). Initial displacements and velocities are mainly translations.
 fn deck(lambda: &str, damping: f64, push: f64) -> String {
     let step = END / STEPS as f64;
     format!(
@@ -47,7 +47,7 @@ fn deck(lambda: &str, damping: f64, push: f64) -> String {
     )
 }
 
-/// The norm in L²: √(∫ |v|² dV).
+/// Return the norm in L²: √(∫ |v|² dV).
 fn norm(simulation: &Simulation<2>, values: &[Vec<f64>; 2]) -> f64 {
     let volume = &simulation.model.volume;
     let points = 0..simulation.model.owned();
@@ -57,7 +57,7 @@ fn norm(simulation: &Simulation<2>, values: &[Vec<f64>; 2]) -> f64 {
     sum.sqrt()
 }
 
-/// The displacements of the whole run, from the start on.
+/// Return the displacements at the start and after each step.
 fn displacements(lambda: &str, damping: f64, push: f64) -> Vec<[Vec<f64>; 2]> {
     simulate::<2, _>(&deck(lambda, damping, push), |mut simulation| {
         let mut all = vec![simulation.fields.displacement.clone()];
@@ -69,8 +69,8 @@ fn displacements(lambda: &str, damping: f64, push: f64) -> Vec<[Vec<f64>; 2]> {
     })
 }
 
-/// A bound of the norm in L² of the operator v ↦ ∫ K (v' − v) dV' with K = λ ξ⊗ξ/ρ: κ + κ₀ of proposition 3.1 with
-/// p = q = 2.
+/// Return a bound of the L² norm of the operator v ↦ ∫ K (v' − v) dV' with K = λ ξ⊗ξ/ρ: κ + κ₀ of proposition
+/// 3.1 with p = q = 2.
 fn bound(simulation: &Simulation<2>, lambda: impl Fn(f64) -> f64) -> f64 {
     let model = &simulation.model;
     let (mut kappa, mut kappa_0) = (0.0, 0.0_f64);
@@ -96,7 +96,7 @@ fn bound(simulation: &Simulation<2>, lambda: impl Fn(f64) -> f64) -> f64 {
     kappa.sqrt() + kappa_0
 }
 
-/// ∫ e^{−r(t−s)/2} sinh((t − s) w)/w f(s) ds over the first `count` steps, by the trapezoidal rule.
+/// Compute ∫ e^{−r(t−s)/2} sinh((t − s) w)/w f(s) ds over the first `count` steps, by the trapezoidal rule.
 fn response(count: usize, damping: f64, w: f64, values: impl Fn(usize) -> f64) -> f64 {
     let step = END / STEPS as f64;
     let at = |k: usize| {
@@ -109,7 +109,7 @@ fn response(count: usize, damping: f64, w: f64, values: impl Fn(usize) -> f64) -
 
 #[test]
 fn the_a_priori_estimate_holds() {
-    // Soft enough that the bound is not far away: the translations are the larger part of the motion.
+    // The plate is so soft that the motion is mainly a translation, and the bound is close.
     let (damping, push) = (0.6, 2e-3);
     let lambda = |length: f64| 2e-3 / length.powi(3);
     let text = "2e-3/r^3";
@@ -171,7 +171,7 @@ fn a_perturbed_kernel_changes_the_motion_as_much_as_allowed() {
 
 #[test]
 fn the_energy_inequality_holds() {
-    // Eq. after (8) of the paper, for a force that varies in time; ν is free.
+    // Inequality after eq. 8 of the paper, for a force that varies in time; ν is arbitrary.
     let push = 2e-3;
     simulate::<2, _>(&deck("2e-2/r^3", 0.0, push), |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();

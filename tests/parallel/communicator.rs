@@ -1,4 +1,4 @@
-//! The communicator of a real run, between ranks that `mpirun` starts.
+//! The MPI communicator, between ranks started by `mpirun`.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use rayon::ThreadPoolBuilder;
 use crate::support::command::is_rank;
 use crate::support::simulate_on;
 
-/// Numbers of a message that waits for its receiver: larger than what any MPI sends at once.
+/// Length of a message that waits for its receiver: larger than the eager limit of any MPI.
 const LARGE: usize = 1 << 20;
 
 #[test]
@@ -32,7 +32,7 @@ fn a_panic_during_an_exchange_leaves_nothing_under_way() {
         }];
         let exchange = || world.exchange(&mut messages, &mut |_| panic!("on purpose"));
         assert!(catch_unwind(AssertUnwindSafe(exchange)).is_err());
-        // Whoever frees the buffers now has them alone.
+        // No exchange uses the buffers any more, so they may be freed.
         let arrived = |found: &f64| *found == value(other, turn);
         assert!(messages[0].receive.iter().all(arrived));
     }
@@ -76,7 +76,7 @@ fn ranks_may_have_nothing_to_gather() {
         return;
     }
     let world = World::start().unwrap();
-    // The address of an empty vector of bytes is that of `MPI_IN_PLACE`.
+    // The address of an empty vector of bytes equals `MPI_IN_PLACE`, so it must not be passed to MPI.
     assert!(world.all_gather(&Vec::new()).is_empty());
     for giver in 0..2 {
         let own = if world.rank() == giver {
@@ -89,7 +89,7 @@ fn ranks_may_have_nothing_to_gather() {
     assert_eq!(world.all_gather(&[world.rank() as u8]), [0, 1]);
 }
 
-/// More than 4096 interior points on each of two ranks: they are worked on in pieces.
+/// More than 4096 interior points on each of two ranks, so that the loops work on them in pieces.
 const PLATE: &str = "
 dimension = 'plane-stress'
 grid = { volume_correction = 'none', spacing = 1, horizon = 3 }
@@ -109,7 +109,7 @@ fn interior_bonds_in_pieces_give_the_same_bits() {
         let deck = PLATE.replace("LAW", law);
         let displacements = |ranks| {
             let of_rank = simulate_on::<2, _>(ranks, &deck, |mut simulation| {
-                // One thread for each rank, so that pieces are small on any machine.
+                // One thread per rank, so that the size of pieces does not depend on the machine.
                 let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
                 let _pool = pool.build().unwrap();
                 for _ in 0..4 {

@@ -1,5 +1,5 @@
-//! The same deck on any number of ranks and threads gives the same bits. Ranks are threads of the test, which costs
-//! no start of MPI; four decks run as the command under `mpirun` as well.
+//! A deck gives equal bits on any number of ranks and threads. Ranks are threads of the test, which avoids
+//! starts of MPI. Four decks are also run by the command under `mpirun`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ front.strain = { from = [0, 0], direction = [1, 0], length = 0.03, field = 'stra
 tip.notch = { from = [0, 0], direction = [1, 0.2], set = 'plate' }
 ";
 
-/// Blocks of different state-based and bond-based laws and horizons, damped, some of them breaking.
+/// Blocks with different state-based and bond-based laws and horizons, damped; some of them break.
 const LAWS: &str = "
 dimension = 'plane-stress'
 [grid]
@@ -112,7 +112,8 @@ fields = ['displacement', 'damage', 'strain_energy_density', 'dilatation', 'weig
 every_steps = 3
 ";
 
-/// Two levels of refinement across a notch and the border of a body, with horizons of both rules.
+/// Return the deck of the plate with two refinement levels across a notch and the border of a body; `rule` is
+/// the rule of the horizon.
 fn refined(rule: &str) -> String {
     let plate = PLATE.replace("end = 12e-6", "end = 5e-6");
     let plate = plate.replace("fracture_energy = 20", "fracture_energy = 2");
@@ -128,7 +129,7 @@ fn refined(rule: &str) -> String {
     )
 }
 
-/// The same with one law, so that its own loops run.
+/// Return the deck [`LAWS`] with one law for all blocks, so that the loops specialised for one law run.
 fn with_one_law(law: &str) -> String {
     let mut lines: Vec<String> = LAWS.lines().map(str::to_owned).collect();
     for line in &mut lines {
@@ -141,7 +142,7 @@ fn with_one_law(law: &str) -> String {
     lines.join("\n")
 }
 
-/// A block of scattered points from a file, flying apart.
+/// A block of scattered points from a file, which flies apart.
 const BLOCK: &str = "
 dimension = '3d'
 [grid]
@@ -164,7 +165,7 @@ end = 8
 every_steps = 10
 ";
 
-/// A notched plate that is relaxed while it is torn, and then let go.
+/// A notched plate that tears in a relaxation and then is released.
 const SLOW: &str = "
 dimension = 'plane-stress'
 grid = { spacing = 1, horizon = 3 }
@@ -188,7 +189,8 @@ relaxation = { load_steps = 6, tolerance = 1e-4 }
 on = ['down']
 ";
 
-/// A turning block that breaks at another one, with friction and damping, and a third body beside the way of the fragments.
+/// A rotating block that breaks at another block, with friction and damping, and a third body beside the path
+/// of the fragments.
 const COLLISION: &str = "
 dimension = 'plane-strain'
 contact = { friction = 0.2, static_friction = 0.4, restitution = 0.8, pair.hit = { bodies = ['flying', 'target'], model = 'short-range' } }
@@ -219,7 +221,7 @@ condition.push = { set = 'all', body_force = ['0.01*x'] }
 time = { end = 5 }
 ";
 
-/// A cloud with no regularity at all, from a simple generator of pseudo-random numbers.
+/// Return a point file with pseudo-random positions.
 fn scattered_points() -> String {
     let mut state = 12345_u64;
     let mut random = || {
@@ -238,7 +240,7 @@ fn scattered_points() -> String {
     text
 }
 
-/// A deck on every number of ranks, which are threads, and threads of a rank.
+/// Run a deck on all layouts of ranks and threads, with ranks as threads, and compare the bits.
 fn same_everywhere(name: &str, text: &str, must_break: bool) {
     let folder = Folder::new(name);
     let problem = deck_in(&folder, text).1;
@@ -253,7 +255,7 @@ fn same_everywhere(name: &str, text: &str, must_break: bool) {
     }
 }
 
-/// The command, on ranks that `mpirun` starts, writes the bits of one rank that is a thread.
+/// Run the command under `mpirun`, and compare the bits with those of one rank in this process.
 fn same_under_mpirun(name: &str, text: &str, must_break: bool) {
     let folder = Folder::new(&format!("{name}-mpirun"));
     let (deck, problem) = deck_in(&folder, text);
@@ -270,11 +272,11 @@ fn same_under_mpirun(name: &str, text: &str, must_break: bool) {
         let difference = difference(&expected, &datasets(&out.join("result.vtkhdf")));
         assert_eq!(difference, None, "on {ranks} × {threads}");
     }
-    // Which layouts move points depends on measured times.
+    // Measured times decide in which layouts points migrate.
     assert_eq!(repartitions > 0, text.contains("[balance]"));
 }
 
-/// Numbers of ranks and of threads of each.
+/// Numbers of ranks, and of threads per rank.
 const LAYOUTS: [(usize, usize); 8] = [
     (1, 1),
     (1, 2),
@@ -286,7 +288,7 @@ const LAYOUTS: [(usize, usize); 8] = [
     (4, 2),
 ];
 
-/// A deck in a folder with its file of points, and its problem.
+/// Write a deck and its point file into a folder; return its path and its problem.
 fn deck_in(folder: &Folder, text: &str) -> (PathBuf, Problem) {
     folder.write("points.csv", &scattered_points());
     let path = folder.write("deck.toml", text);
@@ -294,7 +296,7 @@ fn deck_in(folder: &Folder, text: &str) -> (PathBuf, Problem) {
     (path, problem.unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// What a deck is there for has happened.
+/// Assert that the events that a deck is made for have happened.
 fn assert_events(found: &BTreeMap<String, Vec<u64>>, text: &str, must_break: bool) {
     let last = |column: &str| {
         let bits = found[&format!("history {column}")].last();
@@ -318,7 +320,7 @@ fn listed(deck: &str) -> String {
     deck.replace("[grid]", "[grid]\nfamily = 'list'")
 }
 
-/// With bonds of lattices and in lists.
+/// Run a deck with bonds in lattices and with bonds in lists.
 fn same_with_either_family(name: &str, text: &str) {
     same_everywhere(name, text, true);
     same_everywhere(&format!("{name}-listed"), &listed(text), true);
@@ -336,7 +338,7 @@ fn a_plate_of_two_materials_with_listed_bonds() {
 
 #[test]
 fn a_bar_whose_ghosts_lie_far_from_their_neighbours_in_memory() {
-    // More than 2^16 points on a rank, so that distances between local indices take more than 16 bits.
+    // More than 2^16 points on a rank, so that differences of local indices need more than 16 bits.
     let deck = "
         dimension = '1d'
         [grid]
@@ -379,7 +381,7 @@ fn a_plate_with_refined_parts() {
     same_everywhere("refined", &refined("delta"), true);
 }
 
-/// A plate that gets finer where it is strained and torn, up to twice.
+/// Return the deck of a plate that is refined up to twice where it is strained and torn.
 fn growing() -> String {
     let plate = PLATE.replace("end = 12e-6", "end = 2e-6");
     let plate = plate.replace("fracture_energy = 20", "fracture_energy = 0.5");
@@ -407,7 +409,7 @@ fn a_plate_that_is_refined_while_it_is_torn_and_dealt_out_anew() {
     same_everywhere("growing", &growing(), true);
 }
 
-/// Beside a body without damage.
+/// The plate is beside a body without damage.
 #[test]
 fn a_plate_of_bonds_that_break_by_work_that_is_refined_while_it_is_torn() {
     let deck = growing()
@@ -419,7 +421,7 @@ fn a_plate_of_bonds_that_break_by_work_that_is_refined_while_it_is_torn() {
     same_everywhere("growing-by-work", &deck, true);
 }
 
-/// One rank is always slower than the mean.
+/// With this limit points are rebalanced at each check, because one rank is always slower than the mean.
 const RESTLESS: &str = "[balance]\nevery_steps = 5\nimbalance = 1\n";
 
 #[test]

@@ -1,4 +1,4 @@
-//! Bonds kept as lattices and in lists give the same physics, up to rounding; so do all vector
+//! Bonds in lattices and in lists give the same physics up to rounding; so do all sets of vector
 //! instructions.
 
 use std::collections::BTreeMap;
@@ -10,8 +10,8 @@ use fissure::problem::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 
-/// Two bodies on one grid, with a hole, a crack, a zone without failure and supports; `LAW` and
-/// `GRID` stand for what differs.
+/// Two bodies on one grid, with a hole, a crack, a no-failure set and supports. `LAW` and `GRID` are
+/// placeholders.
 const SOLID: &str = "
 dimension = '3d'
 [grid]
@@ -51,7 +51,7 @@ velocity = ['0.02*x', '0.02*y + 0.003*sin(x)', '0.002*z*x']
 end = 6
 ";
 
-/// A disc with a file's regular points beside it and two grids that do not match, in the plane.
+/// A plane problem: a disc, regular points from a file beside it, and two grids that do not match.
 const PLANE: &str = "
 dimension = 'plane-strain'
 [grid]
@@ -77,7 +77,7 @@ velocity = ['0.02*x', '0.02*y + 0.003*sin(x)']
 end = 6
 ";
 
-/// Everything that bonds determine, by global id.
+/// Return all fields that depend on bonds, sorted by global id.
 fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
     let fields = [
         Field::Displacement,
@@ -132,7 +132,7 @@ fn compare<const D: usize>(deck: &str) {
             assert!(error < 1e-9, "{field:?}: {a} {b}");
         }
     }
-    // On ranks that share the grid the lattice gives the same bits.
+    // With the grid divided over several ranks, the lattice gives equal bits.
     for ((field, one), (_, three)) in lattice.iter().zip(&measure::<D>(3, &with("lattice"))) {
         assert_eq!(one, three, "{field:?}");
     }
@@ -200,7 +200,7 @@ fn bonds_that_hold_more_beside_surfaces() {
     }
 }
 
-/// All ranks take part in all messages.
+/// Ranks without points take part in all collective messages.
 #[test]
 fn ranks_without_points() {
     let two = "
@@ -241,7 +241,8 @@ fn bonds_that_soften() {
     }
 }
 
-/// A plate from a file, regular but for what `place` does to it, written with few digits.
+/// Return a point file of a plate, written with few digits. The points are regular, except for the map
+/// `place` of x.
 fn plate_from_file(place: impl Fn(f64) -> f64) -> String {
     let mut text = String::from("x y volume block\n");
     for k in 0..600 {
@@ -291,7 +292,7 @@ fn a_grid_is_found_in_a_file() {
     let checked = text(&check("auto"));
     let [bonds, kept] = ["bonds", "of them as lattice"].map(|name| count(&checked, name));
     assert_eq!(bonds, kept, "{checked}");
-    // The same bits however the file's points are dealt out, and the same physics as with lists.
+    // Equal bits for any partition of the points of the file, and the same physics as with lists.
     let run = |family: &str, ranks: usize| {
         let out = folder.join(format!("{family}{ranks}"));
         let mut command = fissure(ranks);
@@ -315,7 +316,7 @@ fn a_grid_is_found_in_a_file() {
     for (a, b) in last(&one).into_iter().zip(last(&list)) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
-    // A column that is a little off.
+    // Shift one column of points slightly.
     folder.write(
         "points.txt",
         &plate_from_file(|x| if x == 7.0 { 7.01 } else { x }),
@@ -330,7 +331,7 @@ fn a_grid_is_found_in_a_file() {
     assert_eq!(count(&text(&check("auto")), "of them as lattice"), "0");
 }
 
-/// The values of all datasets under a limit to the instructions.
+/// Run a deck with limited vector instructions, and return the values of all datasets.
 fn run_with(
     instructions: &str,
     folder: &Folder,

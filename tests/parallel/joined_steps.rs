@@ -1,4 +1,4 @@
-//! Steps that run into one another, so that the points are gone over once a step, give the bits of whole ones.
+//! Fused steps, which need one loop over the points per step, give the bits of separate steps.
 
 use crate::support::history::row;
 use crate::support::simulate_on;
@@ -7,8 +7,8 @@ use fissure::solver::motion::Saved;
 use fissure::solver::observers::HistoryObserver;
 use fissure::solver::{Simulation, Stepper};
 
-/// Two sheets of different density that touch, in lattices with a list between them, or in lists: with more points
-/// than a thread works on at once, and a last part of fewer.
+/// Return the deck of two adjacent sheets of different density, with bonds in lattices and a list between
+/// them, or all in lists. The number of points is not a multiple of the piece of work of a thread.
 fn sheets(family: &str, more: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -25,7 +25,7 @@ fn sheets(family: &str, more: &str) -> String {
     )
 }
 
-/// What acts on the sheets at some of their points, in two stages.
+/// Loads and supports on parts of the sheets, in two stages.
 const CONDITIONS: &str = "
     set.top.where = 'y > 38'
     set.bottom.where = 'y < 2'
@@ -52,10 +52,11 @@ const RELAXATION: &str = "[[stage]]
     on = ['up', 'down', 'left_corner']
     ";
 
-/// State, forces, the row of the history and, from it, the number of broken bonds.
+/// Saved state, bits of the forces, bits of the history row, and number of broken bonds from this row.
 type Seen = (Saved, Vec<u64>, Vec<u64>, u64);
 
-/// What is seen after every 25 steps and at the end, whole or run into one another.
+/// Run a deck with separate steps (`whole`) or fused steps; return the state after every 25 steps and at the
+/// end.
 fn run(deck: &str, ranks: usize, whole: bool) -> Vec<Vec<Seen>> {
     simulate_on(ranks, deck, |simulation: Simulation<2>| {
         let owned = simulation.model.owned();
@@ -97,7 +98,7 @@ fn steps_run_into_one_another() {
             for damping in ["0", "0.05"] {
                 let mut deck = sheets(family, more).replace("DAMPING", damping);
                 if more == relaxed {
-                    // Nothing has a velocity at first.
+                    // A run that begins with a relaxation has no initial velocities.
                     deck = deck.replace("initial.shake", "# initial.shake");
                 }
                 for ranks in [1, 2] {

@@ -1,9 +1,9 @@
-//! Bodies that no bond joins go through one another, and the user is told, once, the same on any number
-//! of ranks.
+//! Bodies without bonds or contact pass through each other. One warning is printed, the same on any number of
+//! ranks.
 
 use crate::support::command::{Folder, finish, fissure, text};
 
-/// A ball above a plate, both in motion; no bond joins them.
+/// Return the deck of a ball above a plate; no bond joins them.
 fn ball_and_plate(velocity: &str, interface: &str) -> String {
     format!(
         "dimension = 'plane-strain'
@@ -26,7 +26,7 @@ fn ball_and_plate(velocity: &str, interface: &str) -> String {
     )
 }
 
-/// The warnings of a run.
+/// Run a deck, and return its warnings.
 fn warnings(ranks: usize, deck: &str) -> Vec<String> {
     let folder = Folder::new("contact");
     let deck = folder.write("deck.toml", deck);
@@ -45,8 +45,8 @@ fn a_ball_that_goes_through_a_plate_is_told_once() {
     let deck = ball_and_plate("[0, -1]", "");
     let alone = warnings(1, &deck);
     assert_eq!(alone.len(), 1, "{alone:?}");
-    // The lowest points of the ball, at y = 9.5, are a spacing above those of the plate, at 3.5, after
-    // 5 s; then they are nearer.
+    // After 5 s the lowest points of the ball (y = 9.5) are one spacing above the points of the plate (y =
+    // 3.5); then the distance is smaller.
     let expected = "warning: at t = 5.2500e0 s points of `plate` and `ball` are closer";
     assert!(alone[0].starts_with(expected), "{alone:?}");
     let place = alone[0].split(['(', ')']).nth(1).unwrap();
@@ -62,14 +62,14 @@ fn a_ball_that_goes_through_a_plate_is_told_once() {
 fn bodies_that_stay_apart_or_are_bonded_are_not_told() {
     let apart = ball_and_plate("[0, 1]", "");
     assert_eq!(warnings(2, &apart), [""; 0]);
-    // So high a horizon joins the ball and the plate.
+    // With this horizon, bonds join the ball and the plate.
     let bonded = ball_and_plate("[0, -1]", "").replace("horizon = 3", "horizon = 7");
     assert_eq!(warnings(1, &bonded), [""; 0]);
 }
 
 #[test]
 fn bodies_kept_apart_by_the_interface_are_watched() {
-    // The ball lies on the plate, its points a spacing above those of the plate.
+    // The ball rests on the plate; its points are one spacing above the points of the plate.
     let rest = "interface.rule = 'none'";
     let lying = |velocity| ball_and_plate(velocity, rest).replace("[10, 12]", "[10, 7]");
     assert_eq!(warnings(2, &lying("[0, 0]")), [""; 0]);

@@ -5,12 +5,12 @@ use crate::support::simulate;
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
-/// An elastic block that is stretched, turning and flying.
+/// Return the deck of an elastic block that is stretched, rotates and translates.
 fn flying_block(step: f64) -> String {
     flying("pmb = { density = 2, youngs_modulus = 5 }", step)
 }
 
-/// A block of a law that is stretched, turning and flying.
+/// Return the deck of a block of a law that is stretched, rotates and translates.
 fn flying(law: &str, step: f64) -> String {
     format!(
         "dimension = '3d'
@@ -50,7 +50,7 @@ fn momentum_is_constant_to_rounding() {
     });
 }
 
-/// Laws with what makes each of them different, without and with damping.
+/// Laws with their variants, without and with damping.
 const LAWS: [&str; 7] = [
     "pmb = { density = 2, youngs_modulus = 5 }",
     "normalised_pmb = { density = 2, youngs_modulus = 5 }",
@@ -181,9 +181,9 @@ fn the_error_of_the_motion_falls_by_four_when_the_step_halves() {
 
 #[test]
 fn a_pulse_moves_at_the_lattice_speed() {
-    // c_L² = (c/2ρ) Σ ξ⁴/|ξ|³ V: with m = 3 under uniaxial strain, c = 12E/(5·9dx²A) and Σ = 12 dx² A, so
-    // c_L² = 1.6 E/ρ. A bump at rest falls apart into two halves; the centroid of the one that goes
-    // right moves at the speed of long waves once they have parted.
+    // c_L² = (c/2ρ) Σ ξ⁴/|ξ|³ V. With m = 3 under uniaxial strain, c = 12E/(5·9dx²A) and Σ = 12 dx² A, so
+    // c_L² = 1.6 E/ρ. A pulse at rest separates into two halves. Then the centroid of the right half moves at
+    // the speed of long waves.
     let speed = (1.6_f64 * 5.0 / 2.0).sqrt();
     let text = "dimension = '1d'
         constraint = 'uniaxial-strain'
@@ -217,7 +217,7 @@ fn a_pulse_moves_at_the_lattice_speed() {
 
 #[test]
 fn a_prescribed_velocity_moves_its_points_by_just_that() {
-    // v = 0.2 + 0.1 t on one end, from an initial displacement of 0.3 there.
+    // v = 0.2 + 0.1 t at one end, which has an initial displacement of 0.3.
     let text = "dimension = 'plane-stress'
         grid = { volume_correction = 'none', spacing = 1, horizon = 3 }
         material.rubber.pmb = { density = 2, youngs_modulus = 5 }
@@ -263,7 +263,7 @@ fn a_motion_that_ends_with_the_run_stays_finite() {
         simulation.check().unwrap();
         assert!(simulation.fields.velocity[0].iter().all(|v| v.is_finite()));
     });
-    // A motion without a value within the run is told.
+    // A prescribed motion that becomes undefined during the run is an error.
     let text = text.replace("t/2", "t");
     simulate::<1, _>(&text, |mut simulation| {
         while simulation.clock.number() < simulation.clock.last() {
@@ -273,7 +273,7 @@ fn a_motion_that_ends_with_the_run_stays_finite() {
     });
 }
 
-/// A square or cube at rest with a small disturbance that holds every frequency.
+/// Return the deck of a square or cube with small initial velocities that contain all frequencies.
 fn rattled(dimension: &str, step: f64) -> String {
     let (upper, lower, velocity) = match dimension {
         "3d" => (
@@ -345,8 +345,8 @@ fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
 
 #[test]
 fn supports_do_the_work_that_becomes_energy() {
-    // A bar pulled at one end and held at the other: kinetic + strain energy = work of the pull, up
-    // to an error of second order.
+    // A bar fixed at one end and moved at the other: kinetic + strain energy = work of the support, up to an
+    // error of second order.
     let text = |step: f64| {
         format!(
             "dimension = 'plane-strain'
@@ -382,7 +382,7 @@ fn supports_do_the_work_that_becomes_energy() {
             let of = |name: &str| end.values[column(&observer, name)];
             assert!(of("reaction_right_x") > 0.0);
             assert!(of("reaction_left_x") < 0.0);
-            // Along a direction, of any length.
+            // Projected on a direction vector of any length.
             assert_eq!(of("force_pull"), of("reaction_right_x"));
             let [x, y] = ["reaction_left_x", "reaction_left_y"].map(of);
             let slanted = 0.6 * x - 0.8 * y;
@@ -402,7 +402,7 @@ fn supports_do_the_work_that_becomes_energy() {
 
 #[test]
 fn loads_accelerate_as_newton_says() {
-    // A total force of 3 N on a free body of 2 kg/m³ · 240 m³, and the same as a body force.
+    // A total force of 3 N on a free body of 2 kg/m³ · 240 m³, and the equal body force.
     for load in ["force = [3, 0, 0]", "body_force = ['3/240', 0, 0]"] {
         let text = format!(
             "dimension = '3d'
@@ -422,7 +422,7 @@ fn loads_accelerate_as_newton_says() {
             let end = row(&mut observer, &mut simulation);
             let momentum = end.values[column(&observer, "momentum_x")];
             assert!((momentum / 12.0 - 1.0).abs() < 1e-12, "{momentum}");
-            // Half of F²t²/m.
+            // The work is half of F²t²/m.
             let work = 0.5 * 12.0_f64.powi(2) / 480.0;
             assert!((end.energies.work / work - 1.0).abs() < 1e-9);
             assert!(end.energies.error.abs() < 1e-9 * work);
@@ -468,7 +468,7 @@ fn bonds_that_break_at_the_start_are_counted() {
         });
         for row in rows {
             assert!(row.energies.fracture > 0.0);
-            // One bond of a spacing, two of two and three of three lead across the gap.
+            // One bond of length 1, two of length 2 and three of length 3 cross the gap.
             assert_eq!(row.broken, 6);
         }
     }
@@ -494,7 +494,8 @@ fn a_reaction_knows_a_motion_better_than_its_rounded_places() {
                 simulation.advance();
                 let [reaction] = simulation.fields.reaction.as_ref().unwrap();
                 let largest = reaction.iter().fold(0.0_f64, |most, it| most.max(it.abs()));
-                // Places are rounded to 1e-13 m: so far bonds of 1 m and 5 Pa are off.
+                // Positions of 1e3 m are rounded to 1e-13 m, which limits the accuracy of bonds of 1 m and 5
+                // Pa.
                 assert!(largest < 1e-11, "{motion}: {largest} N/m³");
             }
         });
@@ -532,12 +533,12 @@ fn two_points_that_are_thrown_apart_lose_the_energy_of_their_bond() {
             (before.kinetic - after.energies.kinetic, after.energies)
         })
     };
-    // However late the bond is seen to break, what is lost is what breaking has taken.
+    // However late the bond breaks, the lost energy equals the recorded fracture energy.
     for step in [0.04, 0.02, 0.01, 0.005, 0.0025, 1e-4] {
         let (lost, energies) = thrown(step);
         let error = (lost / energies.fracture - 1.0).abs();
         assert!(error < 1e-12, "{step}: {lost} {energies:?}");
-        // It breaks within a step of the critical stretch, which takes 0.2 s.
+        // The bond breaks within a step of the critical stretch, which it reaches after 0.2 s.
         let late = (lost / bond - 1.0).abs();
         assert!(late < 2.0 * step / 0.2, "{step}: {lost} {bond}");
     }
@@ -545,7 +546,7 @@ fn two_points_that_are_thrown_apart_lose_the_energy_of_their_bond() {
 
 #[test]
 fn the_step_follows_the_damping() {
-    // r Δt would be 80, 8 and 0.8 with the stable step.
+    // With the undamped stable step, r Δt would be 80, 8 and 0.8.
     let deck = |rate: f64| {
         format!(
             "dimension = 'plane-stress'

@@ -1,4 +1,4 @@
-//! Sums and extremes of fields, fields of probes, strain and angular momentum.
+//! History: sums and extremes of fields, fields of probes, strain and angular momentum.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use fissure::component::Component;
 use fissure::problem::Field;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
-/// Two bodies that turn and are pulled apart; the grid of one has finer parts, so volumes differ.
+/// Two bodies that rotate and separate. The grid of one body has refined parts, so volumes differ.
 const PLATES: &str = "
 dimension = 'plane-stress'
 thickness = 0.5
@@ -39,7 +39,7 @@ field.damage = { field = 'damage', set = 'block', of = ['mean', 'maximum'] }
 probe.corner = { at = [0, 0], fields = ['strain', 'damage'] }
 ";
 
-/// The bits of a dataset as numbers.
+/// Return the numbers of a dataset of bits.
 fn numbers(found: &BTreeMap<String, Vec<u64>>, name: &str) -> Vec<f64> {
     let bits = found.get(name).unwrap_or_else(|| panic!("no `{name}`"));
     bits.iter().map(|bits| f64::from_bits(*bits)).collect()
@@ -117,7 +117,7 @@ fn statistics_are_those_of_the_fields_of_the_result() {
         check("broken", "all", &|k| broken[k], &["sum", "maximum"]);
         check("damage", "block", &|k| damage[k], &["mean", "maximum"]);
 
-        // A bond counts from both of its ends.
+        // The field counts each broken bond at both ends.
         let broken = column("broken_bonds")[output];
         assert_eq!(column("field_broken_sum")[output], 2.0 * broken);
         let whole = column("field_energy_integral")[output]
@@ -125,7 +125,7 @@ fn statistics_are_those_of_the_fields_of_the_result() {
         let strain_energy = column("strain_energy")[output];
         assert!((whole - strain_energy).abs() <= 1e-14 * strain_energy);
 
-        // The probe has the values of its point.
+        // The probe records the values of the nearest point.
         let distance = |k: &usize| positions[3 * k].hypot(positions[3 * k + 1]);
         let mut nearest = points.clone();
         let nearest = nearest.find(|k| points.clone().all(|other| distance(k) <= distance(&other)));
@@ -154,7 +154,7 @@ fn statistics_have_the_same_bits_on_any_ranks_and_threads() {
     }
 }
 
-/// Numbers of the steps of the outputs of a bar that vibrates or is drawn, with these keys.
+/// Return the step numbers of the outputs of a bar with these keys of `[time]` and `[output]`.
 fn steps_of_outputs(time: &str, output: &str) -> Vec<u64> {
     let problem = problem(&format!(
         "dimension = '1d'
@@ -186,7 +186,7 @@ fn outputs_are_written_at_given_times() {
     }
 }
 
-/// A block with this setting, and the strain of a point in its middle after a deformation.
+/// Return the strain of a point in the middle of a block after a deformation; `setting` gives the dimension.
 fn strain<const D: usize>(setting: &str, deformation: impl Fn([f64; 3]) -> [f64; 3]) -> [f64; 6] {
     let (lower, upper) = (vec![0; D], vec![9; D]);
     let deck = format!(
@@ -236,12 +236,12 @@ fn strain_is_that_of_a_uniform_deformation() {
     close(strain::<3>("dimension = '3d'", map), expected);
     let plane = [xx, yy, 0.0, xy, 0.0, 0.0];
     close(strain::<2>("dimension = 'plane-strain'", map), plane);
-    // Across a plate with ν = 1/3, ln λ = −ν/(1 − ν) ln det F.
+    // Stretch λ across a plate with ν = 1/3: ln λ = −ν/(1 − ν) ln det F.
     let determinant: f64 = 1.02 * 0.99 - 0.03 * 0.01;
     let zz = half(determinant.powf(-0.5).powi(2) - 1.0);
     let plane = [xx, yy, zz, xy, 0.0, 0.0];
     close(strain::<2>("dimension = 'plane-stress'", map), plane);
-    // A bar with ν = 1/4, and one that is confined.
+    // A bar with ν = 1/4, and a confined bar.
     let stretch = |[x, y, z]: [f64; 3]| [1.02 * x, y, z];
     let xx = half(1.02_f64.powi(2) - 1.0);
     let across = half(1.02_f64.powf(-0.5) - 1.0);
@@ -275,7 +275,7 @@ fn angular_momentum_of_a_turning_body_stays() {
     simulate::<2, _>(plate, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let index = column(&observer, "angular_momentum_z");
-        // ω Σ m r² of the points.
+        // Expected: ω Σ m r² over the points.
         let model = &simulation.model;
         let inertia: f64 = (0..model.owned())
             .map(|k| {

@@ -1,4 +1,4 @@
-//! Contact: bodies that collide, stick and slide; momentum, energy and the faces of a crack.
+//! Contact: bodies that collide, stick and slide; momentum, energy and crack faces.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use fissure::comm::threads;
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
-/// Rows of the named columns, one each `every` steps until the end.
+/// Run a deck, and return rows of the named columns, one per `every` steps.
 fn history<const D: usize>(deck: &str, every: u64, names: &[&str]) -> Vec<Vec<f64>> {
     simulate::<D, _>(deck, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
@@ -30,7 +30,7 @@ fn history<const D: usize>(deck: &str, every: u64, names: &[&str]) -> Vec<Vec<f6
     })
 }
 
-/// Two equal bars of steel, 0.1 m long, that run into each other with 10 m/s.
+/// Return the deck of two equal steel bars, 0.1 m long, that collide at 10 m/s.
 fn bars(contact: &str) -> String {
     format!(
         "dimension = '1d'
@@ -58,7 +58,7 @@ fn equal_bars_exchange_their_velocities_in_the_time_of_two_waves() {
             "contact_hit_force_x",
         ];
         let rows = history::<1>(&bars(&format!("model = '{model}'")), 1, &names);
-        // 2 L/c with c = √(E/ρ).
+        // Expected duration of contact: 2 L/c with c = √(E/ρ).
         let touching: Vec<f64> = rows
             .iter()
             .filter(|row| row[4] > 0.0)
@@ -67,7 +67,8 @@ fn equal_bars_exchange_their_velocities_in_the_time_of_two_waves() {
         let lasted = touching.last().unwrap() - touching[0];
         assert!((lasted / 40e-6 - 1.0).abs() < 0.02, "{model}: {lasted} s");
         let [first, last] = [&rows[0], rows.last().unwrap()];
-        // What is missing is left in the bars as vibration, from the front that the lattice disperses.
+        // The missing kinetic energy remains in the bars as vibration, because the lattice disperses the wave
+        // front.
         assert!((last[1] / first[1] - 1.0).abs() < 0.02, "{model}: {last:?}");
         assert!((last[2] / first[1]).abs() < 0.01, "{model}: {last:?}");
         let momentum = 0.1 * 8000.0 * 10.0;
@@ -92,12 +93,13 @@ fn damping_takes_what_the_motion_loses() {
     let [first, last] = [&rows[0], rows.last().unwrap()];
     assert!(last[2] > 0.005 * first[0], "{last:?}");
     assert_eq!(last[3], 0.0);
-    // Opening and closing between two steps costs some per cent of the energy in the contact.
+    // Contact that opens or closes between two steps changes the energy by some per cent of the contact
+    // energy.
     assert!(last[1].abs() < 0.1 * last[2], "{last:?}");
     assert!(last[4].abs() < 1e-9, "{last:?}");
 }
 
-/// Two single points in the plane, `apart` spacings of 1 m apart along x, of mass 2 kg.
+/// Return the deck of two single points of 2 kg in the plane, at a distance `apart` along x, m.
 fn two_points(contact: &str, apart: f64, velocities: [[f64; 2]; 2], end: f64) -> String {
     let [[a, b], [c, d]] = velocities;
     format!(
@@ -145,12 +147,13 @@ fn points_that_stick_move_together() {
     let deck = two_points("friction = 50", 1.0, [[0.2, 0.004], [0.0, 0.0]], 4.0);
     let rows = history::<2>(&deck, 1, &names);
     let last = rows.last().unwrap();
-    // Without friction it is 0.0052: the contact turns.
+    // Without friction the value is 0.0052, because the direction of the contact rotates.
     assert!((last[0] / 0.002 - 1.0).abs() < 0.25, "{last:?}");
     assert!(last[1] > 0.0 && last[2].abs() < 1e-2 * last[1], "{last:?}");
 }
 
-/// A block on an incline of this slope, which is a rigid half space, with gravity 0.01 m/s²; it begins with a speed down.
+/// Return the deck of a block on an inclined rigid half space, with gravity 0.01 m/s². `angle` is the slope,
+/// `speed` the initial speed down the slope.
 fn incline(angle: f64, friction: &str, speed: f64) -> String {
     let (sine, cosine) = (angle.sin(), angle.cos());
     let (x, y) = (2.0 * 0.01 * sine, -2.0 * 0.01 * cosine);
@@ -180,7 +183,7 @@ fn a_block_on_an_incline_slides_or_sticks() {
     for (angle, friction) in [(0.3_f64, 0.1), (0.5, 0.3), (0.2, 0.0)] {
         let deck = incline(angle, &format!("friction = {friction}"), 0.02);
         let rows = history::<2>(&deck, 10, &names);
-        // The block has settled by half of the time.
+        // After half of the time, vibrations of the block have decayed.
         let [middle, last] = [&rows[rows.len() / 2], rows.last().unwrap()];
         let found = (last[1] - middle[1]) / (last[0] - middle[0]) / mass;
         let expected = 0.01 * (angle.sin() - friction * angle.cos());
@@ -190,7 +193,8 @@ fn a_block_on_an_incline_slides_or_sticks() {
         );
         assert!(last[3].abs() < 0.01 * (last[4] + 0.02), "{last:?}");
     }
-    // Pressed on before it is pulled, so that it never leaves the slope; tan 0.2 = 0.203.
+    // The normal load rises before the tangential load, so that the block never leaves the slope; tan 0.2 =
+    // 0.203.
     let gently = |friction: &str| {
         let (x, y) = (0.02 * 0.2_f64.sin(), -0.02 * 0.2_f64.cos());
         let deck = incline(0.2, friction, 0.0);
@@ -208,7 +212,7 @@ fn a_block_on_an_incline_slides_or_sticks() {
         &names,
     );
     let last = rows.last().unwrap();
-    // It creeps by what the eight points with √(k m) each let it, with k = 2 E ℓ/δ.
+    // The block creeps against the drag of its eight points, √(k m) each, with k = 2 E ℓ/δ.
     let creep = last[2] / (8.0 * (2.0 * 5.0 / 3.0 * 2.0_f64).sqrt());
     assert!((last[1] / mass / creep - 1.0).abs() < 0.02, "{last:?}");
     let weight = mass * 0.01 * 0.2_f64.sin();
@@ -278,7 +282,7 @@ fn a_free_rigid_box_tumbles_with_its_energy() {
             "
         )
     };
-    // Rotation about the middle axis is unstable, so it turns over.
+    // Rotation about the intermediate axis is unstable, so the brick turns over.
     let error = |step: f64| {
         let names = [
             "energy_error",
@@ -324,9 +328,9 @@ fn a_rigid_ball_rolls_down_a_plane_of_points() {
         "friction_energy",
     ];
     let rows = history::<3>(&deck, 5, &names);
-    // By half of the time the ball rolls. Damping of the points that it leaves would slow it down.
+    // After half of the time the ball rolls. Damping of points that lose contact would slow the ball down.
     let [middle, last] = [&rows[rows.len() / 2], rows.last().unwrap()];
-    // The points touch half a spacing below their plane's surface: the ball rolls on this radius.
+    // Contact begins half a spacing from the surface, which determines the rolling radius.
     let inertia = 0.4 * (40.0_f64 / 40.5).powi(2);
     let expected = gravity * angle.sin() / (1.0 + inertia);
     let found = (last[1] - middle[1]) / (last[0] - middle[0]);
@@ -339,7 +343,7 @@ fn a_rigid_ball_rolls_down_a_plane_of_points() {
         (found / without_overlap - 1.0).abs() < 0.02,
         "{found} for {without_overlap}"
     );
-    // It turns as it rolls.
+    // The rotation matches rolling.
     let of_spin = last[2] / (0.5 * mass * last[1].powi(2)) - 1.0;
     assert!((of_spin / inertia - 1.0).abs() < 0.05, "{of_spin}");
     assert!(last[3] < 23.0, "it has left the plane: {last:?}");
@@ -368,7 +372,7 @@ fn a_point_in_a_rigid_body_is_an_error() {
     );
 }
 
-/// A block with a crack through it, whose halves are pressed together.
+/// Return the deck of a block with a crack through it, whose halves are pressed together.
 fn cracked_block(contact: &str) -> String {
     format!(
         "dimension = 'plane-strain'
@@ -393,8 +397,9 @@ fn a_closed_crack_carries_load() {
     let closed = force(&cracked_block("contact = {}"));
     let open = force(&cracked_block(""));
     assert!(open.abs() < 0.02 * whole, "{open} of {whole}");
-    // The layer of contact, δ thick and free across (E for E/(1 − ν²)), lies in line with the 17 m between the supports:
-    // 17/(17 + 3.015/(1 − 1/16)) = 0.84. The faces, which are surfaces, take a little more.
+    // The contact layer is in series with the 17 m between the supports. Its thickness is δ and its modulus E
+    // instead of E/(1 − ν²): 17/(17 + 3.015/(1 − 1/16)) = 0.84. Softer surfaces at the crack faces reduce
+    // this value slightly.
     assert!(
         (0.77..0.84).contains(&(closed / whole)),
         "{closed} of {whole}"
@@ -427,7 +432,7 @@ fn bodies_at_rest_feel_no_contact() {
 
 #[test]
 fn steps_become_shorter_before_stiff_contact_and_longer_again() {
-    // The right bar begins a little away, so that the contact is seen coming.
+    // The right bar starts at a small distance, so that the approach is detected before contact.
     let deck = bars("stiffness = 8e12").replace("lower = [0.1]", "lower = [0.1005]");
     let deck = deck
         .replace("upper = [0.2]", "upper = [0.2005]")
@@ -452,8 +457,8 @@ fn steps_become_shorter_before_stiff_contact_and_longer_again() {
     );
     let last = rows.last().unwrap();
     assert!((last[0] - 150e-6).abs() < 1e-17, "{last:?}");
-    // Points that hit each other within a step too long gained twelve times the energy. At the limit of stability, contact
-    // that opens and closes costs some per cent.
+    // With steps that are too long, colliding points would gain twelve times the energy. At the stability
+    // limit, opening and closing contact changes the energy by some per cent.
     assert!((last[2] / rows[0][1]).abs() < 0.05, "{last:?}");
 }
 
@@ -481,7 +486,7 @@ fn a_rigid_body_whose_motion_is_lost_is_named() {
 
 #[test]
 fn fragments_are_counted_and_weighed() {
-    // A block that two cracks cut in three, one of its points alone.
+    // A block that two cracks divide into three parts, and a separate point.
     let deck = "
         dimension = '3d'
         grid = { spacing = 1, horizon = 2, volume_correction = 'none' }

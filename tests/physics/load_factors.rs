@@ -1,4 +1,4 @@
-//! Loads that an observer changes, and runs that it stops.
+//! Observers that change loads and stop runs.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use fissure::run::{Existing, Observer, Options, Outcome, Reason, Row, RunState, 
 use fissure::solver::{Simulation, Stepper};
 use rayon::ThreadPoolBuilder;
 
-/// A plate that is pulled; its bonds break where `damage` is given.
+/// Return the problem of a plate under tension.
 fn plate(traction: &str, time: &str, extra: &str) -> Problem {
     let text = format!(
         "dimension = 'plane-stress'
@@ -35,13 +35,14 @@ fn plate(traction: &str, time: &str, extra: &str) -> Problem {
 
 const EXPLICIT: &str = "end = 3e-6, step = 1e-8";
 
-/// Outputs and rows of explicit runs.
+/// Outputs and history rows of explicit runs.
 const OFTEN: &str = "output.every_steps = 50\n history.every_steps = 10";
 
-/// Of quasi-static runs.
+/// Outputs and history rows of quasi-static runs.
 const ALWAYS: &str = "output.every_steps = 1\n history.every_steps = 1";
 
-/// Sets factors of `pull` at rows with these numbers, and stops at one.
+/// Observer that sets factors of the load `pull` at rows with these step numbers, and stops the run at one of
+/// them.
 #[derive(Default)]
 struct Control {
     factors: Vec<(u64, f64)>,
@@ -59,7 +60,7 @@ impl Observer for Control {
         if Some(now.number()) == self.stop {
             now.stop();
         }
-        // What the state says is what the row says.
+        // The energies of the state equal those of the row.
         let (found, expected) = (now.energies(), row.energies());
         assert_eq!(
             [found.kinetic, found.strain, found.fracture, found.work],
@@ -92,7 +93,8 @@ fn run(
     fissure::run(problem, &threads::alone(), options, observer)
 }
 
-/// A run with factors gives the bits of one whose load has them in its expression, from just before a time (s).
+/// Assert that a run with factors gives the bits of a run whose load expression contains the factors, each
+/// from just before a time (s).
 fn is_as_by_expression(name: &str, time: &str, outputs: &str, factors: &[(u64, f64, f64)]) {
     let folder = Folder::new(name);
     let [controlled, expressed] = ["controlled", "expressed"].map(|name| folder.join(name));
@@ -136,7 +138,7 @@ fn is_as_by_expression(name: &str, time: &str, outputs: &str, factors: &[(u64, f
 
 #[test]
 fn a_factor_acts_as_the_same_factor_in_the_expression() {
-    // Powers of 2, so that no product is rounded.
+    // Powers of 2, so that products have no rounding errors.
     is_as_by_expression(
         "factor-explicit",
         EXPLICIT,
@@ -186,7 +188,7 @@ fn a_stopped_run_goes_on_with_its_factors() {
     assert_eq!(difference(&expected, &found), None);
 }
 
-/// Asks for something at the first step.
+/// Observer that calls a function at the first step.
 struct Ask(fn(&mut dyn RunState));
 
 impl Observer for Ask {
@@ -236,7 +238,8 @@ fn a_stop_at_a_step_comes_soon_and_wrong_requests_are_errors() {
     );
 }
 
-/// Ids and displacements at the end of a run on some ranks that are threads, with a factor from step 50 on and a rebalancing.
+/// Run a problem on ranks that are threads, with a load factor from step 50 on and a rebalancing. Return the
+/// bits of ids and displacements at the end.
 fn on_ranks(problem: &Problem, ranks: usize) -> Vec<u64> {
     let mut all = threads::run(ranks, |comm| {
         let pool = ThreadPoolBuilder::new().num_threads(1);

@@ -1,5 +1,5 @@
-//! `method = "static"`: its equilibria are those of relaxation, in a fraction of the force evaluations; what it does where
-//! it finds none; ranks, threads and restarts change no bit.
+//! `method = "static"`: equilibria equal those of relaxation, with fewer force evaluations; load steps
+//! without an equilibrium; equal bits on any ranks and threads and after restarts.
 
 use crate::support::equilibria::{same_on_ranks, to_the_end, torn_plate};
 use crate::support::history::{column, row};
@@ -18,7 +18,7 @@ fn displacements<const D: usize>(simulation: &Simulation<D>) -> Vec<f64> {
         .collect()
 }
 
-/// The largest difference as a share of the largest value.
+/// Return the largest difference, divided by the largest value.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     let largest = b.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
@@ -45,7 +45,7 @@ fn a_bar_between_supports_is_stretched_evenly() {
     });
 }
 
-/// A body of a law, held at one side and moved at the other.
+/// Return the deck of a body of a law, fixed at one side and moved at the other.
 fn pulled<const D: usize>(law: &str, motion: &str, method: &str) -> String {
     let (dimension, upper, free) = match D {
         2 => ("plane-strain", "[0.02, 6e-3]", "'free'"),
@@ -70,7 +70,7 @@ fn pulled<const D: usize>(law: &str, motion: &str, method: &str) -> String {
     )
 }
 
-/// Compare both methods in a body of a law.
+/// Compare relaxation and Newton's method for a body of a law.
 fn compare<const D: usize>(law: &str, motion: &str) {
     let run = |method: &str| {
         simulate(
@@ -89,7 +89,7 @@ fn compare<const D: usize>(law: &str, motion: &str) {
     let error = difference(&found, &relaxed);
     assert!(error < 1e-5, "{law}: {error:e}");
     assert!(2 * fast < slow, "{law}: {fast} against {slow} evaluations");
-    // A law that can yield does.
+    // A plastic law must yield in this motion.
     assert!(yielded.is_none_or(|most| most > 1e-3), "{law}: {yielded:?}");
 }
 
@@ -117,7 +117,7 @@ fn bodies_that_yield_have_the_equilibria_of_relaxation() {
     compare::<3>(J2, "'6e-5*t'");
 }
 
-/// Force evaluations of both methods on a deck of `inputs/`.
+/// Return the numbers of force evaluations of relaxation and Newton's method for a deck of `inputs/`.
 fn evaluations(name: &str, parameters: &[(&str, &str)]) -> [u64; 2] {
     ["relaxation", "static"].map(|method| {
         let method = [("time.method", method)];
@@ -141,7 +141,7 @@ fn it_takes_a_fifth_of_the_force_evaluations() {
     }
 }
 
-/// See [`torn_plate`].
+/// Return [`torn_plate`] with Newton's method.
 fn torn(family: &str) -> String {
     torn_plate(
         family,
@@ -217,7 +217,7 @@ fn goes_on_between_load_steps_and_within_them_to_the_same_bits() {
     }
 }
 
-/// A clamped strip whose end is moved so far that it turns.
+/// Return the deck of a clamped strip with a large displacement of its end.
 fn bent(newton: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -247,7 +247,7 @@ fn a_load_step_without_an_equilibrium_is_halved() {
     let (halved, several) = run("load_steps = 1, tolerance = 1e-8, max_iterations = 4");
     assert_eq!(one, 1);
     assert!(several > 1 && several.is_power_of_two(), "{several}");
-    // The end moves by a third of the length.
+    // The end moves by 30 % of the length or more.
     let most = whole.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     assert!(most > 0.3 * 0.04, "{most}");
     let error = difference(&halved, &whole);

@@ -1,4 +1,4 @@
-//! Contact in relaxations: reactions in closed form, energies, and the same bits on any ranks and after a restart.
+//! Contact in relaxations: closed-form reactions, energies, and equal bits on any ranks and after a restart.
 
 use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
@@ -7,7 +7,7 @@ use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
-/// The named columns after each load step.
+/// Run a deck, and return the named columns after each load step.
 fn load_steps<const D: usize>(deck: &str, names: &[&str]) -> Vec<Vec<f64>> {
     simulate::<D, _>(deck, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
@@ -25,7 +25,8 @@ fn load_steps<const D: usize>(deck: &str, names: &[&str]) -> Vec<Vec<f64>> {
     })
 }
 
-/// A bar of springs: 40 points, E = 5 Pa, 1 m apart, joined to their neighbours alone, in the relaxation of 4 load steps.
+/// Return a deck with a spacing of 1 m and bonds between nearest neighbours only, a chain of springs with E =
+/// 5 Pa; a relaxation with 4 load steps.
 fn bars(bodies: &str) -> String {
     format!(
         "dimension = '1d'
@@ -37,11 +38,11 @@ fn bars(bodies: &str) -> String {
     )
 }
 
-/// The stiffness of a bond of [`bars`], 2E A ℓ/δ², and that of a layer of contact δ thick, E A/δ, N/m.
+/// Stiffnesses in [`bars`], N/m: a bond, 2E A ℓ/δ², and a contact layer of thickness δ, E A/δ.
 const BOND: f64 = 2.0 * 5.0 / 2.25;
 const LAYER: f64 = 5.0 / 1.5;
 
-/// The largest error of the energy of load steps as a share of a work (J).
+/// Assert that the energy error of each load step is small compared with a work (J).
 fn assert_balance(rows: &[Vec<f64>], error: usize, work: f64) {
     for row in rows {
         assert!(row[error].abs() < 1e-6 * work, "{row:?} of {work}");
@@ -50,7 +51,7 @@ fn assert_balance(rows: &[Vec<f64>], error: usize, work: f64) {
 
 #[test]
 fn a_block_between_a_rigid_floor_and_a_rigid_plate() {
-    // Nothing else holds it.
+    // Only the contact holds the block.
     let deck = bars(
         "rigid.floor.half_space = { through = [0], normal = [1] }
         rigid.plate = { half_space = { through = [40], normal = [-1] }, motion = ['-0.1*t'] }
@@ -66,7 +67,7 @@ fn a_block_between_a_rigid_floor_and_a_rigid_plate() {
     ];
     let rows = load_steps::<1>(&deck, &names);
     assert_eq!(rows.len(), 4);
-    // Half a layer at each end, and 39 bonds.
+    // Half a contact layer at each end and 39 bonds, in series.
     let stiffness = 1.0 / (1.0 / LAYER + 39.0 / BOND);
     for row in &rows {
         let pressed = 0.1 * row[0];
@@ -102,18 +103,19 @@ fn two_blocks_pressed_together_and_pulled_apart() {
         "external_work",
     ];
     let rows = load_steps::<1>(&deck, &names);
-    // One whole layer between 19 and 29 bonds; nothing is left when the last point is beyond its place.
+    // One whole contact layer between 19 and 29 bonds. The contact is open when the end has moved beyond its
+    // initial position.
     let stiffness = 1.0 / (1.0 / LAYER + 48.0 / BOND);
     for (row, moved) in rows.iter().zip([-0.35, -0.3, -0.05, 0.2]) {
         let force = stiffness * f64::max(-moved, 0.0);
         assert!((row[1] - force).abs() < 1e-6, "{row:?} for {force}");
         assert!((row[2] + force).abs() < 1e-6, "{row:?} for {force}");
     }
-    // The last load step opens the contact on its way, which the trapezoid rule of its work does not see.
+    // The contact opens within the last load step, so the trapezoid rule of the work is inaccurate there.
     assert_balance(&rows[..3], 3, rows[0][4].abs());
 }
 
-/// A block with a crack through it, whose halves are pressed together, with and without contact.
+/// Return the deck of a block with a crack through it, whose halves are pressed together.
 fn cracked_block(contact: &str) -> String {
     format!(
         "dimension = 'plane-strain'
@@ -142,15 +144,15 @@ fn a_closed_crack_carries_load_in_equilibrium() {
     let closed = force(&cracked_block("contact = {}"));
     let open = force(&cracked_block(""));
     assert!(open.abs() < 1e-4 * whole, "{open} of {whole}");
-    // The layer of contact lies in line with the 17 m between the supports: 17/(17 + 3.015/(1 − 1/16)) = 0.84, and the
-    // faces, which are surfaces, take a little more.
+    // The contact layer is in series with the 17 m between the supports: 17/(17 + 3.015/(1 − 1/16)) = 0.84.
+    // Softer surfaces at the crack faces reduce this value slightly.
     assert!(
         (0.77..0.86).contains(&(closed / whole)),
         "{closed} of {whole}"
     );
 }
 
-/// A rigid disc is pressed into a block that breaks and lies on another one.
+/// A rigid disc is pressed into a block that breaks; the block lies on another block.
 const INDENTED: &str = "
     dimension = 'plane-strain'
     grid = { spacing = 1, horizon = 2.5 }

@@ -7,7 +7,7 @@ use fissure::solver::refinement::Regridded;
 
 use crate::support::{displace, problem, simulate, simulate_on};
 
-/// A plate with a hole, refined twice around a place on its edge and once elsewhere.
+/// Return the deck of a plate with a hole, refined twice around a position on its edge and once elsewhere.
 fn plate(more: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -25,7 +25,7 @@ fn plate(more: &str) -> String {
     )
 }
 
-/// A block in space, refined twice in a corner and in its middle.
+/// A 3-D block, refined in a corner (twice) and in its middle.
 const BLOCK: &str = "dimension = '3d'
     grid = { spacing = 1, horizon = 2.2 }
     material.glass.pmb = { density = 2, youngs_modulus = 5 }
@@ -78,14 +78,14 @@ fn ids_depend_on_place_and_level_only() {
     let all = places(&plate(""), 1);
     assert_eq!(places(&plate(""), 3), all);
     assert!(all.windows(2).all(|pair| pair[0].0 < pair[1].0));
-    // With less refined, those that are there are the same.
+    // With a smaller refined region, all points are also points of the larger region's grid.
     let less = plate("").replace("x < 4 && y < 5", "x < 2 && y < 3");
     let fewer = places(&less, 2);
     assert!(fewer.len() < all.len());
     assert!(fewer.iter().all(|point| all.binary_search(point).is_ok()));
 }
 
-/// The largest sum of forces by direction as a share of the sum of their sizes.
+/// Return the largest sum of the forces along an axis, divided by the sum of their absolute values.
 fn unbalanced<const D: usize>(text: &str) -> f64 {
     simulate::<D, _>(text, |mut simulation| {
         displace(&mut simulation, |place| {
@@ -156,8 +156,8 @@ fn horizons_follow_their_rule() {
     assert_eq!(horizons, [3.0, 3.0, 3.0, 3.0, 3.0, 6.0, 2.0, 2.0, 4.0]);
 }
 
-/// Energy density under a uniform strain along x as a share of that of a whole family on the lattice: the
-/// least and the most of all points farther than 5 m from the sides.
+/// Return the smallest and largest energy density under a uniform strain along x, divided by the energy
+/// density of a complete family. Only points farther than 5 m from the sides count.
 fn energies(more: &str, region: &str) -> [f64; 2] {
     let text = format!(
         "dimension = 'plane-stress'
@@ -193,14 +193,15 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     let patch = "(x - 20.5)^2 + (y - 20.5)^2 < 9.01";
     for correction in ["none", "linear"] {
         let more = format!("grid.volume_correction = '{correction}'");
-        // Where everything is refined, each point's family is a smaller image of that on the coarse lattice.
+        // If the whole plate is refined, each family is a scaled copy of the family on the coarse lattice.
         let [least, most] = energies(&more, "x > -1");
         assert!(
             (least - 1.0).abs() < 1e-9 && (most - 1.0).abs() < 1e-9,
             "{least} {most}"
         );
     }
-    // Dipasquale et al. (2014), table 3, loses 10 to 12 %, and 37 % with horizons that are not enlarged.
+    // In Dipasquale et al. (2014), table 3, the loss is 10 to 12 %, and 37 % without larger horizons at
+    // interfaces.
     let linear = "grid.volume_correction = 'linear'";
     let [least, most] = energies(linear, patch);
     assert!(least > 0.95 && most < 1.10, "{least} {most}");
@@ -210,12 +211,12 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     let [least, _] = energies(&format!("{none}\nrefinement.interface_factor = 1"), patch);
     assert!(least < 0.5, "{least}");
     let [least, most] = energies("", patch);
-    // No theory gives these: measured were 0.930 and 1.083, as docs/src/verification/dipasquale.md has it.
+    // Measured values, without a theory: 0.930 and 1.083, as in docs/src/verification/dipasquale.md.
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
 }
 
-/// The least strain energy density in a patch refined twice, as a share of that far from it, when a strip with
-/// blocked sides is strained along x and at rest.
+/// Return the smallest strain energy density in a patch refined twice, divided by the value far from the
+/// patch. A strip with fixed lateral displacements is in equilibrium under a strain along x.
 fn least_energy_at_rest(bonds: &str) -> f64 {
     let text = format!(
         "dimension = 'plane-stress'
@@ -259,7 +260,7 @@ fn patches_lose_less_with_bonds_of_mean_horizons() {
     assert!((0.78..0.9).contains(&mean), "{mean}");
 }
 
-/// A notched plate that is torn and refined where it is strained most, in three places by the end.
+/// A notched plate that tears, and is refined where its strain energy is largest: in three places at the end.
 const TORN: &str = "dimension = 'plane-stress'
     thickness = 1e-3
     parameters.dx = 1e-3
@@ -275,13 +276,13 @@ const TORN: &str = "dimension = 'plane-stress'
     time.end = 1e-5
     ";
 
-/// The same; what has not been strained most for two looks becomes coarse again.
+/// Return the deck [`TORN`] with coarsening: points without a trigger for two evaluations become coarser.
 fn torn_and_coarsened() -> String {
     TORN.replace("every_steps = 6", "coarsen_after = 1e-7, every_steps = 6")
 }
 
-/// Makes steps and refines as a run does; deals the points out anew now and then. Returns how many points
-/// were born, and how many left.
+/// Advance and refine as a run does, with a rebalancing from time to time. Return the numbers of created and
+/// removed points.
 fn go_on(simulation: &mut Simulation<'_, 2>, steps: u64) -> [u64; 2] {
     let mut change = [0; 2];
     for step in 1..=steps {
@@ -300,7 +301,8 @@ fn go_on(simulation: &mut Simulation<'_, 2>, steps: u64) -> [u64; 2] {
     change
 }
 
-/// The run is the same on 1 to 4 ranks; so many points at least are born, and so many leave.
+/// Assert that a run is the same on 1 to 4 ranks. `least` has the smallest numbers of created and removed
+/// points.
 fn are_the_same(text: &str, least: [u64; 2]) {
     let states = |ranks: usize| {
         let found = simulate_on::<2, _>(ranks, text, |mut simulation| {
@@ -356,7 +358,7 @@ fn bonds_of_mean_horizons_are_the_same_on_any_number_of_ranks() {
     are_the_same(&text, [100, 0]);
 }
 
-/// Mass, momentum by component, energy set free, and volume.
+/// Return mass, momentum by component, released energy, and volume.
 fn sums(simulation: &Simulation<'_, 2>) -> Vec<f64> {
     let (model, fields) = (&simulation.model, &simulation.fields);
     let freed = fields.freed_energy.as_ref().expect("bonds break");
@@ -373,7 +375,7 @@ fn sums(simulation: &Simulation<'_, 2>) -> Vec<f64> {
 
 #[test]
 fn what_comes_and_goes_keeps_mass_momentum_and_the_energy_set_free() {
-    // Not symmetric, so that there is momentum both ways.
+    // The velocity is not symmetric, so that both components of the momentum are not zero.
     let text = torn_and_coarsened().replace("2000*y*(1 + 10*x)", "2000*y*(1 + 10*x) + 3");
     for ranks in [1, 3] {
         simulate_on::<2, _>(ranks, &text, |mut simulation| {
@@ -407,7 +409,7 @@ fn new_bonds_do_not_join_what_a_crack_has_parted() {
         "where = 'x > 12*dx', every_steps = 1",
     );
     simulate::<2, _>(&text, |mut simulation| {
-        // A crack from the tip of the notch to the right, along a row of faces.
+        // Cut a crack from the tip of the notch to the right, along a row of cell faces.
         let y: Vec<f64> = simulation.model.reference[1].clone();
         let (x, limit) = (simulation.model.reference[0].clone(), 18e-3);
         simulation.forces.cut(
@@ -440,7 +442,7 @@ fn new_bonds_do_not_join_what_a_crack_has_parted() {
     });
 }
 
-/// The sum of the loads by component, N.
+/// Return the sum of the loads by component, N.
 fn loads<const D: usize>(text: &str) -> [f64; D] {
     simulate::<D, _>(text, |simulation| {
         let external = simulation.fields.external_force.as_ref().expect("loads");
@@ -467,7 +469,7 @@ fn a_load_keeps_its_sum_on_a_refined_layer() {
     for layer in ["y > 12 && x < 9", "x < 9", "y > 15 && x > 3"] {
         let text = pulled.replace("(x - 13)^2 + (y - 8)^2 < 9", layer);
         let [x, y] = loads::<2>(&text);
-        // 3 and 7 Pa on 20 m × 0.5 m, and the 11 N of the side.
+        // 3 and 7 Pa on 20 m × 0.5 m, and the total force of 11 N on the side.
         assert!((x - 30.0).abs() < 1e-12, "{layer}: {x}");
         assert!((y - 81.0).abs() < 1e-12, "{layer}: {y}");
     }
@@ -512,12 +514,12 @@ fn points_are_triggers_only_where_they_may_be() {
             number += 1;
             farthest = farthest.max(model.reference[0][point]);
         }
-        // Two levels, each seen from a horizon away.
+        // Each of two levels extends up to a horizon from its triggers.
         assert!(number > 50 && farthest < 12e-3, "{number} {farthest}");
     });
 }
 
-/// A plate that is refined twice where it says, for as long as it says.
+/// Return the deck of a plate that is refined twice by the trigger in `more`.
 fn passing(more: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -536,7 +538,7 @@ fn passing(more: &str) -> String {
 
 #[test]
 fn what_was_refined_for_a_while_is_as_it_was_before() {
-    // A motion that neither refining nor its reverse may change; the trigger goes out at 0.3 µs.
+    // A rigid motion, which refinement and coarsening must not change. The trigger ends at 0.3 µs.
     let text = passing(
         "refinement.trigger = { where = 'x > 10*dx && x < 14*dx && t < 3e-7', every_steps = 5, coarsen_after = 2e-7 }
         initial.drift.velocity = [3, -2]",
@@ -565,7 +567,7 @@ fn what_was_refined_for_a_while_is_as_it_was_before() {
             let (fields, time) = (&simulation.fields, simulation.clock.time());
             for (d, speed) in [3.0, -2.0].into_iter().enumerate() {
                 for k in 0..simulation.model.owned() {
-                    // Rounding, of places of 1e-2 m and displacements of 1e-6 m.
+                    // Rounding errors of positions of 1e-2 m and displacements of 1e-6 m.
                     let [u, v] = [&fields.displacement, &fields.velocity].map(|field| field[d][k]);
                     assert!((v / speed - 1.0).abs() < 1e-9, "{v}");
                     assert!((u / (speed * time) - 1.0).abs() < 1e-9, "{u}");
@@ -575,7 +577,7 @@ fn what_was_refined_for_a_while_is_as_it_was_before() {
     }
 }
 
-/// The same of a body that can break, refined on its right for 0.1 µs.
+/// Return the deck of [`passing`] with damage, refined on the right for 0.1 µs.
 fn passing_and_brittle() -> String {
     let more = "damage.brittle.critical_stretch = { fracture_energy = 5, alpha = 0 }
         refinement.trigger = { where = 'x > 8*dx && t < 1e-7', every_steps = 1, coarsen_after = 1e-7 }";
@@ -585,7 +587,7 @@ fn passing_and_brittle() -> String {
     )
 }
 
-/// Where the bond between two of these points crosses a height, if it does.
+/// Return the x at which the bond between points a and b crosses a height; `None` without a crossing.
 fn crosses_at(height: f64, [x, y]: [&[f64]; 2], a: usize, b: usize) -> Option<f64> {
     let share = (height - y[a]) / (y[b] - y[a]);
     ((y[a] - height) * (y[b] - height) < 0.0).then(|| x[a] + share * (x[b] - x[a]))
@@ -607,14 +609,15 @@ fn points_near_a_crack_stay() {
         assert!(left > 300, "{left}");
         let model = &simulation.model;
         let [x, y] = [0, 1].map(|d| model.reference[d].as_slice());
-        // Where it was cut the finest points are still there, and nothing has grown together.
+        // The finest points near the cut are still there, and no bond across the cut has been created.
         let finest = |k: &usize| simulation.problem.block(usize::from(model.block[*k])).level == 2;
         let stay = (0..model.owned()).filter(finest).filter(|k| x[*k] > 15e-3);
         assert!(stay.count() > 100);
         let mut joined = 0;
         simulation.forces.for_each_intact(|a, b| {
             if let Some(place) = crosses_at(8.1e-3, [x, y], a, b) {
-                // Half of a coarse spacing beyond the cut, for bonds cross it at any angle and faces are upright.
+                // Tolerance: half of a coarse spacing beyond the cut, because bonds cross at any angle and
+                // cell faces are upright.
                 assert!(place < 14.6e-3, "{place}");
                 joined += 1;
             }
@@ -648,7 +651,7 @@ fn velocities_that_are_linear_in_place_stay_so() {
             let [x, y] = [0, 1].map(|d| model.reference[d][k]);
             let expected = [y, 1e3 * (x - 3e-3)];
             for d in 0..2 {
-                // Rounding, of velocities up to 20 m/s.
+                // Rounding errors of velocities up to 20 m/s.
                 assert!((velocity[d][k] - expected[d]).abs() < 1e-11, "{x} {y}");
             }
         }
@@ -675,7 +678,7 @@ fn a_crack_of_the_coarse_grid_stays_when_finer_ones_have_come_and_gone() {
             let mut joined = 0;
             simulation.forces.for_each_intact(|a, b| {
                 if let Some(place) = crosses_at(8e-3, [x, y], a, b) {
-                    // One coarse spacing, within which the first face that is parted begins.
+                    // Tolerance: one coarse spacing, in which the first separated cell face begins.
                     assert!(place < 13e-3, "{} {} {} {}", x[a], y[a], x[b], y[b]);
                     joined += 1;
                 }

@@ -1,6 +1,6 @@
-//! Relaxation: the equilibrium is that of an independent static solution of the same bonds, whatever
-//! the load steps; bonds break between equilibria, without the overshoot of a wave; it can be stopped
-//! within a load step and goes on to the same bits.
+//! Relaxation. The equilibrium equals an independent static solution of the same bonds, for any number of
+//! load steps. Bonds break in equilibria, without dynamic overshoot. A restart within a load step gives equal
+//! bits.
 
 use crate::support::equilibria::{same_on_ranks, to_the_end, torn_plate};
 use crate::support::history::{column, row};
@@ -12,7 +12,7 @@ use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
 
-/// Makes a whole load step.
+/// Advance by one complete load step.
 fn load_step<const D: usize>(simulation: &mut Simulation<D>) {
     simulation.advance();
     while !simulation.load_step.is_settled {
@@ -21,7 +21,7 @@ fn load_step<const D: usize>(simulation: &mut Simulation<D>) {
     }
 }
 
-/// A plate with a hole that is pulled apart, fixed below.
+/// Return the deck of a plate with a hole under tension, fixed below.
 fn plate_with_hole(relaxation: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -50,8 +50,9 @@ fn plate_with_hole(relaxation: &str) -> String {
     )
 }
 
-/// Solves K u = f for the linear bonds of the plate, without any part of the solver but its points:
-/// bonds by distance, supports by place, conjugate gradients. Returns u by component, by point.
+/// Solve K u = f for the linear bonds of the plate, independently of the solver except for the positions.
+/// Bonds follow from distances and supports from positions; the method is conjugate gradients. Return u for
+/// each point.
 fn static_solution(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let (young, ratio, thickness, horizon, volume) = (5.0, 1.0 / 3.0, 0.5, 3.0, 0.5);
     let pi = std::f64::consts::PI;
@@ -62,7 +63,7 @@ fn static_solution(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
             let bond = [b[0] - a[0], b[1] - a[1]];
             let length = bond[0].hypot(bond[1]);
             if length <= horizon * (1.0 + 1e-9) {
-                // Both ends' share, times both volumes.
+                // The contributions of both ends, times both volumes.
                 let stiffness = micromodulus / length.powi(3) * volume * volume;
                 bonds.push((i, j, bond, stiffness));
             }
@@ -136,7 +137,7 @@ fn displacements(simulation: &Simulation<2>) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// The largest difference as a share of the largest displacement.
+/// Return the largest difference, divided by the largest displacement.
 fn difference(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     let all = |values: &[[f64; 2]]| values.iter().flatten().copied().collect::<Vec<f64>>();
     let (a, b) = (all(a), all(b));
@@ -188,7 +189,7 @@ fn load_steps_do_not_change_the_equilibrium_of_an_elastic_body() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// The message with which a run fails.
+/// Run a simulation that fails, and return its error message.
 fn failure<const D: usize>(mut simulation: Simulation<D>) -> String {
     loop {
         simulation.advance();
@@ -218,7 +219,7 @@ fn a_body_that_nothing_holds_says_so() {
     });
 }
 
-/// A plate in three strips that bonds do not connect; the left one is held.
+/// Return the deck of a plate in three strips without bonds between them; the left strip is fixed.
 fn strips(conditions: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -240,7 +241,8 @@ fn strips(conditions: &str) -> String {
 
 #[test]
 fn a_loaded_piece_that_nothing_holds_is_named() {
-    // 10 columns of 6 points; the one with the smallest id is the first of the left body behind the crack.
+    // The piece has 10 columns of 6 points. Its smallest id is the first point of the left body behind the
+    // crack.
     let push = "condition.push = { set = 'middle', force = [0, 0.25] }";
     let wanted = "loads of 2.500e-1 N act along y on a piece of body `left` that no support holds along y. The \
                   piece has 60 points; point 8 at [8.5, 0.5] m is one of them";
@@ -250,7 +252,7 @@ fn a_loaded_piece_that_nothing_holds_is_named() {
             assert!(text.contains(wanted), "{ranks}: {text}");
         }
     }
-    // A support along x does not hold along y, one along y does.
+    // A support along x does not prevent motion along y.
     let guided = "condition.guide = { set = 'last', displacement = [0, 'free'] }
                   condition.push = { set = 'last', force = [0.25, 0.5] }";
     let text = simulate(&strips(guided), failure::<2>);
@@ -264,7 +266,7 @@ fn pieces_at_rest_and_pieces_whose_loads_cancel_need_no_support() {
     let pull = "set.two.where = 'x > 16 && x < 18'
                 condition.pull = { set = 'two', force = [0.02, 0] }
                 condition.back = { set = 'middle', force = [-0.02, 0] }";
-    // With loads the tolerance refers to them.
+    // With loads, the tolerance is relative to the loads.
     for (conditions, bound) in [("", 1e-12), (pull, 1e-5)] {
         simulate(&strips(conditions), |mut simulation: Simulation<2>| {
             to_the_end(&mut simulation);
@@ -283,7 +285,7 @@ fn pieces_at_rest_and_pieces_whose_loads_cancel_need_no_support() {
     }
 }
 
-/// A block whose left column is moved, without any load.
+/// Return the deck of a block whose left column is moved, without loads.
 fn carried(motion: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -301,13 +303,13 @@ fn carried(motion: &str) -> String {
 
 #[test]
 fn a_body_that_is_carried_without_loads_comes_to_rest() {
-    // The last motion turns the body by 0.3 rad about the lower left corner.
+    // The last motion rotates the body by 0.3 rad about its lower left corner.
     let turned =
         "displacement = ['x*(cos(0.3*t) - 1) - y*sin(0.3*t)', 'x*sin(0.3*t) + y*(cos(0.3*t) - 1)']";
     let far = "initial.far.displacement = [100, 0]";
     for (motion, initial, size, wanted) in [
         ("displacement = ['1e-3*t', 0]", "", 1e-3, Some(1e-3)),
-        // Energies of 1e-38 J.
+        // With this motion, energies are about 1e-38 J.
         ("displacement = ['1e-22*t', 0]", "", 1e-22, Some(1e-22)),
         (
             "displacement = ['100 + 1e-3*t', 0]",
@@ -335,7 +337,7 @@ fn a_body_that_is_carried_without_loads_comes_to_rest() {
             row
         });
         let row = &rows[0];
-        // To move one column alone by as much takes about E h u.
+        // Moving one column alone by u would need a force of about E h u.
         let reaction = row.values[row.values.len() - 2..].iter();
         let largest = reaction.fold(0.0_f64, |most, force| most.max(force.abs()));
         assert!(largest < 1e-12 * 1e6 * size, "{motion} {largest:e}");
@@ -367,7 +369,7 @@ fn a_free_body_that_begins_deformed_relaxes() {
     });
 }
 
-/// A notched strip that parts within its first load step.
+/// A notched strip that separates in its first load step.
 const PARTS_AT_ONCE: &str = "
     dimension = 'plane-stress'
     thickness = 1e-3
@@ -392,7 +394,7 @@ fn a_strip_that_parts_in_its_first_load_step_carries_nothing_then() {
             to_the_end(&mut simulation);
             let row = row(&mut observer, &mut simulation);
             let reaction = row.values[row.values.len() - 2];
-            // Without the notch E h b ε = 1e9 · 1e-3 · 8e-3 · 3e-4 N.
+            // Without the notch, the reaction would be E h b ε = 1e9 · 1e-3 · 8e-3 · 3e-4 N.
             assert!(reaction.abs() < 1e-3 * 2.4, "{reaction}");
             assert!(row.broken > 0);
             for point in 0..simulation.model.owned() {
@@ -411,7 +413,7 @@ fn a_strip_that_parts_in_its_first_load_step_carries_nothing_then() {
     assert_eq!(first, second);
 }
 
-/// The energies at the end of each load step.
+/// Run a deck, and return the energies at the end of each load step.
 fn energies_of_load_steps(deck: &str) -> Vec<Energies> {
     simulate(deck, |mut simulation: Simulation<1>| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
@@ -444,7 +446,7 @@ fn supports_put_in_what_breaking_frees_and_loses() {
             lost = now;
         }
         if steps == 1 {
-            // ½ E ε² A L between the innermost supports.
+            // Expected energy: ½ E ε² A L between the innermost supports.
             let strain: f64 = 0.38 * 1.5 / 35.0;
             let energy = 0.5 * 5.0 * strain * strain * 35.0;
             assert!(
@@ -457,7 +459,8 @@ fn supports_put_in_what_breaking_frees_and_loses() {
 
 #[test]
 fn loads_do_work_on_what_breaking_lets_them_move() {
-    // Bonds between four points in the middle can break; those that lead past them bear the load then.
+    // Only bonds between four points in the middle can break. Bonds that span these points carry the load
+    // afterwards.
     let deck = |critical: f64| {
         format!(
             "dimension = '1d'
@@ -474,7 +477,7 @@ fn loads_do_work_on_what_breaking_lets_them_move() {
             "
         )
     };
-    // The mean displacement of the loaded points at the end, with the energies of both load steps.
+    // Return the mean displacement of the loaded points at the end, and the energies of both load steps.
     let run = |critical: f64| {
         let mean = simulate(&deck(critical), |mut simulation: Simulation<1>| {
             to_the_end(&mut simulation);
@@ -510,7 +513,7 @@ fn loads_do_work_on_what_breaking_lets_them_move() {
 
 #[test]
 fn a_load_step_that_breaks_before_its_first_iteration_is_counted_once() {
-    // All points are moved, so that every place is an equilibrium.
+    // All displacements are prescribed, so that every state is an equilibrium.
     let deck = "dimension = '1d'
         grid = { spacing = 1, horizon = 3 }
         material.rubber.pmb = { density = 2, youngs_modulus = 5 }
@@ -522,12 +525,12 @@ fn a_load_step_that_breaks_before_its_first_iteration_is_counted_once() {
     let rows = energies_of_load_steps(deck);
     let [row] = rows[..] else { panic!("{rows:?}") };
     assert!(row.fracture > 0.0 && row.strain > 0.0, "{row:?}");
-    // The bonds of a bar are linear, and nothing moves when they break.
+    // The bonds of a bar are linear, and no point moves when bonds break.
     let lost = row.work - row.strain - row.fracture;
     assert!(lost.abs() < 1e-9 * row.work, "{row:?}");
 }
 
-/// A bar of brittle bonds that is pulled apart at its ends.
+/// A bar of brittle bonds that is pulled at its ends.
 const BAR: &str = "
     dimension = '1d'
     grid = { spacing = 1, horizon = 3 }
@@ -556,7 +559,7 @@ fn a_bar_breaks_when_it_must_and_carries_nothing_from_then_on() {
             rows.push(row(&mut observer, &mut simulation).values);
         }
         let first = rows.iter().position(|row| row[broken] > 0.0).unwrap();
-        // Linear until then: 35 m between the outermost points that are held.
+        // The response is linear until then, with 35 m between the innermost points of the supports.
         let strain = 0.38 * rows[first][0] / 35.0;
         assert!((0.9..1.1).contains(&(strain / 0.0105)), "{:?}", rows[first]);
         let slope = rows[1][force] / rows[1][0];
@@ -566,7 +569,7 @@ fn a_bar_breaks_when_it_must_and_carries_nothing_from_then_on() {
                 "{row:?}"
             );
         }
-        // All bonds across one section, in the same load step; then both halves are free of forces.
+        // All bonds across one section break in the same load step; then both halves carry no force.
         assert_eq!(rows.last().unwrap()[broken], rows[first][broken]);
         for row in &rows[first..] {
             assert!(row[force].abs() < 1e-6 * rows[first - 1][force], "{row:?}");
@@ -578,7 +581,7 @@ fn a_bar_breaks_when_it_must_and_carries_nothing_from_then_on() {
     });
 }
 
-/// See [`torn_plate`].
+/// Return [`torn_plate`] with relaxation.
 fn torn(family: &str) -> String {
     torn_plate(
         family,
@@ -631,8 +634,8 @@ fn goes_on_from_within_a_load_step_to_the_same_bits() {
     assert!(within >= 3, "{within} stops within a load step");
 }
 
-/// A strip of a solid whose bonds flow is pulled to ten times its yield strain. Its force was measured with 500 load steps;
-/// the bound of a continuum is 2/√3 σ_y A = 6.93 N, and families at surfaces carry more.
+/// A strip of a plastic solid is pulled to ten times its yield strain. The reference force was computed with
+/// 500 load steps. The limit load of a continuum is 2/√3 σ_y A = 6.93 N; families at surfaces carry more.
 #[test]
 fn bonds_that_flow_are_in_equilibrium_after_any_number_of_load_steps() {
     for steps in [1, 5, 20] {
@@ -657,7 +660,7 @@ fn bonds_that_flow_are_in_equilibrium_after_any_number_of_load_steps() {
             let right = (0..model.owned()).filter(|k| model.position(*k)[0] > 0.017);
             let pull: f64 = right.map(|k| reaction[0][k] * model.volume[k]).sum();
             assert!((pull / 8.76 - 1.0).abs() < 5e-3, "{steps}: {pull} N");
-            // The forces that go with the stored history are those of the equilibrium.
+            // An evaluation with the stored bond history gives the forces of the equilibrium.
             let before = fields.internal_force.clone();
             simulation.evaluate(BondUpdate::None);
             assert_eq!(simulation.fields.internal_force, before, "{steps}");

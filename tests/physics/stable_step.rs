@@ -1,4 +1,4 @@
-//! The stable step against the largest frequency that a body has.
+//! The stable step, compared with the largest frequency of a body.
 
 use crate::support::history::row;
 use crate::support::simulate;
@@ -7,13 +7,13 @@ use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::HistoryObserver;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// A system of one body or two.
+/// A system of one or two bodies.
 struct System {
     dimension: &'static str,
     text: String,
 }
 
-/// A block of one law, just large enough that a point in its middle has its whole family.
+/// Return a block of one law, just large enough for a complete family in its middle.
 fn block(dimension: &'static str, law: &str) -> System {
     let (horizon, lower, upper) = match dimension {
         "3d" => (2, "[0, 0, 0]", "[5, 6, 5]"),
@@ -28,7 +28,7 @@ fn block(dimension: &'static str, law: &str) -> System {
     System { dimension, text }
 }
 
-/// Two bodies side by side.
+/// Return two bodies side by side.
 fn pair(laws: [&str; 2]) -> System {
     let [left, right] = laws;
     let text = format!(
@@ -46,7 +46,7 @@ fn pair(laws: [&str; 2]) -> System {
 }
 
 impl System {
-    /// At rest, for a step of 1 s.
+    /// Return the deck at rest, with a step of 1 s.
     fn at_rest(&self) -> String {
         format!(
             "dimension = '{}'\n{}time = {{ end = 1, step = 1 }}",
@@ -54,7 +54,7 @@ impl System {
         )
     }
 
-    /// With small velocities that hold every frequency.
+    /// Return the deck with small initial velocities that contain all frequencies.
     fn rattled(&self, step: f64, steps: u32) -> String {
         let velocity = match self.dimension {
             "3d" => "['1e-6*cos(3.1*x*y)', '1e-6*sin(7*x+z)', '1e-6*cos(z*z+x)']",
@@ -72,8 +72,8 @@ impl System {
     }
 }
 
-/// The largest frequency (1/s) of small motions, from differences of the forces: the largest
-/// eigenvalue of M^(−1/2) K M^(−1/2), K being minus the derivative of the forces ∫ f dV.
+/// Return the largest frequency of small motions, 1/s, from the largest eigenvalue of M^(−1/2) K M^(−1/2). K
+/// is minus the derivative of the forces ∫ f dV, computed by differences.
 fn largest_frequency<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     const SHIFT: f64 = 1e-6;
     let points = simulation.model.owned();
@@ -103,7 +103,7 @@ fn largest_frequency<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     matrix.symmetric_eigenvalues().max().sqrt()
 }
 
-/// The stable step and the true limit 2/ω, s.
+/// Return the stable step and the exact limit 2/ω, s.
 fn steps<const D: usize>(system: &System) -> (f64, f64) {
     simulate::<D, _>(&system.at_rest(), |mut simulation| {
         let limit = 2.0 / largest_frequency(&mut simulation);
@@ -111,8 +111,8 @@ fn steps<const D: usize>(system: &System) -> (f64, f64) {
     })
 }
 
-/// By which factor the energy has grown at most after so many steps of this size; infinite where the
-/// motion has no value any more.
+/// Return the largest factor by which the energy has grown during `steps` steps of this size; infinity if the
+/// motion overflows.
 fn growth<const D: usize>(system: &System, step: f64, steps: u32) -> f64 {
     simulate::<D, _>(&system.rattled(step, steps), |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
@@ -133,8 +133,8 @@ fn growth<const D: usize>(system: &System, step: f64, steps: u32) -> f64 {
     })
 }
 
-/// Σ V C n⊗n (1 − cos k·ξ) over the whole family of a lattice of spacing 1, with C = 1/|ξ|; without a
-/// wave Σ V C n⊗n.
+/// Return Σ V C n⊗n (1 − cos k·ξ) over the complete family of a lattice of spacing 1, with C = 1/|ξ|; without
+/// a wave, Σ V C n⊗n.
 fn lattice_sum(dimension: usize, horizon: f64, wave: Option<Vector3<f64>>) -> Matrix3<f64> {
     let reach = horizon as i32;
     let range = |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
@@ -154,7 +154,7 @@ fn lattice_sum(dimension: usize, horizon: f64, wave: Option<Vector3<f64>>) -> Ma
     sum
 }
 
-/// The usual step √(2ρ/Σ V c/|ξ|) (Silling & Askari 2005) of the lattice of [`block`], s.
+/// Return the usual step √(2ρ/Σ V c/|ξ|) (Silling & Askari 2005) for the lattice of [`block`], s.
 fn usual(dimension: usize, density: f64, modulus: f64) -> f64 {
     let pi = std::f64::consts::PI;
     let (horizon, micromodulus) = match dimension {
@@ -187,7 +187,7 @@ fn below_the_step_the_energy_is_bounded_and_beyond_the_limit_it_is_not() {
     fn check<const D: usize>(dimension: &'static str) {
         let system = block(dimension, PMB);
         let (stable, limit) = steps::<D>(&system);
-        // The energy of a wave of Verlet swings by a factor of up to 1/(1 − (ωΔt/2)²).
+        // In the Verlet method, the energy of a wave oscillates by a factor of up to 1/(1 − (ωΔt/2)²).
         for step in [0.98 * stable, 0.98 * limit] {
             let swing = 1.0 / (1.0 - (step / limit).powi(2));
             let found = growth::<D>(&system, step, 1000);
@@ -196,7 +196,7 @@ fn below_the_step_the_energy_is_bounded_and_beyond_the_limit_it_is_not() {
                 "{dimension}: {found}, at most {swing}"
             );
         }
-        // ωΔt = 2.04 grows by a factor of 1.49 a step.
+        // With ωΔt = 2.04, the energy grows by a factor of 1.49 per step.
         let found = growth::<D>(&system, 1.02 * limit, 100);
         assert!(found > 1e9, "{dimension}: {found}");
     }
@@ -245,13 +245,13 @@ fn the_step_of_every_law_is_within_the_limit() {
 
 #[test]
 fn the_limit_of_the_cubic_lattice_is_nearly_twice_the_usual_step() {
-    // Waves in the infinite lattice: ρ ω² is the largest eigenvalue of Σ V C n⊗n (1 − cos k·ξ). A
-    // body is the lattice with bonds taken away, so its frequencies are no higher.
+    // Waves in the infinite lattice: ρ ω² is the largest eigenvalue of Σ V C n⊗n (1 − cos k·ξ). A finite body
+    // has fewer bonds, so its frequencies are not higher.
     const PARTS: i32 = 24;
     for (horizon, expected) in [(2.0, 1.86), (3.0, 1.97), (4.0, 2.03)] {
         let rest = lattice_sum(3, horizon, None);
         let mut largest = 0.0_f64;
-        // Frequencies are the same along all axes and both ways.
+        // By symmetry, wave vectors with 0 ≤ z ≤ y ≤ x are sufficient.
         for x in 0..=PARTS {
             for y in 0..=x {
                 for z in 0..=y {
@@ -261,7 +261,7 @@ fn the_limit_of_the_cubic_lattice_is_nearly_twice_the_usual_step() {
                 }
             }
         }
-        // (2/ω)/√(2ρ/Σ V C), of which the density drops out.
+        // (2/ω)/√(2ρ/Σ V C), which does not depend on the density.
         let gain = (2.0 * rest.trace() / largest).sqrt();
         assert!((gain - expected).abs() < 0.01, "{horizon}: {gain}");
     }

@@ -1,5 +1,5 @@
-//! Stages of a run: a body relaxed under a load stays at rest when its motion is followed, and springs
-//! back when the load is taken off; and bodies of another density move as they must.
+//! Stages of a run. A body relaxed under a load stays at rest in a following explicit stage, and springs back
+//! without the load. Bodies with a density scale move as expected.
 
 use crate::support::history::{column, row, rows_to_the_end};
 use crate::support::saved::{state, whole};
@@ -9,7 +9,8 @@ use fissure::error::Warning;
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Energies, HistoryObserver};
 
-/// A bar that is held at one end, pulled at the other, and then let go or not.
+/// Return the deck of a bar fixed at one end and loaded at the other; `second` is the second stage, with or
+/// without the load.
 fn bar(second: &str) -> String {
     format!(
         "dimension = '1d'
@@ -31,8 +32,8 @@ fn bar(second: &str) -> String {
     )
 }
 
-/// Energies at the end of the first stage, and the extremes of the end's displacement and the energies
-/// after it.
+/// Energies at the end of the first stage, and afterwards the extremes of the end's displacement and of the
+/// energies.
 struct Seen {
     preload: Energies,
     displacement: f64,
@@ -89,7 +90,7 @@ fn a_relaxed_body_stays_at_rest() {
 fn a_body_that_is_let_go_swings_about_its_place() {
     let seen = see(&bar("safety = 0.1\n off = ['pull']"));
     let strain = seen.preload.strain;
-    // Half a swing takes less than 2 L/c = 32 s, L = 28 m, c = √3 m/s.
+    // Half a period is less than 2 L/c = 32 s, with L = 28 m and c = √3 m/s.
     assert!((seen.lowest + seen.displacement).abs() < 0.1 * seen.displacement);
     assert!(
         (0.9..1.001).contains(&(seen.kinetic / strain)),
@@ -171,7 +172,7 @@ fn a_stage_may_be_one_step_long_up_to_rounding() {
             "
         )
     };
-    // 1.2e-7 − 1e-7 is less than 2e-8, and 0.1 + 0.2 is more than 0.3.
+    // In floating point, 1.2e-7 − 1e-7 is less than 2e-8, and 0.1 + 0.2 is more than 0.3.
     let short = "time.end = 2.2e-7
         [[stage]]
         end = 1e-7
@@ -204,8 +205,8 @@ fn a_stage_may_be_one_step_long_up_to_rounding() {
 const GUIDE: &str = "set.left.where = 'x < 3'
         condition.guide = { set = 'left', velocity = [0.1, 'free'] }";
 
-/// A block that flies and is pulled along, with its velocity prescribed on one side or not, and with damping or not; its
-/// density scale goes from 1 to 4, and to 0.5.
+/// Return the deck of a moving block under a body force, with optional damping and an optional support. Its
+/// density scale changes from 1 to 4 and then to 0.5.
 fn flying(damping: f64, support: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -267,7 +268,7 @@ fn a_change_of_density_keeps_momentum_and_books_energy() {
     }
 }
 
-/// The warnings of a deck, without places and from the key on up to the first semicolon.
+/// Return the warnings of a deck, each from the key up to the first semicolon, without the location.
 fn problem_warnings(deck: &str) -> Vec<String> {
     let short = |warning: &Warning| {
         let text = &warning.message;

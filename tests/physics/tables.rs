@@ -1,4 +1,4 @@
-//! Values by time from tables: motions follow them, and loads are those of the expressions that they stand for.
+//! Tables of values over time: motions follow the table, and loads equal those of the equivalent expressions.
 
 use crate::support::command::Folder;
 use crate::support::equilibria::{same_on_ranks, to_the_end, torn_plate};
@@ -8,7 +8,7 @@ use fissure::comm::threads;
 use fissure::deck::{self, Source};
 use fissure::solver::Simulation;
 
-/// The rows of a motion, s and m.
+/// Rows of a motion: time (s) and displacement (m).
 const ROWS: [(f64, f64); 5] = [
     (0.0, 0.0),
     (0.11, 0.02),
@@ -17,7 +17,8 @@ const ROWS: [(f64, f64); 5] = [
     (1.0, 0.04),
 ];
 
-/// The motion at a time, s; a run may pass its end by a part of a step, in which the last segment goes on.
+/// Return the displacement (m) at a time (s). A run may pass its end by a part of a step, so the last segment
+/// is extrapolated.
 fn motion_at(time: f64) -> f64 {
     let k = (1..ROWS.len() - 1).find(|k| time < ROWS[*k].0);
     let k = k.unwrap_or(ROWS.len() - 1);
@@ -33,7 +34,7 @@ fn columns(rows: &[(f64, f64)]) -> String {
     format!("times = [{times}], values = [{values}]")
 }
 
-/// A plate whose left side follows a table, with further lines.
+/// Return the deck of a plate whose left side follows a table, with further lines.
 fn plate(more: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -125,7 +126,7 @@ fn load_steps_follow_a_table() {
     }
 }
 
-/// Displacements at the end.
+/// Return the displacements at the end of a run.
 fn moved(deck: &str) -> Vec<f64> {
     simulate::<2, _>(deck, |mut simulation| {
         to_the_end(&mut simulation);
@@ -143,7 +144,7 @@ fn tables_act_as_the_expressions_that_they_stand_for() {
         ("pressure = 'VALUE', normal = [1, 0]", 0.1),
         ("temperature = '10*VALUE'", 7.0),
     ] {
-        // Rises from 0.25 to 0.75.
+        // The value rises from t = 0.25 to t = 0.75.
         let deck = |table: &str, value: &str| {
             plate(&format!(
                 "{table}

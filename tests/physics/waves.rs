@@ -1,5 +1,5 @@
-//! Waves that travel: pulses through cubic lattices and standing waves in a bar, simulated and timed.
-//! `tests/laws/elasticity.rs` holds the forces in such waves against closed forms.
+//! Wave speeds from simulations: pulses in cubic lattices and standing waves in a bar.
+//! `tests/laws/elasticity.rs` compares the forces in such waves with closed forms.
 
 use std::collections::HashMap;
 
@@ -9,12 +9,12 @@ use fissure::solver::Simulation;
 const DENSITY: f64 = 3.0;
 const BULK: f64 = 2.0;
 
-/// Makes every point move as the one of the middle column at the same x: with a plane wave along x in
-/// a bar whose middle has whole families, the infinite lattice.
+/// Constraint that moves every point as the point of the middle column at the same x. The bar then carries a
+/// plane wave as in the infinite lattice, because the middle column has complete families.
 struct Plane {
-    /// The place in the middle column of each point.
+    /// Index in `column` of the point at the same x, for each point.
     leader: Vec<usize>,
-    /// The middle column.
+    /// Points of the middle column.
     column: Vec<usize>,
 }
 
@@ -48,7 +48,7 @@ impl Plane {
         }
     }
 
-    /// The centroid of the part of a pulse of displacement that goes to the right.
+    /// Return the centroid of the right half of a displacement pulse, m.
     fn centroid(&self, simulation: &Simulation<3>) -> f64 {
         let values = self.column.iter().map(|point| {
             let x = simulation.model.reference[0][*point];
@@ -64,11 +64,11 @@ impl Plane {
     }
 }
 
-/// The speed of a pulse of displacement (m/s) along an axis of a cubic lattice of unit spacing; `bodies`
-/// gives the deck's materials and bodies for a bar that reaches this far to both sides.
+/// Return the speed (m/s) of a displacement pulse along an axis of a cubic lattice of unit spacing. `bodies`
+/// returns the materials and bodies of a bar with a given half length.
 ///
-/// A Gaussian at rest falls apart into two halves. However they disperse, the centroid of one moves at
-/// the speed of long waves once they have parted.
+/// A Gaussian pulse at rest separates into two halves. Then the centroid of a half moves at the speed of long
+/// waves, whatever the dispersion.
 fn pulse_speed(horizon: f64, bodies: impl Fn(f64) -> String) -> f64 {
     let expected = (1.8 * BULK / DENSITY).sqrt();
     let [apart, end] = [5.0, 8.5].map(|horizons| horizons * horizon / expected);
@@ -106,7 +106,7 @@ fn pulse_speed(horizon: f64, bodies: impl Fn(f64) -> String) -> f64 {
     })
 }
 
-/// A bar of one law, so far to all sides of its axis.
+/// Return a function that describes a bar of one law with this half width.
 fn uniform(law: &str, width: f64) -> impl Fn(f64) -> String {
     move |half| {
         format!(
@@ -139,7 +139,8 @@ fn pulses_have_the_speeds_of_the_prototype_law() {
 
 #[test]
 fn pulses_have_the_speeds_of_the_normalised_law() {
-    // The neighbours of the middle have whole families as well, hence its constant.
+    // The bar is so wide that neighbours of the middle column also have complete families, and thus the same
+    // constant.
     for (horizon, expected) in [(2.52, 1.001), (3.0, 0.971), (4.0, 0.995)] {
         let width = 2.0 * f64::floor(horizon) + 0.5;
         let found = pulse_speed(horizon, uniform("normalised_pmb", width));
@@ -149,8 +150,8 @@ fn pulses_have_the_speeds_of_the_normalised_law() {
 
 #[test]
 fn a_pulse_has_the_speed_of_the_normalised_law_in_a_wide_family() {
-    // The same for m = 6 in a bar of half the width: the middle column is a body of the normalised law,
-    // and the others have the constant of a whole family by a modulus of their own.
+    // The same for m = 6 in a bar of half the width. The middle column is a body of the normalised law. The
+    // other points get the constant of a complete family from another modulus.
     let horizon: f64 = 6.0;
     let mut lengths = 0.0;
     for x in -6..=6 {
@@ -161,7 +162,7 @@ fn a_pulse_has_the_speed_of_the_normalised_law_in_a_wide_family() {
             }
         }
     }
-    // 18K/Σ|ξ|V in place of 18K/πδ⁴.
+    // Modulus that gives the constant 18K/Σ|ξ|V instead of 18K/πδ⁴.
     let bulk = BULK * std::f64::consts::PI * horizon.powi(4) / lengths;
     let bodies = |half: f64| {
         format!(
@@ -182,8 +183,8 @@ fn a_pulse_has_the_speed_of_the_normalised_law_in_a_wide_family() {
 
 #[test]
 fn standing_waves_in_a_bar_disperse_as_the_integral_says() {
-    // ω = k c with the phase speeds of ω² = (4c/ρδ²) Cin(kδ), c the modulus of uniaxial strain: the
-    // middle of a long bar comes to rest at π/2ω, before the ends are heard.
+    // ω = k c with the phase speeds of ω² = (4c/ρδ²) Cin(kδ), where c is the modulus of uniaxial strain. The
+    // displacement in the middle of a long bar is zero at π/2ω, before waves from the ends arrive.
     let (horizon, modulus) = (40.0, 1.2_f64 * 5.0);
     let speed = (modulus / DENSITY).sqrt();
     for (number, expected) in [

@@ -1,5 +1,5 @@
-//! Checkpoints: a run that is killed or stopped at any moment, and continued on any number of ranks,
-//! ends to the bit where the uninterrupted one ends.
+//! Checkpoints: a run that is killed or stopped at any time and restarted on any number of ranks has the bits
+//! of an uninterrupted run.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use crate::support::command::{
 use crate::support::datasets::{datasets, difference, points_left};
 use fissure::output::ResultReader;
 
-/// Exit code of a run that stopped and can be continued.
+/// Exit code of a run that stopped and can be restarted.
 const STOPPED: i32 = 75;
 
-/// A notched plate that is torn and shaken; long enough to be interrupted.
+/// Return the deck of a notched plate that is torn and shaken, long enough for interruptions.
 fn plate(end: &str, extra: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -59,26 +59,26 @@ fn send(signal: &str, process: u32) {
     assert!(sent.unwrap().success());
 }
 
-/// Whether a checkpoint is there to continue from.
+/// Return whether a folder contains a checkpoint.
 fn has_checkpoint(out: &Path) -> bool {
     ["checkpoint_0.h5", "checkpoint_1.h5"]
         .iter()
         .any(|name| out.join(name).exists())
 }
 
-/// How many outputs a result has; none while it is just being written to.
+/// Return the number of outputs of a result; 0 while a program writes to the result.
 fn outputs(out: &Path) -> usize {
     let steps = ResultReader::open(&result(out)).and_then(|result| result.steps());
     steps.map_or(0, |steps| steps.len())
 }
 
-/// How many lines `history.csv` has.
+/// Return the number of lines of `history.csv`.
 fn rows(out: &Path) -> usize {
     let text = std::fs::read_to_string(out.join("history.csv"));
     text.map_or(0, |text| text.lines().count())
 }
 
-/// Starts a run, and waits for its second output.
+/// Start a run, and wait for its second output.
 fn with_two_outputs(mut command: Command, out: &Path) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
@@ -90,7 +90,7 @@ fn with_two_outputs(mut command: Command, out: &Path) -> Child {
     child
 }
 
-/// Kills one rank of a run after a while; returns whether that ended the run.
+/// Kill one rank of a run after a delay; return whether the kill ended the run.
 fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
     let mut child = command
         .stdout(Stdio::null())
@@ -130,8 +130,8 @@ fn killed_while_the_grid_grows_and_continued_on_any_number_of_ranks() {
     );
 }
 
-/// A run of a deck, with a checkpoint every 15 steps so that kills hit their writing as well. The long
-/// form is scripts/kill_test.
+/// Kill and restart runs of a deck. A checkpoint every 15 steps makes kills during a write likely.
+/// scripts/kill_test is the long form of this test.
 fn survives_kills(name: &str, text: &str) {
     let kills: usize = std::env::var("FISSURE_KILLS").map_or(6, |text| text.parse().unwrap());
     let folder = Folder::new(name);
@@ -173,7 +173,7 @@ fn survives_kills(name: &str, text: &str) {
                 continue;
             }
             if killed == 0 {
-                // It is faster than the first one was, on a machine that had more to do then.
+                // The run is faster than the uninterrupted run, because the machine is less busy now.
                 duration = duration.mul_f64(0.8);
             }
             if killed == 3 {
@@ -226,7 +226,7 @@ fn a_signal_to_any_rank_stops_all_and_nothing_is_lost() {
 #[test]
 fn a_signal_during_the_set_up_ends_it() {
     let folder = Folder::new("set-up");
-    // Seconds of set-up, whatever the machine.
+    // With this spacing, the set-up takes seconds on any machine.
     let coarse = "spacing = 1e-3, horizon = 3e-3";
     let plate = plate("1e-5", "").replace(coarse, "spacing = 4e-5, horizon = 1.2e-4");
     assert!(!plate.contains(coarse));
@@ -239,7 +239,7 @@ fn a_signal_during_the_set_up_ends_it() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // The folder is taken before the points are made.
+        // The folder is locked before the points are created.
         while !out.join(".lock").exists() {
             std::thread::sleep(Duration::from_millis(5));
             assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
@@ -256,7 +256,7 @@ fn a_signal_during_the_set_up_ends_it() {
 
 #[test]
 fn signals_are_listened_to_before_mpi_has_started() {
-    // A rank waits in the start of MPI for one that never comes.
+    // A rank waits during the start of MPI for a rank that is never started.
     let script = "$0 run no_deck.toml & rank=$!
         for k in $(seq 300); do
             caught=$(awk '/^SigCgt/ { print $2 }' /proc/$rank/status)
@@ -318,7 +318,7 @@ fn the_wall_clock_limit_stops_in_time() {
             printed.contains("as the wall-clock limit is near"),
             "{printed}"
         );
-        // The limit, and what it takes to start and end on a busy machine.
+        // The time limit, with a margin for start and end on a busy machine.
         assert!(begin.elapsed() < Duration::from_secs(12));
     }
 }
@@ -343,7 +343,7 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
         "{printed}"
     );
 
-    // Complete: nothing to do, and nothing done.
+    // The run is complete, so a restart changes nothing.
     let before = datasets(&result(&out));
     let printed = succeed(&mut run(1, &deck, &out, &["--restart"]));
     assert!(printed.contains("complete already"), "{printed}");
@@ -362,7 +362,7 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
         None
     );
 
-    // Other fields go to a new file; the one with the first half is kept, a second time as well.
+    // Other fields need a new file; the file with the first half is kept, also at a second change.
     let other = plate("3e-5", "").replace(
         "output.every_steps = 200",
         "output = { every_steps = 100, fields = ['damage'] }",
@@ -404,7 +404,7 @@ fn bonds_broken_since_the_last_output_add_up_to_all_that_broke() {
         "output = { every_steps = 90, fields = ['broken_bonds', 'newly_broken_bonds'] }",
     );
     let (deck, out) = (folder.write("deck.toml", &text), folder.join("out"));
-    // Stops between two outputs, and goes on.
+    // Stop between two outputs, and restart.
     succeed(&mut run(1, &deck, &out, &["--set", "end=1.25e-5"]));
     succeed(&mut run(2, &deck, &out, &["--restart"]));
     let reader = ResultReader::open(&result(&out)).unwrap();
@@ -465,7 +465,8 @@ fn a_collision_of_scattered_bodies_goes_on_as_if_it_had_never_stopped() {
     collision_goes_on("scattered-collision", scatter);
 }
 
-/// A collision that is stopped in the middle and goes on, on other ranks, has the result of one that is not.
+/// Stop a collision in the middle and restart it on other ranks; the result must equal that of an
+/// uninterrupted run.
 fn collision_goes_on(name: &str, [jitter, weibull]: [&str; 2]) {
     let folder = Folder::new(name);
     let text = "
@@ -496,7 +497,7 @@ fn collision_goes_on(name: &str, [jitter, weibull]: [&str; 2]) {
         let bits = whole[&format!("history {name}")].iter();
         bits.map(|bits| f64::from_bits(*bits)).collect::<Vec<_>>()
     };
-    // They touch where the run is stopped, and bonds break before and after.
+    // The bodies touch when the run is stopped, and bonds break before and after.
     let (time, touching, broken) = (
         column("time"),
         column("touching_pairs"),
@@ -507,7 +508,7 @@ fn collision_goes_on(name: &str, [jitter, weibull]: [&str; 2]) {
     assert!(broken[middle] > 0.0 && *broken.last().unwrap() > broken[middle]);
 }
 
-/// A run has dissipated energy before and after its middle.
+/// Assert that a run dissipates energy before and after its middle.
 fn dissipates(result: &BTreeMap<String, Vec<u64>>) {
     let dissipated = result["history dissipated_energy"].iter();
     let dissipated: Vec<f64> = dissipated.map(|bits| f64::from_bits(*bits)).collect();
@@ -515,8 +516,8 @@ fn dissipates(result: &BTreeMap<String, Vec<u64>>) {
     assert!(middle > 0.0 && *dissipated.last().unwrap() > middle);
 }
 
-/// The result of a run that is stopped in the middle and goes on, on other ranks, which must be that
-/// of a run that is not.
+/// Stop a run in the middle and restart it on other ranks; the result must equal that of an uninterrupted
+/// run. Return the result.
 fn goes_on(name: &str, law: &str, family: &str) -> BTreeMap<String, Vec<u64>> {
     let folder = Folder::new(name);
     let text = plate("1e-5", "")
@@ -559,7 +560,7 @@ fn a_damaged_checkpoint_is_recognised_and_the_other_one_used() {
     let out = folder.join("out");
     succeed(&mut run(2, &deck, &out, &[]));
     let expected = datasets(&result(&out));
-    // Checkpoints at the steps 700, 1400 and 2000, so the newest is in the first file.
+    // Checkpoints are written at the steps 700, 1400 and 2000, so the newest checkpoint is in the first file.
     let newest = out.join("checkpoint_0.h5");
     let sound = std::fs::read(&newest).unwrap();
     let mut flipped = sound.clone();
@@ -610,7 +611,7 @@ fn a_full_disc_leaves_the_checkpoint_before() {
             "the run ended by itself"
         );
     }
-    // Something else takes up the rest of the disc.
+    // Another file fills the rest of the disc.
     let _ = std::fs::write(disc.join("other"), vec![0; 20 << 20]);
     let is_full = |output: std::process::Output| {
         let printed = text(&output);
@@ -619,7 +620,7 @@ fn a_full_disc_leaves_the_checkpoint_before() {
         assert!(printed.contains("No space left"), "{printed}");
     };
     is_full(wait(child));
-    // There is no room for the copy that a later end needs: the result stays where it is.
+    // There is no space for the copy that a later end needs, so the result must remain unchanged.
     let before = entries(&out);
     is_full(finish(&mut run(
         2,
@@ -638,8 +639,8 @@ fn a_full_disc_leaves_the_checkpoint_before() {
     );
 }
 
-/// Runs the plate until 1e-5 s into a folder, and continues it with another deck until 1.5e-5 s; returns
-/// what that prints.
+/// Run the plate until 1e-5 s, and restart it with another deck until 1.5e-5 s; return the output of the
+/// restart.
 fn continued_with(folder: &Folder, name: &str, other: &str) -> String {
     let out = folder.join(name);
     let deck = folder.write("deck.toml", &plate("1e-5", ""));
@@ -687,11 +688,11 @@ fn columns_of_the_history_keep_their_meaning() {
             let reader = ResultReader::open(&folder.join(name).join(file)).unwrap();
             reader.history().unwrap()[1].values.clone()
         };
-        // What was meant before ends where the new meaning begins.
+        // The old result ends at the step at which the new result begins.
         assert_eq!(rows("result_until_step_1000.vtkhdf").last(), Some(&1000.0));
         assert_eq!(rows("result.vtkhdf")[0], 1000.0);
     }
-    // Rows at other times mean the same.
+    // Rows at other times do not change the definitions of columns.
     let deck = plate("1e-5", "").replace("every_steps = 50,", "every_steps = 25,");
     let printed = continued_with(&folder, "often", &deck);
     assert!(!printed.contains("starting a new result"), "{printed}");
@@ -728,7 +729,7 @@ fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
         let printed = text(&output);
         assert!(output.status.success(), "{name}: {printed}");
         assert_eq!(printed.matches(told).count(), 1, "{name}: {printed}");
-        // Every file that is named is there.
+        // Every file named in the message exists.
         let names = printed.split("it is kept as ").nth(1).unwrap();
         for path in names.lines().next().unwrap().split(" and ") {
             assert!(Path::new(path).exists(), "{name}: {path}: {printed}");
@@ -742,7 +743,7 @@ fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
     }
 }
 
-/// The names in a folder, each with the file's number.
+/// Return the names in a folder, each with the inode of the file.
 fn entries(folder: &Path) -> Vec<(std::ffi::OsString, u64)> {
     use std::os::unix::fs::DirEntryExt;
 
@@ -773,7 +774,7 @@ fn a_file_that_cannot_be_read_is_not_called_damaged() {
         assert_eq!(entries(&out), before);
     };
 
-    // As a program has it that writes to the file through HDF5.
+    // The same lock as that of a program that writes to the file through HDF5.
     let writer = std::fs::File::open(result(&out)).unwrap();
     writer.lock().unwrap();
     for ranks in [1, 2] {
@@ -795,7 +796,7 @@ fn a_file_that_cannot_be_read_is_not_called_damaged() {
             "checkpoint_0.h5: the checkpoint cannot be read",
         ),
     ] {
-        // Permissions do not bind root; these two do.
+        // Permissions do not apply to root, so a dangling link and a folder replace the file.
         let aside = folder.join("aside");
         std::fs::rename(file(name), &aside).unwrap();
         std::os::unix::fs::symlink("not-mounted/file", file(name)).unwrap();
@@ -834,7 +835,7 @@ fn a_refined_region_is_continued_in_its_result() {
     assert!(expected.contains_key("level 0"));
     assert_eq!(difference(&expected, &datasets(&result(&out))), None);
 
-    // Other points are still found to be others.
+    // Results with other points are still detected.
     let some = refined.replace(
         "output.every_steps",
         "output.set = 'top'\noutput.every_steps",
@@ -870,7 +871,7 @@ fn a_run_goes_on_again_and_again() {
 fn a_result_with_room_for_all_outputs_is_gone_on_with_in_place() {
     use std::os::unix::fs::MetadataExt;
 
-    /// More than the new texts of how a run was started take, bytes.
+    /// Upper bound of the size of new attributes about the start of a run, bytes.
     const ATTRIBUTES: u64 = 65536;
 
     let folder = Folder::new("in-place");
@@ -884,7 +885,7 @@ fn a_result_with_room_for_all_outputs_is_gone_on_with_in_place() {
         let mut command = run(ranks, &deck, &out, extra);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
-        // A reader of the result would lock it.
+        // Wait for rows of `history.csv`, because a reader of the result would lock the result.
         while rows(&out) < before + 9 {
             std::thread::sleep(Duration::from_millis(20));
             let ended = child.try_wait().unwrap();
@@ -893,12 +894,13 @@ fn a_result_with_room_for_all_outputs_is_gone_on_with_in_place() {
         send("-USR1", *rank_processes(&child, ranks).last().unwrap());
         let output = wait(child);
         assert_eq!(output.status.code(), Some(STOPPED), "{}", text(&output));
-        // The place is the same, and the length but for the attributes: there is room from the start.
+        // The inode is the same, and the length too, except for attributes: the file has its final size from
+        // the start.
         let (place, length) = *first.get_or_insert((file().ino(), file().len()));
         assert_eq!(file().ino(), place);
         assert!(file().len() < length + ATTRIBUTES);
     }
-    // While somebody reads it, it is copied.
+    // While another program reads the result, a restart copies it.
     let copy = folder.join("copy");
     std::fs::create_dir(&copy).unwrap();
     for entry in std::fs::read_dir(&out).unwrap().flatten() {
@@ -952,7 +954,7 @@ fn an_extended_run_keeps_its_step_and_says_so() {
             "{time}"
         );
     }
-    // At the same end nothing is said.
+    // With the same end, no message is printed.
     let printed = text(&finish(&mut run(
         1,
         &deck,

@@ -1,4 +1,5 @@
-//! Results of `[output.NAME]`: their own times, fields and points, on any number of ranks and over restarts.
+//! Further results, `[output.NAME]`, with their own times, fields and points, on any number of ranks and
+//! after restarts.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,7 +10,7 @@ use fissure::output::ResultReader;
 use crate::support::command::{Folder, finish, fissure, succeed, text, wait};
 use crate::support::datasets::{datasets, difference};
 
-/// A notched plate that is torn.
+/// A notched plate that tears.
 const PLATE: &str = "dimension = 'plane-stress'
     parameters = { end = 2e-5 }
     grid = { volume_correction = 'none', spacing = 2e-3, horizon = 6e-3 }
@@ -37,7 +38,7 @@ const FURTHER: &str = "output.often = { every_steps = 45, fields = ['broken_bond
     output.slow = { every = 7e-6, fields = ['newly_broken_bonds', 'strain_energy_density'] }
 ";
 
-/// The names of the files of both.
+/// File names of the main result and the further results.
 const FILES: [&str; 4] = [
     "result.vtkhdf",
     "result_often.vtkhdf",
@@ -60,14 +61,14 @@ fn steps(file: &Path) -> Vec<u64> {
     ResultReader::open(file).unwrap().steps().unwrap()
 }
 
-/// What a run that succeeds prints, warnings included.
+/// Run a command that must succeed, and return its output with warnings.
 fn printed_by(command: &mut Command) -> String {
     let output = finish(command);
     assert!(output.status.success(), "{}", text(&output));
     text(&output)
 }
 
-/// No difference between the results of two folders, to the bit.
+/// Assert that the results in two folders have equal bits.
 fn are_equal(expected: &Path, found: &Path) {
     for file in FILES {
         let [expected, found] = [expected, found].map(|folder| datasets(&folder.join(file)));
@@ -101,7 +102,7 @@ fn each_result_has_its_own_times_fields_and_points() {
     // Two rows on each side of the notch.
     let reader = ResultReader::open(&all.join("result_often.vtkhdf")).unwrap();
     assert_eq!(reader.positions(0).unwrap().len(), 4 * 30);
-    // The bonds that broke since the last output of a file add up to all that broke.
+    // The newly broken bonds of all outputs of a file add up to the broken bonds.
     let mut so_far = vec![0.0; 4 * 30];
     for step in 0..often.len() {
         let new = reader.field("newly_broken_bonds", step).unwrap();
@@ -113,7 +114,7 @@ fn each_result_has_its_own_times_fields_and_points() {
     }
     assert!(so_far.iter().sum::<f64>() > 20.0);
 
-    // The main result is that of a run without the others.
+    // The main result equals that of a run without further results.
     let alone = folder.join("alone");
     succeed(&mut run(1, &deck(&folder, "alone.toml", &[]), &alone, &[]));
     let [expected, found] = [&alone, &all].map(|folder| datasets(&folder.join(FILES[0])));
@@ -123,7 +124,7 @@ fn each_result_has_its_own_times_fields_and_points() {
     succeed(&mut run(3, &deck_of_all, &three, &[]));
     are_equal(&all, &three);
 
-    // Commands take the path of a file.
+    // Commands accept the path of a result file.
     let mut compare = fissure(1);
     compare.arg("compare");
     compare.args([&all, &three].map(|folder| folder.join("result_often.vtkhdf")));
@@ -133,7 +134,7 @@ fn each_result_has_its_own_times_fields_and_points() {
     succeed(plot.args(["--field", "broken_bonds"]));
     assert!(all.join("result_often_broken_bonds.png").exists());
 
-    // No file is replaced without a word.
+    // No existing file is replaced without `--overwrite`.
     std::fs::remove_file(all.join("result.vtkhdf")).unwrap();
     std::fs::remove_file(all.join("history.csv")).unwrap();
     let refused = finish(&mut run(1, &deck_of_all, &all, &[]));
@@ -185,7 +186,8 @@ fn a_restart_may_change_the_further_results() {
     let first = deck(&folder, "deck.toml", &[FURTHER]);
     let out = folder.join("out");
     succeed(&mut run(1, &first, &out, &["--set", "end=1.1e-5"]));
-    // One is gone, one has other fields, one is no longer asked for, and one is new.
+    // One further result has been deleted, one has other fields, one is no longer in the deck, and one is
+    // new.
     std::fs::remove_file(out.join("result_slow.vtkhdf")).unwrap();
     let once_before = datasets(&out.join("result_once.vtkhdf"));
     let changed = FURTHER
@@ -219,7 +221,7 @@ fn a_restart_may_change_the_further_results() {
         steps(&out.join("result.vtkhdf"))[4..8],
         [400, 500, 550, 600]
     );
-    // Counts go on where the file goes on.
+    // Counts of newly broken bonds continue if the file continues.
     let main = ResultReader::open(&out.join("result.vtkhdf")).unwrap();
     let [before, now] = [6, 7].map(|k| main.field("broken_bonds", k).unwrap());
     let new = main.field("newly_broken_bonds", 7).unwrap();
@@ -230,7 +232,7 @@ fn a_restart_may_change_the_further_results() {
             .zip(&now)
             .all(|((before, new), now)| before + new == *now)
     );
-    // A file of another run is set aside.
+    // A file of another run is renamed.
     let third = deck(&folder, "third.toml", &[FURTHER]);
     let printed = printed_by(&mut run(
         1,

@@ -1,5 +1,5 @@
-//! Steps that are undone and made again give the same bits: bonds that broke are whole again, bonds
-//! that yielded have not, and time, loads, supports and energies are where they were.
+//! Steps that are rolled back and repeated give equal bits. The rollback restores broken bonds, the bond
+//! history, time, loads, supports and energies.
 
 use crate::support::simulate_on;
 use fissure::comm::IdOrder;
@@ -7,7 +7,8 @@ use fissure::solver::Simulation;
 use fissure::solver::motion::{Kept, Saved};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
-/// A damped plate that is torn by supports and pushed by loads, with listed bonds between its parts.
+/// Return the deck of a damped plate that is torn by supports and loads, with bonds in lists between its
+/// bodies.
 fn plate(law: &str, alpha: f64, family: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -27,7 +28,7 @@ fn plate(law: &str, alpha: f64, family: &str) -> String {
     )
 }
 
-/// All that can be seen of a run: state, forces and the row of the history.
+/// Observable state of a run: saved state, forces, and the row of the history.
 #[derive(Debug, PartialEq)]
 struct Seen {
     saved: Saved,
@@ -51,8 +52,8 @@ fn see<const D: usize>(
     }
 }
 
-/// Whether steps that are undone, twice, give the same bits when they are made again; `happened` says
-/// of the rows before and after them whether they did what they are to test.
+/// Assert that steps that are rolled back twice and repeated give equal bits. `happened` checks from the rows
+/// before and after the steps that the tested event has occurred.
 fn undone_and_made_again(deck: &str, happened: fn(&[f64], &[f64]) -> bool) {
     let ranks = 2;
     let parts = simulate_on(ranks, deck, |mut simulation: Simulation<2>| {
@@ -60,7 +61,7 @@ fn undone_and_made_again(deck: &str, happened: fn(&[f64], &[f64]) -> bool) {
         let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
         let order = IdOrder::new(simulation.comm, ids, total);
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        // Broken bonds count from the first row.
+        // The count of broken bonds begins with the first row.
         see(&mut simulation, &order, &mut observer);
         let mut steps = |simulation: &mut Simulation<2>, count: usize| {
             for _ in 0..count {
@@ -77,7 +78,7 @@ fn undone_and_made_again(deck: &str, happened: fn(&[f64], &[f64]) -> bool) {
             assert_eq!(simulation.save(&order), start.saved);
             assert_eq!(steps(&mut simulation, 40), first);
         }
-        // From another moment with the same memory, and with steps of another size in between.
+        // Reuse the buffer for a later state, with steps of another size before the rollback.
         simulation.keep(&mut kept);
         let second = steps(&mut simulation, 20);
         simulation.undo(&kept);
@@ -95,7 +96,7 @@ fn undone_and_made_again(deck: &str, happened: fn(&[f64], &[f64]) -> bool) {
     assert!(parts.iter().all(|happened| *happened), "{deck}");
 }
 
-/// Columns of the history.
+/// Indices of history columns.
 const DISSIPATED: usize = 6;
 const BROKEN: usize = 8;
 

@@ -1,22 +1,22 @@
-//! Running the `fissure` command, alone and under mpirun.
+//! Runs of the `fissure` command, as a single process and under mpirun.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Longer than any run of a test should take, on a slow and busy machine.
+/// Upper limit of the duration of a command in a test, also on a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// How long mpirun may go on after all of its ranks have ended. That of Open MPI 4.1.4 with PMIx 4.2.2 may wait for
-/// ever in its own end (`PMIx_server_finalize`) after a rank was killed.
+/// Time that mpirun may take after all of its ranks have ended. The mpirun of Open MPI 4.1.4 with PMIx 4.2.2
+/// may hang in `PMIx_server_finalize` after a rank was killed.
 const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
 
-/// A folder that is removed with everything in it when dropped.
+/// A folder that is removed with its content when dropped.
 pub struct Folder(pub PathBuf);
 
 impl Folder {
-    /// A new, empty folder with a name of its own.
+    /// Create an empty temporary folder; its name contains `name` and the process id.
     pub fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&path);
@@ -24,12 +24,12 @@ impl Folder {
         Self(path)
     }
 
-    /// A path in the folder.
+    /// Return a path in the folder.
     pub fn join(&self, name: impl AsRef<Path>) -> PathBuf {
         self.0.join(name)
     }
 
-    /// Writes a file into the folder.
+    /// Write a file into the folder.
     pub fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.join(name);
         std::fs::write(&path, text).unwrap();
@@ -37,11 +37,12 @@ impl Folder {
     }
 }
 
-/// A file system of its own in a folder, unmounted when dropped.
+/// A small file system (tmpfs) in a folder, unmounted when dropped.
 pub struct SmallDisc(PathBuf);
 
 impl SmallDisc {
-    /// Mounts one of a size such as `2m`; `None` where the test is [skipped](skip), for only root can.
+    /// Mount a file system of a size such as `2m`. Only root can do this; otherwise the test is
+    /// [skipped](skip) and the result is `None`.
     pub fn mount(folder: &Folder, size: &str) -> Option<Self> {
         let path = folder.join("small");
         std::fs::create_dir(&path).unwrap();
@@ -57,7 +58,7 @@ impl SmallDisc {
         None
     }
 
-    /// A path on it.
+    /// Return a path in the file system.
     pub fn join(&self, name: impl AsRef<Path>) -> PathBuf {
         self.0.join(name)
     }
@@ -69,10 +70,10 @@ impl Drop for SmallDisc {
     }
 }
 
-/// Says that a test is skipped, and why.
+/// Print that a test is skipped, and the reason.
 ///
 /// # Panics
-/// Where the environment variable `CI` is set: nothing may be missing there.
+/// If the environment variable `CI` is set, because CI must not skip tests.
 pub fn skip(why: &str) {
     let in_ci = std::env::var_os("CI").is_some();
     assert!(!in_ci, "{why}; where CI is set, no test is skipped");
@@ -85,7 +86,7 @@ impl Drop for Folder {
     }
 }
 
-/// The command on so many ranks under mpirun, on one rank without it.
+/// Return the command on several ranks under mpirun, or on one rank without mpirun.
 pub fn fissure(ranks: usize) -> Command {
     let binary = env!("CARGO_BIN_EXE_fissure");
     if ranks == 1 {
@@ -94,11 +95,11 @@ pub fn fissure(ranks: usize) -> Command {
     under_mpirun(ranks, binary)
 }
 
-/// Set for the ranks of a test that uses MPI itself.
+/// Environment variable that marks the ranks of a test that uses MPI in its own process.
 const RANK_OF_A_TEST: &str = "FISSURE_RANK_OF_A_TEST";
 
-/// Whether this process is a rank of a test that uses MPI itself. Where it is not, runs that test,
-/// named in full, on so many ranks; it must pass on all of them.
+/// Return whether this process is a rank of a test that uses MPI. Otherwise run the test with this full name
+/// on `ranks` ranks; the test must pass on all ranks.
 pub fn is_rank(ranks: usize, test: &str) -> bool {
     if std::env::var_os(RANK_OF_A_TEST).is_some() {
         return true;
@@ -119,17 +120,17 @@ fn under_mpirun(ranks: usize, program: impl AsRef<OsStr>) -> Command {
         ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
         ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
         ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
-        // Ranks that wait give up their core to those that work.
+        // Waiting ranks yield their core to working ranks.
         ("OMPI_MCA_mpi_yield_when_idle", "1"),
         ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
     ]);
     command
 }
 
-/// Runs a command to its end.
+/// Run a command to its end.
 ///
 /// # Panics
-/// When it takes too long: nothing may hang.
+/// If the command exceeds the time limit.
 pub fn finish(command: &mut Command) -> Output {
     let child = command
         .stdout(Stdio::piped())
@@ -139,7 +140,7 @@ pub fn finish(command: &mut Command) -> Output {
     wait(child)
 }
 
-/// LaneTuple of the processes that mpirun, or the command itself, started for the ranks.
+/// Return the process ids of the ranks started by mpirun, or of the command itself.
 pub fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
     if ranks == 1 {
         return vec![child.id()];
@@ -147,7 +148,7 @@ pub fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
     children(child)
 }
 
-/// LaneTuple of the processes that a process started, zombies among them.
+/// Return the ids of the child processes of a process, including zombies.
 fn children(child: &Child) -> Vec<u32> {
     let children = format!("/proc/{0}/task/{0}/children", child.id());
     let text = std::fs::read_to_string(children).unwrap_or_default();
@@ -156,14 +157,14 @@ fn children(child: &Child) -> Vec<u32> {
         .collect()
 }
 
-/// Whether a process exists and is no zombie.
+/// Return whether a process exists and is not a zombie.
 pub fn is_running(process: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
     let state = status.rsplit(") ").next().unwrap_or_default();
     !(state.is_empty() || state.starts_with(['Z', 'X']))
 }
 
-/// Waits for the end of a process that writes little. Ends an mpirun that does not notice that all of its ranks have
+/// Wait for the end of a process with little output. Kill an mpirun that hangs after all of its ranks have
 /// ended.
 pub fn wait(mut child: Child) -> Output {
     let start = Instant::now();
@@ -187,14 +188,14 @@ pub fn wait(mut child: Child) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// Runs a command that must succeed and returns what it prints.
+/// Run a command that must succeed, and return its standard output.
 pub fn succeed(command: &mut Command) -> String {
     let output = finish(command);
     assert!(output.status.success(), "{command:?}\n{}", text(&output));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// What a command printed.
+/// Return standard output and standard error of a command.
 pub fn text(output: &Output) -> String {
     let (out, error) = (&output.stdout, &output.stderr);
     format!(

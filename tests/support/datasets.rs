@@ -1,11 +1,11 @@
-//! Results as comparable bits.
+//! Results as bits for comparisons.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use fissure::output::ResultReader;
 
-/// Every dataset of a result, rows sorted by id, as bits, by name.
+/// Return the bits of every dataset of a result by name, with rows sorted by id.
 pub fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
     let reader = ResultReader::open(result).unwrap_or_else(|error| panic!("{error}"));
     let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect();
@@ -29,7 +29,7 @@ pub fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
     all
 }
 
-/// The bits of values of points, the rows sorted by the ids of the points.
+/// Return the bits of values of points, with rows sorted by the ids of the points.
 pub fn sorted(ids: &[u64], values: &[f64]) -> Vec<u64> {
     let mut order: Vec<usize> = (0..ids.len()).collect();
     order.sort_by_key(|k| ids[*k]);
@@ -39,7 +39,7 @@ pub fn sorted(ids: &[u64], values: &[f64]) -> Vec<u64> {
     values.map(|value| value.to_bits()).collect()
 }
 
-/// Whether there were fewer points in some row of the history than in the one before.
+/// Return whether the number of points decreases between two rows of the history.
 pub fn points_left(found: &BTreeMap<String, Vec<u64>>) -> bool {
     let points: Vec<f64> = found["history points"]
         .iter()
@@ -48,7 +48,7 @@ pub fn points_left(found: &BTreeMap<String, Vec<u64>>) -> bool {
     points.windows(2).any(|pair| pair[1] < pair[0])
 }
 
-/// The first dataset in which two results differ, if any.
+/// Return the name of the first dataset in which two results differ.
 pub fn difference(
     expected: &BTreeMap<String, Vec<u64>>,
     found: &BTreeMap<String, Vec<u64>>,

@@ -1,10 +1,10 @@
-//! Load steps of both methods that find equilibria.
+//! Helpers for relaxation and Newton's method.
 
 use super::saved::{state, whole};
 use super::simulate_on;
 use fissure::solver::Simulation;
 
-/// Make all load steps.
+/// Advance through all load steps to the end.
 pub fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) {
     while !simulation.is_over() {
         simulation.advance();
@@ -12,7 +12,7 @@ pub fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) {
     }
 }
 
-/// The deck of a notched plate that is torn, under supports and a load, with further keys of `[time]`.
+/// Return the deck of a notched plate that tears under supports and a load, with further keys of `[time]`.
 pub fn torn_plate(family: &str, time: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -32,7 +32,7 @@ pub fn torn_plate(family: &str, time: &str) -> String {
     )
 }
 
-/// Check that a plane problem in which bonds break has equal bits on one, two and three ranks.
+/// Assert that a plane problem in which bonds break has equal bits on one, two and three ranks.
 pub fn same_on_ranks(deck: &str) {
     let run = |ranks: usize| {
         let parts = simulate_on(ranks, deck, |mut simulation: Simulation<2>| {

@@ -1,9 +1,9 @@
-//! The history of a simulation that a test makes step by step.
+//! History of a simulation that a test advances step by step.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
-/// The present row of the history. Collective.
+/// Return the current row of the history. Collective.
 pub fn row<const D: usize>(
     observer: &mut HistoryObserver,
     simulation: &mut Simulation<D>,
@@ -12,7 +12,7 @@ pub fn row<const D: usize>(
     observer.row(simulation, &snapshot)
 }
 
-/// The rows from the present state to the end, one after every step. Collective.
+/// Advance to the end, and return the row of the current state and of each step. Collective.
 pub fn rows_to_the_end<const D: usize>(
     observer: &mut HistoryObserver,
     simulation: &mut Simulation<D>,
@@ -25,7 +25,7 @@ pub fn rows_to_the_end<const D: usize>(
     rows
 }
 
-/// The index of the values of a column in a row.
+/// Return the index of a column in the rows.
 pub fn column(observer: &HistoryObserver, name: &str) -> usize {
     let mut columns = observer.columns().iter();
     let found = columns.position(|(known, _)| known == name);

@@ -1,4 +1,4 @@
-//! What several test files share.
+//! Helpers shared by several test files.
 
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
@@ -18,21 +18,20 @@ use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::calibration::calibrated;
 
-/// A validated deck from its text.
+/// Return the problem of a deck.
 pub fn problem(text: &str) -> Problem {
     let source = Source::new("test.toml", text);
     deck::parse(&source).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Runs `body` on one rank without MPI.
+/// Run `body` on one rank without MPI.
 pub fn simulate<const D: usize, T>(text: &str, body: impl FnOnce(Simulation<D>) -> T) -> T {
     let problem = problem(text);
     let comm = threads::alone();
     body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Runs `body` on one rank without MPI, with a deck of `inputs/` in which some parameters have other
-/// values.
+/// Run `body` on one rank without MPI, with a deck of `inputs/` and other values of some parameters.
 pub fn simulate_input<const D: usize, T>(
     name: &str,
     parameters: &[(&str, &str)],
@@ -50,7 +49,7 @@ pub fn simulate_input<const D: usize, T>(
     body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Runs `body` on several ranks, each a thread.
+/// Run `body` on several ranks, each a thread.
 pub fn simulate_on<const D: usize, T: Send>(
     ranks: usize,
     text: &str,
@@ -62,7 +61,7 @@ pub fn simulate_on<const D: usize, T: Send>(
     })
 }
 
-/// Sets all displacements, ghosts included, and evaluates the forces there.
+/// Set the displacements of all points, including ghosts, and evaluate the forces.
 pub fn displace<const D: usize>(
     simulation: &mut Simulation<D>,
     map: impl Fn([f64; 3]) -> [f64; 3],
@@ -77,19 +76,19 @@ pub fn displace<const D: usize>(
     simulation.evaluate(BondUpdate::Step(0.0));
 }
 
-/// The internal force density of an owned point, N/m³.
+/// Return the internal force density of an owned point, N/m³.
 pub fn force<const D: usize>(simulation: &Simulation<D>, point: usize) -> [f64; D] {
     let force = &simulation.fields.internal_force;
     force.each_ref().map(|component| component[point])
 }
 
-/// The internal force densities of all owned points, N/m³.
+/// Return the internal force densities of all owned points, N/m³.
 pub fn forces<const D: usize>(simulation: &Simulation<D>) -> Vec<[f64; D]> {
     let points = 0..simulation.model.owned();
     points.map(|point| force(simulation, point)).collect()
 }
 
-/// The largest force density of any point, N/m³.
+/// Return the largest component of the force density of all owned points, N/m³.
 pub fn largest_force<const D: usize>(simulation: &Simulation<D>) -> f64 {
     let components = forces(simulation).into_iter().flatten();
     components.fold(0.0, |largest, force| force.abs().max(largest))

@@ -1,4 +1,4 @@
-//! What a run records, on ranks that are threads: no MPI is started and no file is written.
+//! Outputs and history of a run in memory, with ranks as threads, without MPI and without files.
 
 use std::collections::BTreeMap;
 
@@ -14,13 +14,13 @@ use super::datasets::sorted;
 /// The outputs and rows of a run.
 #[derive(Default)]
 pub struct Recorded {
-    /// Names and bits as [`datasets`](super::datasets::datasets) reads them from the result of the command.
+    /// Names and bits in the form of [`datasets`](super::datasets::datasets).
     pub datasets: BTreeMap<String, Vec<u64>>,
-    /// Number of times that points changed their rank to balance the ranks.
+    /// Number of rebalancings in which points migrated.
     pub repartitions: usize,
 }
 
-/// Runs a problem on `ranks` ranks with `threads` threads each.
+/// Run a problem on `ranks` ranks with `threads` threads each.
 pub fn record(problem: &Problem, ranks: usize, threads: usize) -> Recorded {
     let mut of_rank = threads::run(ranks, |comm| {
         let pool = ThreadPoolBuilder::new().num_threads(threads);
@@ -71,8 +71,8 @@ fn is_rebalance_due<const D: usize>(problem: &Problem, stepper: &Stepper<'_, D>)
     stepper.comm().size() > 1 && problem.balance.is_some_and(is_due)
 }
 
-/// A time for bonds, ns, that makes even and odd ranks the slow ones in turn: measured times would make the
-/// test depend on the load of the machine.
+/// Return an artificial time of the loops over bonds, ns, which makes even and odd ranks slow alternately.
+/// Measured times would make the test depend on the load of the machine.
 fn pretended_time<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
     let rule = simulation.problem.balance.unwrap();
     let turn = simulation.clock.number() / rule.every_steps;
@@ -81,14 +81,14 @@ fn pretended_time<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
 }
 
 impl Recorded {
-    /// Whether an output or a row of the history is due.
+    /// Return whether an output and a history row are due.
     fn is_due(problem: &Problem, clock: &Clock) -> [bool; 2] {
         let output = Schedule::of_outputs(&problem.output);
         let row = Schedule::every(problem.row_interval());
         [output, row].map(|schedule| schedule.is_due(clock))
     }
 
-    /// Adds what is due after the present step. Collective.
+    /// Record the output and the history row that are due after the current step. Collective.
     fn add<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

@@ -1,10 +1,10 @@
-//! What a run keeps, from all its ranks.
+//! Saved states of a run, joined over its ranks.
 
 use fissure::comm::IdOrder;
 use fissure::solver::Simulation;
 use fissure::solver::motion::Saved;
 
-/// The state of all points, by the parts of the ranks.
+/// Return the saved state of the rank's part of the points, ordered by id.
 pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
     let owned = simulation.model.owned();
     let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
@@ -13,7 +13,7 @@ pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
     (order, saved)
 }
 
-/// Parts of the ranks put together.
+/// Join the parts of all ranks to bits of values, bytes of bonds, and progress counters.
 pub fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
     let column = |k: usize| parts.iter().flat_map(move |part| &part.columns[k]);
     let values = (0..parts[0].columns.len()).flat_map(column);

@@ -13,13 +13,13 @@ except ImportError:
 
 
 class History(dict):
-    """Columns of a history by name, as arrays. Used where pandas is not installed."""
+    """Columns of a history by name, as arrays; the table type if pandas is not installed."""
 
 
 def read_history(path):
-    """Read a history.csv, or the one in a folder: a pandas.DataFrame, or without pandas a History.
+    """Read history.csv from its path or its folder. Return a pandas.DataFrame, or a History if pandas is not installed.
 
-    An incomplete last row, as a killed run leaves it, is skipped. Units are in `table.attrs["units"]`.
+    An incomplete last row of a killed run is skipped. Units are in `table.attrs["units"]`.
     """
     path = pathlib.Path(path)
     if path.is_dir():
@@ -37,7 +37,7 @@ def read_history(path):
 
 
 def table_of(names, units, values):
-    """Make a table of the columns of a matrix."""
+    """Return a table with the columns of a matrix."""
     by_name = dict(zip(names, units))
     if pandas is not None:
         table = pandas.DataFrame(values, columns=names)

@@ -9,7 +9,7 @@ from . import result
 
 
 class RunError(RuntimeError):
-    """A run that did not end well; `code` is its exit code and `output` what it printed."""
+    """Error of a run that failed or was stopped, with its exit code `code` and its printed text `output`."""
 
     def __init__(self, code, output):
         super().__init__(output.strip() or f"fissure ended with exit code {code}")
@@ -37,15 +37,15 @@ def run(
     output      folder of the result [out/ and the deck's name]
     ranks       number of MPI ranks; more than one are started by `launcher`
     threads     threads of each rank [the cores of the rank]
-    overwrite   replace a result that is already there
-    restart     continue from the newest checkpoint instead
-    overlays    paths of decks whose keys replace those of the deck, later ones those of earlier ones
+    overwrite   replace an existing result
+    restart     restart from the newest checkpoint
+    overlays    paths of decks whose keys override the deck; later overlays override earlier ones
     keys        other values of keys, such as {"time.safety": 0.4}
-    launcher    words that start the ranks [mpirun -n RANKS --bind-to none]
+    launcher    command that starts the ranks [mpirun -n RANKS --bind-to none]
     binary      the program [$FISSURE, or fissure on the path]
     parameters  other values of the deck's parameters: numbers or expressions
 
-    Raises RunError if the run fails or is stopped; its `code` is 75 if it can be continued with `restart=True`.
+    Raises RunError if the run fails or is stopped; its `code` is 75 if the run can be restarted with `restart=True`.
     """
     deck = pathlib.Path(deck)
     folder = pathlib.Path(output) if output is not None else pathlib.Path("out") / deck.stem
@@ -74,9 +74,9 @@ def run(
 
 
 def _toml(value):
-    """A value as a deck has it."""
+    """Format a value as in a deck."""
     if hasattr(value, "tolist"):
-        value = value.tolist()  # of numpy
+        value = value.tolist()  # numpy values
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -14,9 +14,9 @@ _DATA = "VTKHDF/PointData"
 
 
 def open(path, output=None):
-    """Open a result: a file result.vtkhdf, or the folder that has it. Close it with `close()`, or use `with`.
+    """Open a result, given by the path of result.vtkhdf or of its folder. Close the result with `close()`, or use `with`.
 
-    With `output`, the result of [output.NAME] in the folder; it has no history.
+    `output` selects the further result of [output.NAME] in the folder, which has no history.
     """
     if output is None:
         return Result(path)
@@ -33,8 +33,8 @@ def open(path, output=None):
 class Result:
     """A result of a run, open for reading.
 
-    `times` (s) and `steps` have one entry an output. An output is chosen by its index `output`, which may be negative and
-    is the last one if not given, or by the nearest `time` (s), which must lie within the run. Rows of fields and points are in the order of `ids`.
+    `times` (s) and `steps` have one entry per output. An output is selected by its index `output`, which may be negative, or
+    by the nearest `time` (s), which must be within the run; the default is the last output. Rows of fields and points are in the order of `ids`.
     """
 
     def __init__(self, path):
@@ -71,7 +71,7 @@ class Result:
 
     @property
     def attributes(self):
-        """How the run was made, as texts by name: version, command_line, ranks, threads, mpi, time_step, …"""
+        """Information about the run, as texts by name: version, command_line, ranks, threads, mpi, time_step, …"""
         return dict(self._file.attrs)
 
     @property
@@ -95,7 +95,7 @@ class Result:
 
     @property
     def points(self):
-        """Reference positions at the last output, m: one row a point with x, y, z."""
+        """Reference positions at the last output, m: one row per point with x, y, z."""
         return self.points_at()
 
     def points_at(self, output=None, *, time=None):
@@ -110,7 +110,7 @@ class Result:
 
     @property
     def sets(self):
-        """Masks of points at the last output, by name: `all`, the bodies, and the sets that the deck gives by `ids`."""
+        """Masks of points at the last output, by name: `all`, the bodies, and the sets with `ids` in the deck."""
         deck, block, ids = self.deck, self.field("block"), self.ids
         masks = {"all": numpy.ones(len(ids), dtype=bool)}
         masks |= {name: block == number for number, name in enumerate(deck["body"])}
@@ -118,12 +118,12 @@ class Result:
         return masks
 
     def field(self, name, output=None, *, time=None):
-        """Values of a field at an output: one row a point; vectors and tensors have columns."""
+        """Values of a field at an output: one row per point; vectors and tensors have one column per component."""
         output = self._output(output, time)
         return self._dataset(name)[self._rows(f"PointDataOffsets/{name}", output)]
 
     def __getitem__(self, name):
-        """Values of a field at all outputs: [output, point, component]. Points must not change from output to output."""
+        """Values of a field at all outputs: [output, point, component]. The points must be the same at all outputs."""
         dataset = self._dataset(name)
         if len(self._counts) > 1:
             raise ValueError(f"{self.path}: each output has its own points; read them one by one with field()")
@@ -134,7 +134,7 @@ class Result:
 
     @property
     def history(self):
-        """The history: a pandas.DataFrame, or without pandas a dictionary of arrays by name."""
+        """The history: a pandas.DataFrame, or a dictionary of arrays by name if pandas is not installed."""
         if "history" not in self._file:
             return table_of([], [], numpy.empty((0, 0)))
         table = self._file["history"]

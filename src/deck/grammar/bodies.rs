@@ -111,7 +111,7 @@ pub enum Shape {
     Difference(Spanned<Vec<Spanned<Shape>>>),
 }
 
-/// A set of points; exactly one of the keys.
+/// A set of points, given by exactly one selector: `where`, `shape`, `ids`, `file` or `mesh`.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Set {
@@ -124,13 +124,13 @@ pub struct Set {
     /// The points' global ids, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ids: Option<Spanned<Vec<Spanned<u64>>>>,
-    /// Path of a file with the points' numbers, relative to the deck.
+    /// Path of a file with the numbers of the points, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Number of the first point in the file; 0 if not given.
+    /// Number that the file uses for the first point; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
-    /// A group of the meshes that define the points of bodies.
+    /// Name of a group in the meshes that define the points of bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Spanned<GroupName>>,
 }

@@ -10,7 +10,7 @@ use crate::deck::number::{Number, Vector};
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
-    /// The set; all points if not given.
+    /// Name of the set; all points if not given.
     #[serde(default = "super::all_points")]
     pub set: Text,
     /// Displacement in m.
@@ -21,12 +21,13 @@ pub struct Initial {
     pub velocity: Option<Vector>,
 }
 
-/// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x, y, z and t
-/// for each component. The string `"free"` does not prescribe a component of displacement or velocity.
+/// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x,
+/// y, z and t for each component. A component of displacement or velocity with the string `"free"` is not
+/// prescribed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// The set that it acts on.
+    /// Name of the set that the condition acts on.
     pub set: Text,
     /// Prescribed displacement in m.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -14,13 +14,15 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub struct Count(NonZeroU64);
 
 impl Count {
+    /// Wrap a count.
+    ///
     /// # Panics
-    /// When it is 0.
+    /// If `number` is 0.
     pub const fn new(number: u64) -> Self {
         Self(NonZeroU64::new(number).expect("not 0"))
     }
 
-    /// The count as a `u64`.
+    /// Return the count as a `u64`.
     pub fn get(self) -> u64 {
         self.0.get()
     }

@@ -15,7 +15,7 @@ use crate::deck::spanned::Spanned;
 use crate::elastic::Constant;
 use crate::material::{Declaration, Kind, declarations};
 
-/// A material: its law, and the table of the law.
+/// A material: the name of its law, and the table with the keys of this law.
 #[derive(Debug, Clone)]
 pub struct Material {
     /// Name of the law.
@@ -49,14 +49,14 @@ pub const ELASTIC_CONSTANTS: [(&str, Constant); 5] = [
     ("poisson_ratio", Constant::Poisson),
 ];
 
-/// The keys of every law's table.
+/// Return the keys that the table of every law may have.
 pub fn common_keys() -> impl Iterator<Item = &'static str> + Clone {
     let constants = ELASTIC_CONSTANTS.into_iter().map(|(name, _)| name);
     let others = [DAMPING, THERMAL_EXPANSION, REFERENCE_TEMPERATURE];
     [DENSITY].into_iter().chain(constants).chain(others)
 }
 
-/// Deserialize like an enum of laws; the law's name is checked later.
+/// Deserialize as an enum of laws. The validation checks the name of the law.
 impl<'de> Deserialize<'de> for Material {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct MaterialVisitor;
@@ -79,7 +79,7 @@ impl<'de> Deserialize<'de> for Material {
     }
 }
 
-/// One of the laws, with the keys that it declares.
+/// Schema with one property per law; its value is the table of the law's keys.
 impl JsonSchema for Material {
     fn schema_name() -> Cow<'static, str> {
         "Material".into()
@@ -100,7 +100,7 @@ impl JsonSchema for Material {
     }
 }
 
-/// Schema of a key that every law's table has.
+/// Return the schema description of a key common to all laws.
 fn meaning(key: &str) -> &'static str {
     match key {
         DENSITY => "Density in kg/m³.",
@@ -112,7 +112,7 @@ fn meaning(key: &str) -> &'static str {
     }
 }
 
-/// The schema of a law's table.
+/// Return the schema of the table of a law.
 fn law_schema(law: &Declaration) -> Value {
     let number = json!(["number", "string"]);
     let mut properties = serde_json::Map::new();
@@ -179,7 +179,7 @@ pub struct CriticalStretch {
     /// The critical stretch s0 itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub critical_stretch: Option<Number>,
-    /// α in the criterion s ≥ s0 − α s_min; 0 if not given, which is a constant critical stretch.
+    /// α in the criterion s ≥ s0 − α s_min. The default 0 gives a constant critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.

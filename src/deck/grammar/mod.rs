@@ -1,7 +1,8 @@
-//! The deck's grammar: what may stand in the TOML file, section by section.
+//! Grammar of the deck: the keys and values of each section of the TOML file.
 //!
-//! Every number may be a string with an expression of the `[parameters]`. All values are in SI units. Unknown keys are
-//! errors. Choices are tables named by the choice (`[material.glass.pmb]`), which keeps the place of an error.
+//! Every number may be a string with an expression of the `[parameters]`. All values are in SI units. Unknown
+//! keys are errors. A choice is a table with the name of the variant (`[material.glass.pmb]`), so that error
+//! messages keep the source location.
 
 mod bodies;
 mod conditions;
@@ -35,7 +36,7 @@ pub use sections::*;
 pub use table::Table;
 pub use time::*;
 
-/// A string with its place in the deck.
+/// A string with its byte range in the deck.
 pub type Text = Spanned<String>;
 
 /// Named tables in the order of the deck.
@@ -103,16 +104,16 @@ pub struct Deck {
     /// The stages of the run in their order; if none is given, `[time]` is the only stage.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stage: Vec<Spanned<Stage>>,
-    /// What is written to the result, and how often.
+    /// Content of the result files, and interval of outputs.
     #[serde(default)]
     pub output: Spanned<Outputs>,
-    /// What is written to the history, and how often.
+    /// Content of the history, and interval of its rows.
     #[serde(default)]
     pub history: Spanned<History>,
-    /// When checkpoints are written.
+    /// Interval of checkpoints.
     #[serde(default)]
     pub checkpoint: Spanned<Checkpoint>,
-    /// When points are rebalanced between ranks; never if not given.
+    /// Rebalancing of points between ranks; none if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balance: Option<Spanned<Balance>>,
 }

@@ -59,7 +59,7 @@ impl<'de> Deserialize<'de> for Outputs {
     }
 }
 
-/// The keys of the main result; tables of further results are set apart.
+/// Map access that yields the keys of the main result, and moves the tables of further results to `further`.
 struct MainKeys<'a, A> {
     keys: A,
     further: &'a mut Tables<Output>,
@@ -86,7 +86,7 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for MainKeys<'_, A> {
     }
 }
 
-/// The schema of [`Output`], which further keys have as well.
+/// Schema of [`Output`]; the value of any other key is a further result with the same schema.
 impl JsonSchema for Outputs {
     fn schema_name() -> Cow<'static, str> {
         "Outputs".into()
@@ -119,7 +119,7 @@ pub struct Output {
     /// Precision of the fields that change in time: `"double"` (8 bytes per number) or `"single"` (4 bytes).
     #[serde(default)]
     pub precision: Precision,
-    /// The set whose points the result holds; all points if not given.
+    /// Name of the set whose points the result contains; all points if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub set: Option<Text>,
 }
@@ -178,7 +178,7 @@ pub struct History {
     pub tip: Tables<Tip>,
 }
 
-/// Checkpoints; at most one of the keys.
+/// Interval of checkpoints, given by at most one of the keys.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
@@ -285,9 +285,9 @@ pub enum Statistic {
     Maximum,
 }
 
-/// A front: the position that a field has reached along a line. It starts from the farthest point near the line whose
-/// value exceeds the threshold. Linear interpolation to the next point ahead gives the position where the threshold is
-/// crossed.
+/// A front: the position that a field has reached along a line. The search finds the farthest point near the
+/// line whose value exceeds the threshold. Linear interpolation to the next point ahead gives the position
+/// where the value crosses the threshold.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {

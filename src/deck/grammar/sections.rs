@@ -1,5 +1,5 @@
-//! The sections of a deck: the form of their headers, whether other sections refer to them, and what a restart may
-//! change.
+//! The sections of a deck: the form of their headers, whether other sections refer to them, and the changes
+//! that a restart permits.
 
 use std::ops::Range;
 
@@ -9,13 +9,13 @@ use super::{Deck, Tables};
 /// A section of the deck, or a key outside of all sections.
 #[derive(Debug, PartialEq)]
 pub struct Section {
-    /// Its path, such as `grid` or `history.probe`.
+    /// Path of the section, such as `grid` or `history.probe`.
     pub path: &'static str,
-    /// How its header is written.
+    /// Form of the header.
     pub form: Form,
-    /// Whether its tables have an effect only where another section refers to them by name.
+    /// Tables of the section have an effect only where another section refers to them by name.
     pub referred_to: bool,
-    /// What a restart may change of it.
+    /// Changes that a restart permits.
     pub restart: Restart,
 }
 
@@ -36,16 +36,16 @@ pub enum Form {
     NamedKind,
 }
 
-/// What a restart may change of a section.
+/// Changes of a section that a restart permits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
-    /// Nothing.
+    /// No changes.
     Fixed,
-    /// Nothing, not even the order of its tables: later ones take precedence over earlier ones.
+    /// No changes, and no other order of the tables: later tables take precedence over earlier tables.
     FixedOrder,
-    /// May be added or removed; its content is compared where it is referenced.
+    /// Tables may be added or removed; the content of a table is compared where it is referenced.
     WhereUsed,
-    /// Everything.
+    /// Any changes.
     Free,
 }
 
@@ -61,7 +61,7 @@ pub const SECTIONS: [Section; 38] = [
     Section::new("constraint", Key, Fixed),
     // Parameters are compared where they are used.
     Section::new("parameters", Table, Free),
-    // Tables are compared where they are used, too.
+    // Tables are also compared where they are used.
     Section::new("table", Named, Free).referred_to(),
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),
@@ -126,7 +126,7 @@ impl Section {
             .find_map(|depth| Self::find(&path[..depth].join(".")))
     }
 
-    /// Number of parts of a path into the section that stand in the header.
+    /// Return the number of leading parts of `path` that the header of the section contains.
     pub fn header_length(&self, path: &[String]) -> usize {
         let parts = self.path.split('.').count();
         let is_key = |name: &String| OUTPUT_KEYS.contains(&name.as_str());
@@ -141,18 +141,18 @@ impl Section {
     }
 }
 
-/// A table that the deck gives a name.
+/// A named table of the deck.
 pub struct NamedTable<'a> {
-    /// The path of its section.
+    /// Path of the section of the table.
     pub section: &'static str,
-    /// Its name.
+    /// Name of the table.
     pub name: &'a str,
-    /// Its place in the deck.
+    /// Byte range of the table in the deck.
     pub span: Range<usize>,
 }
 
 impl Deck {
-    /// The named tables, section by section.
+    /// Return the named tables, section by section.
     pub fn named_tables(&self) -> Vec<NamedTable<'_>> {
         fn add<'a, T>(
             found: &mut Vec<NamedTable<'a>>,
@@ -199,7 +199,7 @@ impl Deck {
 mod tests {
     use super::*;
 
-    /// The fields of a struct of the grammar, read from a deserialization error.
+    /// Return the keys of the deck, read from a deserialization error.
     fn fields(deck: &str) -> Vec<String> {
         let error = toml::from_str::<Deck>(deck).unwrap_err();
         let fields = error.message().split('`').skip(3).step_by(2);

@@ -15,10 +15,11 @@ pub struct Table {
     /// Text file whose first row names its columns, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Name of the column of values. If not given and the file has two columns, the column that is not the time.
+    /// Name of the column of values. If not given and the file has two columns, the column other than the
+    /// time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<Text>,
-    /// Name of the column of times in s; if not given, `t` or `time`, or else the first.
+    /// Name of the column of times in s; if not given, `t` or `time`, otherwise the first column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Text>,
     /// Strictly increasing times in s, instead of a file.
@@ -30,7 +31,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table with these rows.
+    /// Create a table with these rows.
     pub fn of_rows(times: &[f64], values: &[f64]) -> Self {
         let list = |numbers: &[f64]| {
             let numbers = numbers.iter().copied().map(default_number).collect();

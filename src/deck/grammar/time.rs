@@ -98,7 +98,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// The name of the method in a deck.
+    /// Return the name of the method in a deck.
     pub fn name(self) -> &'static str {
         match self {
             Self::Explicit => "explicit",
@@ -107,7 +107,7 @@ impl Method {
         }
     }
 
-    /// Whether the method computes equilibria.
+    /// Return whether the method computes equilibria.
     pub fn is_quasi_static(self) -> bool {
         self != Self::Explicit
     }
@@ -120,10 +120,10 @@ pub struct Adaptive {
     /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a smaller dt.
     #[serde(default = "default_most_broken")]
     pub most_broken: Count,
-    /// Largest number of bonds of one point that may break in a calm step.
+    /// Largest number of bonds of one point that break in a calm step.
     #[serde(default = "default_stable_broken")]
     pub stable_broken: Spanned<u64>,
-    /// Number of consecutive calm steps before dt is raised.
+    /// Number of consecutive calm steps after which dt is raised.
     #[serde(default = "default_calm_steps")]
     pub steps: Count,
     /// Factor on dt when a step is repeated.
@@ -211,7 +211,7 @@ pub struct Static {
     /// Largest number of iterations of a load step.
     #[serde(default = "default_max_iterations")]
     pub max_iterations: Count,
-    /// How many times a load step without an equilibrium may be halved.
+    /// Largest number of halvings of a load step without an equilibrium.
     #[serde(default = "default_max_halvings")]
     pub max_halvings: Spanned<u64>,
 }
