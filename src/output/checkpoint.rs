@@ -5,11 +5,13 @@
 
 use std::path::{Path, PathBuf};
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::comm::{Communicator, IdOrder, agree};
 use crate::error::{Error, Result};
 use crate::refine::NodeKey;
 use crate::solver::Simulation;
-use crate::solver::motion::{Saved, SavedBonds};
+use crate::solver::motion::{Saved, SavedBonds, SavedColumn};
 
 use super::access::Creation;
 use super::attribute::Attribute;
@@ -24,7 +26,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Version of the file layout.
-const VERSION: i64 = 8;
+const VERSION: i64 = 9;
 
 /// Test whether a path is in use; a link to a missing or unreadable file counts.
 pub fn is_taken(path: &Path) -> bool {
@@ -63,14 +65,32 @@ pub struct FurtherResult {
     pub name: String,
     /// Number of outputs in the file of the result.
     pub outputs: u64,
-    /// The state has a column with the bonds broken since the last output of this result. The columns of all
-    /// further results follow the other columns.
-    pub counts_newly_broken: bool,
 }
 
-/// Attribute with the names of the further results, one per line; absent without further results. The
-/// attribute `numbers` ends with two numbers for each further result.
-const FURTHER: &str = "further_outputs";
+/// The numbers of a header, as stored in an attribute.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Numbers {
+    version: i64,
+    number: u64,
+    step: f64,
+    points: u64,
+    fingerprint: u64,
+    outputs: u64,
+    rows: u64,
+    energy_at_start: f64,
+    intact_at_start: u64,
+    refined_nodes: u64,
+    removed_nodes: u64,
+    further_results: u64,
+}
+
+/// Attributes with the names of the further results, one per line, and their numbers of outputs; absent
+/// without further results.
+const FURTHER: [&str; 2] = ["further_outputs", "counts_of_further_outputs"];
+
+/// Attribute with the names of the datasets of the state, one per line.
+const STATE: &str = "state";
 
 /// Datasets with the state of the refined grids; absent if empty.
 const GRIDS: [&str; 2] = ["/refined", "/parted"];
@@ -203,78 +223,50 @@ fn newest_first(folder: &Path) -> Result<Vec<u8>> {
 /// If another version of Fissure wrote the file.
 pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let mut file = CollectiveFile::open(path, comm)?;
-    let numbers = file.integers_attribute("/", "numbers")?;
-    let deck = file.text_attribute("/", "deck")?;
-    let mut grids = [const { Vec::new() }; 2];
-    let mut further = Vec::new();
-    if let [
-        VERSION,
-        _,
-        _,
-        _,
-        _,
-        _,
-        _,
-        _,
-        _,
-        refined,
-        suppressed,
-        ref figures @ ..,
-    ] = numbers[..]
-    {
-        if !figures.is_empty() {
-            let names = file.text_attribute("/", FURTHER)?;
-            let figures = figures.as_chunks().0.iter();
-            further = names
-                .lines()
-                .zip(figures)
-                .map(|(name, [outputs, counts])| FurtherResult {
-                    name: name.to_owned(),
-                    outputs: *outputs as u64,
-                    counts_newly_broken: *counts != 0,
-                })
-                .collect();
+    let words = file.integers_attribute("/", "numbers")?;
+    let numbers = bytemuck::try_cast_slice::<i64, Numbers>(&words);
+    let numbers = match numbers {
+        Ok([numbers]) if numbers.version == VERSION => *numbers,
+        _ => {
+            return Err(Error::input(format!(
+                "{} was written by another version of Fissure",
+                path.display()
+            )));
         }
-        for ((keys, name), count) in grids.iter_mut().zip(GRIDS).zip([refined, suppressed]) {
-            if count > 0 {
-                let dataset = file.open_dataset(name)?;
-                let rows: Vec<i64> = file.read_rows(&dataset, 0, count as usize)?;
-                *keys = rows.as_chunks().0.to_vec();
-            }
+    };
+    let deck = file.text_attribute("/", "deck")?;
+    let mut further = Vec::new();
+    if numbers.further_results > 0 {
+        let names = file.text_attribute("/", FURTHER[0])?;
+        let counts = file.integers_attribute("/", FURTHER[1])?;
+        let results = names.lines().zip(counts);
+        further.extend(results.map(|(name, outputs)| FurtherResult {
+            name: name.to_owned(),
+            outputs: outputs as u64,
+        }));
+    }
+    let mut grids = [const { Vec::new() }; 2];
+    let counts = [numbers.refined_nodes, numbers.removed_nodes];
+    for ((keys, name), count) in grids.iter_mut().zip(GRIDS).zip(counts) {
+        if count > 0 {
+            let dataset = file.open_dataset(name)?;
+            let rows: Vec<i64> = file.read_rows(&dataset, 0, count as usize)?;
+            *keys = rows.as_chunks().0.to_vec();
         }
     }
     file.close()?;
-    match numbers[..] {
-        [
-            VERSION,
-            number,
-            step,
-            points,
-            fingerprint,
-            outputs,
-            rows,
-            energy,
-            intact,
-            _,
-            _,
-            ..,
-        ] => Ok(Header {
-            number: number as u64,
-            step: f64::from_bits(step as u64),
-            grids,
-            points: points as u64,
-            fingerprint: fingerprint as u64,
-            outputs: outputs as u64,
-            further,
-            rows: rows as u64,
-            start: (f64::from_bits(energy as u64), intact as u64),
-            deck,
-        }),
-        _ => Err(Error::input(format!(
-            "{} was written by another version of Fissure",
-            path.display()
-        ))),
-    }
+    Ok(Header {
+        number: numbers.number,
+        step: numbers.step,
+        grids,
+        points: numbers.points,
+        fingerprint: numbers.fingerprint,
+        outputs: numbers.outputs,
+        further,
+        rows: numbers.rows,
+        start: (numbers.energy_at_start, numbers.intact_at_start),
+        deck,
+    })
 }
 
 /// Read the state of this rank's block of ids. Collective.
@@ -286,12 +278,15 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
     let lengths = file.open_dataset("/bond_bytes")?;
     let bonds = file.open_dataset("/bonds")?;
     let progress = file.integers_attribute("/", "progress")?;
-    let width = file.integers_attribute("/", "columns")?;
+    let names = file.text_attribute("/", STATE)?;
     let (first, count) = (order.first(), order.count());
     let mut columns = Vec::new();
-    for k in 0..width.first().copied().unwrap_or(0) {
-        let dataset = file.open_dataset(&column(k as usize))?;
-        columns.push(file.read_rows(&dataset, first, count)?);
+    for name in names.lines() {
+        let dataset = file.open_dataset(&dataset_name(name))?;
+        columns.push(SavedColumn {
+            name: name.to_owned(),
+            values: file.read_rows(&dataset, first, count)?,
+        });
     }
     let lengths: Vec<u32> = file.read_rows(&lengths, first, count)?;
     let own = lengths.iter().map(|length| u64::from(*length)).sum();
@@ -306,8 +301,8 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
 }
 
 /// Return the path of the dataset of a column of the state.
-fn column(k: usize) -> String {
-    format!("/column_{k}")
+fn dataset_name(column: &str) -> String {
+    format!("/{column}")
 }
 
 fn write_file<const D: usize>(
@@ -318,40 +313,40 @@ fn write_file<const D: usize>(
 ) -> Result<()> {
     let comm = simulation.comm;
     let mut file = CollectiveFile::create(path, comm, Creation::Truncate)?;
-    let mut numbers = vec![
-        VERSION,
-        header.number as i64,
-        header.step.to_bits() as i64,
-        header.points as i64,
-        header.fingerprint as i64,
-        header.outputs as i64,
-        header.rows as i64,
-        header.start.0.to_bits() as i64,
-        header.start.1 as i64,
-        header.grids[0].len() as i64,
-        header.grids[1].len() as i64,
-    ];
-    for further in &header.further {
-        let counts = i64::from(further.counts_newly_broken);
-        numbers.extend([further.outputs as i64, counts]);
-    }
+    let numbers = Numbers {
+        version: VERSION,
+        number: header.number,
+        step: header.step,
+        points: header.points,
+        fingerprint: header.fingerprint,
+        outputs: header.outputs,
+        rows: header.rows,
+        energy_at_start: header.start.0,
+        intact_at_start: header.start.1,
+        refined_nodes: header.grids[0].len() as u64,
+        removed_nodes: header.grids[1].len() as u64,
+        further_results: header.further.len() as u64,
+    };
     if !header.further.is_empty() {
-        let names: Vec<&str> = header
-            .further
-            .iter()
+        let names: Vec<&str> = (header.further.iter())
             .map(|result| &result.name[..])
             .collect();
-        file.set_attribute("/", FURTHER, Attribute::Text(&names.join("\n")))?;
+        let counts: Vec<i64> = (header.further.iter())
+            .map(|result| result.outputs as i64)
+            .collect();
+        file.set_attribute("/", FURTHER[0], Attribute::Text(&names.join("\n")))?;
+        file.set_attribute("/", FURTHER[1], Attribute::Integers(&counts))?;
     }
-    file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
+    let words = bytemuck::cast_slice(std::slice::from_ref(&numbers));
+    file.set_attribute("/", "numbers", Attribute::Integers(words))?;
     let progress: Vec<i64> = simulation
         .progress()
         .iter()
         .map(|word| *word as i64)
         .collect();
     file.set_attribute("/", "progress", Attribute::Integers(&progress))?;
-    let width = [simulation.saved_width() as i64];
-    file.set_attribute("/", "columns", Attribute::Integers(&width))?;
+    let names = simulation.saved_names().join("\n");
+    file.set_attribute("/", STATE, Attribute::Text(&names))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
     for (keys, name) in header.grids.iter().zip(GRIDS) {
         if !keys.is_empty() {
@@ -367,9 +362,9 @@ fn write_file<const D: usize>(
     }
     let points = Rows::Fixed(header.points);
     // Write column by column to limit the buffer memory.
-    for (k, values) in simulation.saved_columns(order).enumerate() {
-        let dataset = file.create_dataset::<f64>(&column(k), points, None)?;
-        file.write_rows(&dataset, order.first(), &values)?;
+    for column in simulation.saved_columns(order) {
+        let dataset = file.create_dataset::<f64>(&dataset_name(&column.name), points, None)?;
+        file.write_rows(&dataset, order.first(), &column.values)?;
     }
     let saved = simulation.saved_bonds(order);
     let (start, total) = crate::comm::scan(comm, saved.bytes.len() as u64);

@@ -52,3 +52,15 @@ pub enum Action {
     /// Prescribes the temperature.
     Temperature(Expression),
 }
+
+impl Action {
+    /// Whether it adds forces.
+    pub fn is_load(&self) -> bool {
+        matches!(self, Self::BodyForce(..) | Self::Force(_))
+    }
+
+    /// Whether it prescribes the motion.
+    pub fn is_support(&self) -> bool {
+        matches!(self, Self::Displacement(_) | Self::Velocity(_))
+    }
+}

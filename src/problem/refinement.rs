@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::expression::Expression;
 
-use super::InterfaceRule;
+use super::{InterfaceRule, Problem};
 
 /// Refinement of the grid (Dipasquale et al. 2014, §2).
 #[derive(Debug, Clone)]
@@ -67,4 +67,18 @@ pub struct RefinedRegion {
     pub level: u32,
     /// Condition on the reference position that selects the points.
     pub condition: Expression,
+}
+
+impl Problem {
+    /// Criteria of refinement during the run, if there are any.
+    pub fn refinement_trigger(&self) -> Option<&Trigger> {
+        let refinement = self.refinement.as_ref();
+        refinement.and_then(|refinement| refinement.trigger.as_ref())
+    }
+
+    /// Whether grids are coarsened again during the run.
+    pub fn may_coarsen(&self) -> bool {
+        let trigger = self.refinement_trigger();
+        trigger.is_some_and(|trigger| trigger.coarsen_after.is_some())
+    }
 }

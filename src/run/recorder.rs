@@ -106,7 +106,6 @@ impl<'a> Recorder<'a> {
         let result = |(output, file): (&Output, &OutputFile)| FurtherResult {
             name: output.name.clone().unwrap_or_default(),
             outputs: file.file.steps(),
-            counts_newly_broken: problem.has_damage() && output.counts_newly_broken(),
         };
         outputs.map(result).collect()
     }

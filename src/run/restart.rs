@@ -4,7 +4,6 @@ use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::output::checkpoint::{Checkpoints, Header, read_header, read_saved};
 use crate::solver::Simulation;
-use crate::solver::motion::Saved;
 
 use super::checkpoints::{CheckpointWriter, fingerprint};
 use super::files::Files;
@@ -52,37 +51,10 @@ pub fn restart<const D: usize>(
         return Err(Error::input(format!("{} {message}", path.display())));
     }
     let order = simulation.id_order();
-    let mut saved = read_saved(comm, &path, &order)?;
-    match_counters(simulation, &header, &mut saved);
+    let saved = read_saved(comm, &path, &order)?;
     simulation.restore(&order, &saved)?;
     Ok(Restart {
         checkpoints: CheckpointWriter::after(checkpoints, physics, fingerprint),
         header,
     })
-}
-
-/// Match the saved counts of newly broken bonds, the last columns, with the further outputs by name: others may count now. A
-/// new count starts at 0.
-fn match_counters<const D: usize>(
-    simulation: &Simulation<'_, D>,
-    header: &Header,
-    saved: &mut Saved,
-) {
-    if !simulation.problem.has_damage() {
-        return;
-    }
-    let further = header.further.iter();
-    let names = further.filter(|result| result.counts_newly_broken);
-    let names: Vec<&String> = names.map(|result| &result.name).collect();
-    let others = saved.columns.len().saturating_sub(names.len());
-    let old = saved.columns.split_off(others);
-    let points = saved.bonds.lengths.len();
-    for output in simulation.problem.further_counts() {
-        let position = names
-            .iter()
-            .position(|name| Some(*name) == output.name.as_ref());
-        let column = position.and_then(|position| old.get(position));
-        let column = column.cloned().unwrap_or_else(|| vec![0.0; points]);
-        saved.columns.push(column);
-    }
 }

@@ -206,21 +206,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let mut waiting = each
             .map(|conditions| conditions.map(Some))
             .collect::<Result<Vec<_>>>()?;
-        let all = || waiting.iter().flatten();
-        let needs = Needs {
-            loads: all().any(Conditions::have_loads),
-            supports: all().any(Conditions::have_supports),
-            temperature: is_thermal,
-            damping: model.damping.iter().any(|rate| *rate > 0.0),
-            equilibria: problem.is_quasi_static(),
-            relaxation: problem.has_relaxation(),
-            damage: problem.has_damage(),
-            further_counts: problem.further_counts().count(),
-            plasticity: forces.has_plasticity(),
-            contact: problem.has_contact(),
-            coarsening: refinement::may_coarsen(problem),
-        };
-        let mut fields = Fields::new(&model, needs);
+        let mut fields = Fields::new(&model, Needs::new(problem, forces.has_plasticity()));
         if let Some(density) = &mut fields.fictitious_density {
             *density = fictitious_density(&stiffness);
         }

@@ -3,7 +3,7 @@
 use crate::comm::Communicator;
 use crate::error::{Error, Result};
 use crate::message::suggestion;
-use crate::problem::{Action, Condition, Time};
+use crate::problem::{Condition, Time};
 
 use super::Simulation;
 use super::conditions::LoadFactors;
@@ -134,9 +134,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
     /// If there is no condition of this name, or it is no load.
     pub fn load(&self, name: &str) -> Result<usize> {
         let conditions = &self.simulation.problem.conditions;
-        let is_load = |condition: &Condition| {
-            matches!(condition.action, Action::BodyForce(..) | Action::Force(_))
-        };
+        let is_load = |condition: &Condition| condition.action.is_load();
         let found = conditions
             .iter()
             .position(|condition| condition.name == name);
@@ -151,8 +149,8 @@ impl<'a, const D: usize> Stepper<'a, D> {
         )))
     }
 
-    /// Multiply a load by a factor from the next step, or load step, on. All ranks pass the same. If there is no such load, or
-    /// the factor is not finite, [`Self::wrong_request`] says so.
+    /// Multiply a load by a factor from the next step, or load step, on. All ranks must pass the same factor.
+    /// An unknown load or a factor that is not finite is reported by [`Self::wrong_request`].
     pub fn set_load_factor(&mut self, name: &str, factor: f64) {
         let checked = self.load(name).and_then(|load| {
             if factor.is_finite() {

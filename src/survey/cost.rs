@@ -1,13 +1,13 @@
 //! Memory and disk space of a run.
 
 use super::Size;
-use crate::material::{Law, PlasticState};
-use crate::problem::{Action, Block, Body, FamilyRule, Output, Problem};
+use crate::material::Law;
+use crate::problem::{Block, Body, FamilyRule, Output, Problem};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::motion::Clock;
+use crate::solver::motion::fields::Needs;
 use crate::solver::observers::Schedule;
-use crate::solver::refinement::may_coarsen;
 
 /// Static bytes per point in a result: position, id, block, volume and VTK cell.
 const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
@@ -112,7 +112,7 @@ impl Cost {
             memory: measured.unwrap_or_else(|| estimated(problem, points, bonds, listed as f64)),
             bonds: saved,
             columns: columns as f64,
-            saved: simulation.saved_width(),
+            saved: simulation.fields.state().count(),
         };
         cost(problem, counts, &simulation.expected_clock())
     }
@@ -205,65 +205,19 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Numbers per point in a checkpoint: displacement, velocity; broken bonds and their energies; reactions,
-/// work; damping power; plastic state; contact; time of the last refinement trigger.
+/// Number of values per point in a checkpoint.
 fn saved_width(problem: &Problem) -> usize {
-    let dimension = problem.dimension.count();
-    let is_support =
-        |action: &Action| matches!(action, Action::Displacement(_) | Action::Velocity(_));
-    let mut actions = problem.conditions.iter().map(|condition| &condition.action);
-    let supported = if actions.any(is_support) {
-        dimension
-    } else {
-        0
-    };
-    let worked = usize::from(!problem.conditions.is_empty());
-    let broken = if problem.has_damage() {
-        4 + problem.further_counts().count()
-    } else {
-        0
-    };
-    let damped = problem
-        .bodies
-        .iter()
-        .any(|body| body.material.damping > 0.0);
-    let equilibria = if problem.is_quasi_static() {
-        dimension + supported
-    } else {
-        0
-    };
-    let relaxed = if problem.has_relaxation() {
-        dimension
-    } else {
-        0
-    };
-    let has_plasticity = problem.blocks().any(|block| match dimension {
-        2 => Law::<2>::has_plasticity(&block_laws(problem, &block).law),
-        3 => Law::<3>::has_plasticity(&block_laws(problem, &block).law),
-        _ => false,
-    });
-    let plastic = if has_plasticity {
-        PlasticState::COUNT
-    } else {
-        0
-    };
-    let triggered = usize::from(may_coarsen(problem));
-    // Friction, damping, and the energies that they dissipated.
-    let contact = if problem.has_contact() {
-        2 * dimension + 2
-    } else {
-        0
-    };
-    2 * dimension
-        + broken
-        + supported
-        + worked
-        + usize::from(damped)
-        + equilibria
-        + relaxed
-        + plastic
-        + contact
-        + triggered
+    fn width<const D: usize>(problem: &Problem) -> usize {
+        let mut blocks = problem.blocks();
+        let has_plasticity =
+            blocks.any(|block| Law::<D>::has_plasticity(&block_laws(problem, &block).law));
+        Needs::new(problem, has_plasticity).state_width::<D>()
+    }
+    match problem.dimension.count() {
+        1 => width::<1>(problem),
+        2 => width::<2>(problem),
+        _ => width::<3>(problem),
+    }
 }
 
 fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {

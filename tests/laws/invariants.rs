@@ -9,7 +9,7 @@ use fissure::material::{Declaration, Invariants, declarations};
 use fissure::problem::Body;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
-use fissure::solver::motion::{Kept, Saved, SavedBonds};
+use fissure::solver::motion::{Kept, Saved, SavedBonds, SavedColumn};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// A law with one of its examples: the keys beside density and Young's modulus.
@@ -699,7 +699,7 @@ fn joined(parts: Vec<Saved>) -> Saved {
     let first = parts.next().unwrap();
     parts.fold(first, |mut all, part| {
         for (column, more) in all.columns.iter_mut().zip(part.columns) {
-            column.extend(more);
+            column.values.extend(more.values);
         }
         all.bonds.lengths.extend(part.bonds.lengths);
         all.bonds.bytes.extend(part.bonds.bytes);
@@ -712,7 +712,10 @@ fn part(all: &Saved, first: usize, count: usize) -> Saved {
     let SavedBonds { lengths, bytes } = &all.bonds;
     let end = |points: usize| lengths[..points].iter().sum::<u32>() as usize;
     let points = first..first + count;
-    let column = |column: &Vec<f64>| column[points.clone()].to_vec();
+    let column = |column: &SavedColumn| SavedColumn {
+        name: column.name.clone(),
+        values: column.values[points.clone()].to_vec(),
+    };
     Saved {
         columns: all.columns.iter().map(column).collect(),
         bonds: SavedBonds {

@@ -15,7 +15,7 @@ pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
 
 /// Join the parts of all ranks to bits of values, bytes of bonds, and progress counters.
 pub fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
-    let column = |k: usize| parts.iter().flat_map(move |part| &part.columns[k]);
+    let column = |k: usize| parts.iter().flat_map(move |part| &part.columns[k].values);
     let values = (0..parts[0].columns.len()).flat_map(column);
     let values = values.map(|value| value.to_bits()).collect();
     let bonds = parts

@@ -248,16 +248,6 @@ impl<const D: usize> Conditions<D> {
         self.loads.push(load);
     }
 
-    /// Whether there are loads; the same on all ranks.
-    pub fn have_loads(&self) -> bool {
-        !self.loads.is_empty()
-    }
-
-    /// Whether there are supports; the same on all ranks.
-    pub fn have_supports(&self) -> bool {
-        !self.supports.is_empty()
-    }
-
     /// Prepare the positions of supported points at `time` (s). `step` is the last step (s), 0 at the
     /// start.
     pub fn set_places(&mut self, time: f64, step: f64) {

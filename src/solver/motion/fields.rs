@@ -3,7 +3,7 @@
 //! Checkpoints, rollbacks and the result iterate over this list. A field that is added to it is saved,
 //! rolled back and output as its description says. A field has one column of numbers per component.
 
-use crate::problem::Field;
+use crate::problem::{Action, Field, Problem};
 use crate::solver::bonds::{Broken, PlasticColumns};
 use crate::solver::model::Model;
 
@@ -14,8 +14,6 @@ pub struct Description {
     pub name: &'static str,
     /// SI unit.
     pub unit: &'static str,
-    /// Whether ghosts have the field. Their values are exchanged from their owners.
-    pub exchanged: bool,
     /// Whether the field is part of the state of a run. Checkpoints contain state, and it migrates with its
     /// points. Other fields are recomputed from the state.
     pub state: bool,
@@ -119,7 +117,6 @@ macro_rules! fields {
 const STATE: Description = Description {
     name: "",
     unit: "",
-    exchanged: false,
     state: true,
     undone: true,
     birth: Birth::Interpolated,
@@ -141,12 +138,14 @@ const FORCE_DENSITY: Description = Description {
     ..STATE
 };
 
+/// Name of the field with one column per further result.
+pub const NEWLY_BROKEN_OF_FURTHER: &str = "newly_broken_of_further";
+
 fields! {
     /// u, m; first owned points, then ghosts.
     displacement: [Vec<f64>; D] = Description {
         name: "displacement",
         unit: "m",
-        exchanged: true,
         output: Some(Field::Displacement),
         ..STATE
     };
@@ -158,14 +157,12 @@ fields! {
         undone: false,
         birth: Birth::FoundAnew,
         output: Some(Field::Temperature),
-        ..STATE
     };
     /// Thermal stretch in the directions of the setting; first owned points, then ghosts; none without
     /// prescribed temperatures.
     thermal_stretch: Option<Vec<f64>> = Description {
         name: "thermal_stretch",
         unit: "1",
-        exchanged: true,
         state: false,
         undone: false,
         birth: Birth::FoundAnew,
@@ -356,10 +353,10 @@ fields! {
         name: "damped_energy",
         ..ENERGY
     };
-    /// Number of a point's bonds that have broken since the last output of each further result with this field; none without
-    /// damage. The last of the state: a restart may change the outputs.
+    /// Number of a point's bonds that have broken since the last output of each further result that has this
+    /// field; none without damage.
     newly_broken_of_further: Vec<Vec<f64>> = Description {
-        name: "newly_broken_of_further",
+        name: NEWLY_BROKEN_OF_FURTHER,
         unit: "1",
         birth: Birth::FoundAnew,
         ..STATE
@@ -455,7 +452,52 @@ impl<'a> Exerted<'a> {
     }
 }
 
+impl Needs {
+    /// The fields that a problem needs. `has_plasticity`: points of a law of the problem have a plastic state.
+    pub fn new(problem: &Problem, has_plasticity: bool) -> Self {
+        let acts = |acts: fn(&Action) -> bool| {
+            let mut conditions = problem.conditions.iter();
+            conditions.any(|condition| acts(&condition.action))
+        };
+        let mut bodies = problem.bodies.iter();
+        Self {
+            loads: acts(Action::is_load),
+            supports: acts(Action::is_support),
+            temperature: problem.has_temperature(),
+            damping: bodies.any(|body| body.material.damping > 0.0),
+            equilibria: problem.is_quasi_static(),
+            relaxation: problem.has_relaxation(),
+            damage: problem.has_damage(),
+            further_counts: problem.further_counts().count(),
+            plasticity: has_plasticity,
+            contact: problem.has_contact(),
+            coarsening: problem.may_coarsen(),
+        }
+    }
+
+    /// Number of values per point that a checkpoint stores.
+    pub fn state_width<const D: usize>(self) -> usize {
+        let fields = Fields::<D>::new(&Model::empty(), self);
+        fields.state().count()
+    }
+}
+
 impl<const D: usize> Fields<D> {
+    /// Iterate over the columns of the state, with the description of their field and their component.
+    pub fn state(&self) -> impl Iterator<Item = (Description, usize, &Vec<f64>)> {
+        let fields = self.each().filter(|(field, _)| field.state);
+        fields.flat_map(|(field, columns)| {
+            let columns = columns.iter().enumerate();
+            columns.map(move |(component, column)| (field, component, column))
+        })
+    }
+
+    /// Iterate over the columns of the state, in the order of [`Self::state`].
+    pub fn state_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        let fields = self.each_mut().filter(|(field, _)| field.state);
+        fields.flat_map(|(_, columns)| columns)
+    }
+
     /// Allocate the fields with all points at rest at their reference positions.
     pub fn new(model: &Model<D>, needs: Needs) -> Self {
         let (owned, local) = (model.owned(), model.volume.len());

@@ -19,5 +19,5 @@ pub mod walk;
 
 pub use clock::Clock;
 pub use fields::Fields;
-pub use saved::{Saved, SavedBonds};
+pub use saved::{Saved, SavedBonds, SavedColumn};
 pub use undo::Kept;

@@ -11,6 +11,7 @@ use crate::solver::refinement::Refined;
 
 use super::Clock;
 use super::adaptive::StepControl;
+use super::fields::{Description, NEWLY_BROKEN_OF_FURTHER};
 use super::load_step::LoadStep;
 use super::newton::NewtonState;
 
@@ -18,11 +19,21 @@ use super::newton::NewtonState;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Saved {
     /// The components of all fields that are state.
-    pub columns: Vec<Vec<f64>>,
+    pub columns: Vec<SavedColumn>,
     /// State of the bonds.
     pub bonds: SavedBonds,
     /// Progress of the run, without point data; the same on all ranks.
     pub progress: Vec<u64>,
+}
+
+/// A component of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavedColumn {
+    /// Name of the field and index of the component, or name of the further result whose newly broken bonds it
+    /// counts.
+    pub name: String,
+    /// Value of each point.
+    pub values: Vec<f64>,
 }
 
 /// Bond state of the points in this rank's range of ids.
@@ -34,84 +45,94 @@ pub struct SavedBonds {
     pub bytes: Vec<u8>,
 }
 
-/// Number of words of the clock in the progress.
-const CLOCK: usize = 5;
+/// Start of the names of columns that count newly broken bonds of a further result. A restart may change the
+/// further results.
+const NEWLY_BROKEN_OF: &str = "newly_broken_of_";
 
-/// Number of words of the state of an adaptive step.
-const STEP_CONTROL: usize = 6;
+/// The part of the words of a progress that is not decoded yet.
+struct Words<'a>(&'a [u64]);
 
-/// Number of words of a load step.
-const LOAD_STEP: usize = 8;
+impl<'a> Words<'a> {
+    /// Decode the next words.
+    fn next<const N: usize>(&mut self) -> [u64; N] {
+        let (words, rest) = self.0.split_first_chunk().expect("enough words");
+        self.0 = rest;
+        *words
+    }
 
-/// Number of words of the state of Newton's method.
-const NEWTON: usize = 5;
-
-/// Number of words of the counters of refinement.
-const REFINED: usize = 2;
+    /// Return the next `count` words.
+    fn split(&mut self, count: usize) -> &'a [u64] {
+        let (words, rest) = self.0.split_at(count);
+        self.0 = rest;
+        words
+    }
+}
 
 impl<const D: usize> Simulation<'_, D> {
     /// Encode the progress of the run, without point data.
     pub fn progress(&self) -> Vec<u64> {
-        let mut progress = self.progress_without_factors();
-        progress.extend(self.load_factors.words());
-        progress
+        let mut words = self.progress_without_factors();
+        words.extend(self.load_factors.words());
+        words
     }
 
+    /// Encode the progress except the load factors, whose number of words depends on their values.
     fn progress_without_factors(&self) -> Vec<u64> {
-        let clock = self.clock.words().into_iter();
-        let stage = [self.stage as u64].into_iter();
-        let steps = self.step_control.words().into_iter();
-        let times = stage.chain(clock).chain(steps);
-        let refined = self.refined.words().into_iter();
-        let changes = self.problem.changes_density_scale();
-        let scaled = changes.then(|| self.density_scale_energy.to_bits());
-        let refined = refined.chain(scaled);
-        let contact = self.contact.iter();
-        let contact = contact.flat_map(|contact| contact.state().words());
-        let newton = self.problem.has_newton().then(|| self.newton.words());
-        let progress = times.chain(refined).chain(self.load_step.words());
-        let progress = progress.chain(newton.into_iter().flatten());
-        progress.chain(contact).collect()
+        let mut words = vec![self.stage as u64];
+        words.extend(self.clock.words());
+        words.extend(self.step_control.words());
+        words.extend(self.refined.words());
+        if self.problem.changes_density_scale() {
+            words.push(self.density_scale_energy.to_bits());
+        }
+        words.extend(self.load_step.words());
+        if self.problem.has_newton() {
+            words.extend(self.newton.words());
+        }
+        if let Some(contact) = &self.contact {
+            words.extend(contact.state().words());
+        }
+        words
     }
 
     /// Restore the progress from [`Self::progress`].
     pub(in crate::solver) fn continue_from(&mut self, progress: &[u64]) {
-        let (stage, rest) = progress.split_at(1);
-        let (clock, rest) = rest.split_at(CLOCK);
-        let (steps, rest) = rest.split_at(STEP_CONTROL);
-        let (refined, rest) = rest.split_at(REFINED);
-        let (scaled, rest) = rest.split_at(usize::from(self.problem.changes_density_scale()));
-        let (load_step, rest) = rest.split_at(LOAD_STEP);
-        let has_newton = self.problem.has_newton();
-        let (newton, rest) = rest.split_at(if has_newton { NEWTON } else { 0 });
-        let contact = self.contact.as_ref();
-        let contact_count = contact.map_or(0, |contact| contact.state().words().len());
-        let (contact_words, factors) = rest.split_at(contact_count);
-        self.load_factors = LoadFactors::of_words(factors, self.problem.conditions.len());
-        self.enter(stage[0] as usize);
-        let clock = std::array::from_fn(|k| clock[k]);
-        self.clock = Clock::of_words(clock, self.time_rule().end);
-        self.step_control = StepControl::of_words(std::array::from_fn(|k| steps[k]));
-        self.refined = Refined::of_words(std::array::from_fn(|k| refined[k]));
-        self.density_scale_energy = scaled.first().copied().map_or(0.0, f64::from_bits);
-        self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
-        if has_newton {
-            self.newton = NewtonState::of_words(std::array::from_fn(|k| newton[k]));
+        let mut words = Words(progress);
+        let [stage] = words.next();
+        self.enter(stage as usize);
+        self.clock = Clock::of_words(words.next(), self.time_rule().end);
+        self.step_control = StepControl::of_words(words.next());
+        self.refined = Refined::of_words(words.next());
+        if self.problem.changes_density_scale() {
+            let [energy] = words.next();
+            self.density_scale_energy = f64::from_bits(energy);
+        }
+        self.load_step = LoadStep::of_words(words.next());
+        if self.problem.has_newton() {
+            self.newton = NewtonState::of_words(words.next());
         }
         if let Some(contact) = &mut self.contact {
-            contact.restore(&ContactState::of_words(contact_words));
+            let count = contact.state().words().len();
+            contact.restore(&ContactState::of_words(words.split(count)));
         }
+        self.load_factors = LoadFactors::of_words(words.0, self.problem.conditions.len());
     }
 
-    /// The columns of the state.
-    fn state(&self) -> impl Iterator<Item = &Vec<f64>> {
-        let fields = self.fields.each().filter(|(field, _)| field.state);
-        fields.flat_map(|(_, columns)| columns)
+    /// Name of a component of a field of the state.
+    fn column_name(&self, field: Description, component: usize) -> String {
+        if field.name == NEWLY_BROKEN_OF_FURTHER {
+            let output = self.problem.further_counts().nth(component);
+            let name = output.and_then(|output| output.name.as_deref());
+            return format!("{NEWLY_BROKEN_OF}{}", name.unwrap_or_default());
+        }
+        format!("{}_{component}", field.name)
     }
 
-    /// Number of saved values per point; the same on all ranks.
-    pub fn saved_width(&self) -> usize {
-        self.state().count()
+    /// Names of the columns of the state; the same on all ranks.
+    pub fn saved_names(&self) -> Vec<String> {
+        let state = self.fields.state();
+        let names = state.map(|(field, component, _)| self.column_name(field, component));
+        names.collect()
     }
 
     /// The present state, distributed to ranks by id. Collective.
@@ -124,10 +145,13 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// The columns of the state one by one. Each is distributed by id when it is requested. Collective.
-    pub fn saved_columns(&self, order: &IdOrder) -> impl Iterator<Item = Vec<f64>> {
+    pub fn saved_columns(&self, order: &IdOrder) -> impl Iterator<Item = SavedColumn> {
         let owned = self.model.owned();
-        self.state()
-            .map(move |column| order.collect(self.comm, &column[..owned], 1))
+        let state = self.fields.state();
+        state.map(move |(field, component, values)| SavedColumn {
+            name: self.column_name(field, component),
+            values: order.collect(self.comm, &values[..owned], 1),
+        })
     }
 
     /// The bond state, distributed by id. Collective.
@@ -142,21 +166,12 @@ impl<const D: usize> Simulation<'_, D> {
     /// Restore a saved state. Collective.
     ///
     /// # Errors
-    /// If the state belongs to other points or bonds; the error is the same on all ranks.
+    /// If the state belongs to other points, bonds or fields; the error is the same on all ranks.
     pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
+        let names = self.saved_names();
         let lengths = self.forces.saved_lengths(self.model.owned());
         let expected = order.collect(self.comm, &lengths, 1);
-        let others = self.progress_without_factors().len();
-        let factors = saved.progress.len().checked_sub(others);
-        let progress =
-            matches!(factors, Some(0)) || factors == Some(self.load_factors.word_count());
-        let columns = saved.columns.len() == self.saved_width();
-        let fits = columns && saved.bonds.lengths == expected && progress;
-        let fits = if fits {
-            Ok(())
-        } else {
-            Err(Error::run("the checkpoint is that of other bonds"))
-        };
+        let fits = self.fits(&names, &expected, saved);
         agree(self.comm, fits)?;
         let SavedBonds {
             lengths: all,
@@ -164,14 +179,50 @@ impl<const D: usize> Simulation<'_, D> {
         } = &saved.bonds;
         let bonds = order.spread_ragged(self.comm, bytes, &lengths, all);
         self.forces.restore(&lengths, &bonds);
-        let fields = self.fields.each_mut().filter(|(field, _)| field.state);
-        let columns = fields.flat_map(|(_, columns)| columns);
-        for (column, saved) in columns.zip(&saved.columns) {
-            let values = order.spread(self.comm, saved, 1);
+        for (column, name) in self.fields.state_mut().zip(&names) {
+            let mut columns = saved.columns.iter();
+            let Some(saved) = columns.find(|saved| saved.name == *name) else {
+                // A further result is new and has no count yet.
+                column.fill(0.0);
+                continue;
+            };
+            let values = order.spread(self.comm, &saved.values, 1);
             column[..values.len()].copy_from_slice(&values);
         }
         self.continue_from(&saved.progress);
         self.recompute_derived();
+        Ok(())
+    }
+
+    /// Check that a saved state has the columns with these names and the bonds with these lengths.
+    fn fits(&self, names: &[String], lengths: &[u32], saved: &Saved) -> Result<()> {
+        let error = |what: String| Err(Error::run(format!("the checkpoint {what}")));
+        let saved_names: Vec<&str> = (saved.columns.iter())
+            .map(|column| &column.name[..])
+            .collect();
+        let names: Vec<&str> = names.iter().map(|name| &name[..]).collect();
+        let missing = |names: &[&str], in_all: &[&str]| {
+            let mut names = names.iter();
+            let found =
+                names.find(|name| !name.starts_with(NEWLY_BROKEN_OF) && !in_all.contains(*name));
+            found.map(|name| (*name).to_owned())
+        };
+        if let Some(name) = missing(&names, &saved_names) {
+            return error(format!("has no field `{name}`"));
+        }
+        if let Some(name) = missing(&saved_names, &names) {
+            return error(format!(
+                "has the field `{name}`, which is not part of this run"
+            ));
+        }
+        if saved.bonds.lengths != lengths {
+            return error("is that of other bonds".to_owned());
+        }
+        let expected = self.progress_without_factors().len();
+        let factors = saved.progress.len().checked_sub(expected);
+        if factors != Some(0) && factors != Some(self.load_factors.word_count()) {
+            return error("has another number of words for the progress of the run".to_owned());
+        }
         Ok(())
     }
 }

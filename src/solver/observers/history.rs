@@ -371,12 +371,6 @@ pub fn column_names(problem: &Problem) -> Vec<(String, &'static str)> {
     columns.names().to_vec()
 }
 
-/// Whether grids of a problem change during the run.
-fn has_trigger(problem: &Problem) -> bool {
-    let refinement = problem.refinement.as_ref();
-    refinement.is_some_and(|refinement| refinement.trigger.is_some())
-}
-
 /// Whether points of a problem can have too few bonds for their law.
 fn can_be_singular<const D: usize>(problem: &Problem) -> bool {
     let mut blocks = problem.blocks();
@@ -416,7 +410,7 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
     if problem.changes_density_scale() {
         columns.add("density_scale_energy", "J", |now| now.density_scale_energy);
     }
-    if has_trigger(problem) {
+    if problem.refinement_trigger().is_some() {
         columns.add("points", "1", |now| now.points as f64);
         columns.add("refinement_energy", "J", |now| now.refinement_energy);
     }

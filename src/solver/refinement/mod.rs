@@ -29,7 +29,7 @@ use super::observers::history::point_sums;
 use super::steps::automatic_step;
 use facets::Facets;
 use past::{NOWHERE, Past};
-pub use trigger::{is_possible, may_coarsen};
+pub use trigger::is_possible;
 
 /// Number of points created and removed at once, over all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

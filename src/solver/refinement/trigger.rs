@@ -107,19 +107,9 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
     Err(Error::input(message).at(&trigger.span))
 }
 
-fn trigger(problem: &Problem) -> Option<&Trigger> {
-    let refinement = problem.refinement.as_ref();
-    refinement.and_then(|refinement| refinement.trigger.as_ref())
-}
-
-/// Whether grids are coarsened again during a run.
-pub fn may_coarsen(problem: &Problem) -> bool {
-    trigger(problem).is_some_and(|trigger| trigger.coarsen_after.is_some())
-}
-
 impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn trigger(&self) -> Option<&'a Trigger> {
-        trigger(self.problem)
+        self.problem.refinement_trigger()
     }
 
     /// Whether points may be created during the run.
