@@ -56,19 +56,20 @@ pub struct Header {
     pub deck: String,
 }
 
-/// What a checkpoint knows of a further result.
+/// Data of a further result in a checkpoint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FurtherResult {
     /// Name of its output.
     pub name: String,
     /// Outputs in the file.
     pub outputs: u64,
-    /// The state has a column of the bonds that have broken since its last output, after all other columns.
+    /// Whether the state has, after all other columns, a column with the number of bonds that have broken since the last
+    /// output of this result.
     pub counts_newly_broken: bool,
 }
 
-/// Attribute with the names of the further results, one per line; absent without them. Two numbers of each follow the other
-/// `numbers`.
+/// Attribute with the names of the further results, one per line; absent if there are none. The attribute `numbers` then
+/// ends with two numbers of each further result.
 const FURTHER: &str = "further_outputs";
 
 /// The datasets of the state of the grids; absent if empty.
@@ -274,7 +275,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     }
 }
 
-/// Read the state of this rank's block of ids. Collective.
+/// Read the state of this rank's range of ids. Collective.
 ///
 /// # Errors
 /// If the file cannot be read.

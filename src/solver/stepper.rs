@@ -12,7 +12,7 @@ use super::motion::Clock;
 use super::motion::load_step::LoadStep;
 use super::simulation::Times;
 
-/// Makes the steps of a simulation.
+/// Driver that makes the steps of a simulation.
 ///
 /// Velocities are defined at half steps, as in the leapfrog form of Verlet. A step ends with the forces at
 /// the new positions. The next step fuses the second half kick with its own first half kick, in one pass
@@ -23,16 +23,16 @@ pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
     /// Whether the second half kick of the last step is still to be applied.
     half_kick_pending: bool,
-    /// What an observer has asked for.
+    /// Requests of observers.
     requests: Requests,
 }
 
-/// What an observer has asked for on this rank.
+/// Requests of observers on this rank.
 #[derive(Default)]
 struct Requests {
-    /// Stop the run.
+    /// Whether to stop the run.
     stop: bool,
-    /// What is wrong in a request.
+    /// Error of a wrong request.
     error: Option<Error>,
 }
 
@@ -151,8 +151,8 @@ impl<'a, const D: usize> Stepper<'a, D> {
         )))
     }
 
-    /// Multiply a load by a factor from the next step, or load step, on. All ranks pass the same. If there is no such load, or
-    /// the factor is not finite, [`Self::wrong_request`] says so.
+    /// Multiply a load by a factor from the next step or load step on. All ranks must pass the same factor. If there is no
+    /// such load, or the factor is not finite, [`Self::wrong_request`] returns an error afterwards.
     pub fn set_load_factor(&mut self, name: &str, factor: f64) {
         let checked = self.load(name).and_then(|load| {
             if factor.is_finite() {
