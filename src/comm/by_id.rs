@@ -1,4 +1,4 @@
-//! Redistribution of point values between owners and blocks of consecutive global ids.
+//! Redistribution of point values between owners and ranges of consecutive global ids.
 //!
 //! Files store points by id, so they do not depend on the number of ranks. Ids of refined levels are m + k
 //! n, where n is the number of level-0 points and k ≥ 1. In files, such a point follows the level-0 point
@@ -11,13 +11,13 @@ use rayon::prelude::*;
 
 use super::Communicator;
 
-/// The plan between the owned points of a rank and its block of ids.
+/// The plan between the owned points of a rank and its range of ids.
 pub struct IdOrder {
     first: u64,
     count: usize,
-    /// For each rank: the owned points with ids in its block.
+    /// For each rank: the owned points with ids in its range.
     owned: Vec<Vec<u32>>,
-    /// For each rank: the rows of this rank's block that it owns.
+    /// For each rank: the rows of this rank's range of ids that it owns.
     rows: Vec<Vec<u32>>,
 }
 
@@ -66,24 +66,24 @@ impl IdOrder {
         }
     }
 
-    /// Number of points in the blocks of the ranks before this one.
+    /// Number of points in the ranges of ids of the ranks before this one.
     pub fn first(&self) -> u64 {
         self.first
     }
 
-    /// Number of points in this rank's block.
+    /// Number of points in this rank's range of ids.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Redistribute values, `width` per point, from the owned points to this rank's block. Collective.
+    /// Redistribute values, `width` per point, from the owned points to this rank's range of ids. Collective.
     pub fn collect<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
         let row = |row: usize| row * width..(row + 1) * width;
         let from = (&self.owned[..], values, row);
         transfer(comm, from, (&self.rows[..], self.count * width, row))
     }
 
-    /// Redistribute values, `width` per point, from this rank's block to the owned points. Collective.
+    /// Redistribute values, `width` per point, from this rank's range of ids to the owned points. Collective.
     pub fn spread<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
         let row = |row: usize| row * width..(row + 1) * width;
         let from = (&self.rows[..], values, row);
@@ -92,7 +92,7 @@ impl IdOrder {
     }
 
     /// Same as [`Self::collect`], for rows of different lengths. `owned` and `block` are the row lengths of
-    /// the owned points and of this rank's block.
+    /// the owned points and of this rank's range of ids.
     pub fn collect_ragged<T: Pod>(
         &self,
         comm: &dyn Communicator,

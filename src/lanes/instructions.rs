@@ -96,7 +96,10 @@ fn unsupported() -> Error {
     )
 }
 
-/// Level of a name.
+/// Index in [`BUILT`] of the instruction set with this name.
+///
+/// # Errors
+/// If there is none.
 fn named(name: &str) -> Result<usize> {
     let short = |name: &str| name.replace('-', "").to_lowercase();
     let found = BUILT.iter().position(|known| short(known) == short(name));

@@ -1,4 +1,4 @@
-//! Sets of points from a text file of point numbers, like the node sets of Peridigm and PeriLab.
+//! Sets of points from a text file of point ids, like the node sets of Peridigm and PeriLab.
 
 use std::path::Path;
 

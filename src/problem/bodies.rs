@@ -377,7 +377,7 @@ pub enum Selector {
     Mesh(MeshSet),
 }
 
-/// A file with the numbers of points.
+/// A file with the ids of points.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct IdFile {
     /// Path, already relative to the working directory.

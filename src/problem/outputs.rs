@@ -210,16 +210,15 @@ pub enum Field {
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
-    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane, under uniaxial
-    /// stress (1 − 2ν) of that along the bar.
+    /// θ, the trace of the three-dimensional strain. In plane stress, it is (1 − 2ν)/(1 − ν) times the trace of the
+    /// strain in the plane; under uniaxial stress, (1 − 2ν) times the strain along the bar.
     Dilatation,
     /// m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
-    /// Kirchhoff stress Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz by the stress of
-    /// correspondence laws, ν (xx + yy) otherwise; under uniaxial strain yy = zz = ν/(1 − ν) xx.
+    /// Kirchhoff stress Σ T⊗Y Ṽ of the three-dimensional body, Pa: xx, yy, zz, xy, yz, xz. In plane strain, zz is that of
+    /// the law for correspondence laws, otherwise ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 − ν) xx.
     Stress,
-    /// Σ T⊗Y Ṽ over the volume that the deformed body has for one of the undeformed: Cauchy's stress,
-    /// Pa, in the same order.
+    /// Cauchy stress: Σ T⊗Y Ṽ divided by the ratio of deformed to undeformed volume, Pa, in the same order.
     CauchyStress,
     /// von Mises' equivalent of Cauchy's stress, Pa.
     VonMisesStress,
@@ -352,8 +351,9 @@ pub(crate) const DEFAULT_FIELDS: [Field; 4] = [
 /// Default number of outputs of a run.
 pub(crate) const OUTPUTS: f64 = 50.0;
 
-/// Default number of history rows, and the fewest steps between them: writing a row needs the time of one or two steps.
+/// Default number of history rows.
 const ROWS: f64 = 500.0;
+/// Smallest default number of steps between rows: writing a row takes as long as one or two steps.
 const STEPS_A_ROW: u64 = 20;
 
 /// Default wall-clock time between checkpoints, s.

@@ -28,9 +28,9 @@ pub struct OutputFile<'a> {
     /// When an output is due.
     pub schedule: Schedule,
     output: &'a Output,
-    /// Number among the further outputs that count newly broken bonds.
+    /// Index of this output among the further outputs that count newly broken bonds; `None` if it does not.
     counter: Option<usize>,
-    /// The rows of this rank's block that are in the result; `None` for all.
+    /// The rows of this rank's range of ids that are in the result; `None` for all.
     rows: Option<Vec<usize>>,
     /// The side-car; on rank 0 only.
     side_car: Option<SideCar>,
@@ -165,7 +165,7 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// The rows of this rank's block that are in the result; `None` for all. Collective.
+/// The rows of this rank's range of ids that are in the result; `None` for all. Collective.
 ///
 /// # Errors
 /// If the set of the output is empty.

@@ -27,7 +27,7 @@ const BUFFERED_ROWS: usize = 256;
 pub struct Recorder<'a> {
     /// Computes the rows of the history.
     pub observer: HistoryObserver,
-    /// Redistribution from owned points to blocks of ids, for checkpoints and results.
+    /// Redistribution from owned points to ranges of ids, for checkpoints and results.
     pub order: IdOrder,
     /// The last row of the history.
     pub last_row: Option<HistoryRow>,
@@ -286,8 +286,8 @@ fn abandon(comm: &dyn Communicator, opened: Vec<OutputFile>, files: &Files, star
     }
 }
 
-/// How the results of a checkpoint are continued: for each output, whether its file is resumed or why there is a new one, which
-/// is `None` where the checkpoint knows of no file and there is none. Collective.
+/// For each output, whether its result file is resumed at a restart, or why a new file starts. The reason is `None` if the
+/// checkpoint has no file of this output and none exists. Collective.
 ///
 /// # Errors
 /// If a set of the history is empty, a deck cannot be parsed, or a result is locked or unreadable.
@@ -337,13 +337,13 @@ pub fn reasons_for_new_results<const D: usize>(
 pub enum Continuation {
     /// The file is resumed.
     Resume,
-    /// There is a new file; the reason, if an existing one is set aside.
+    /// A new file starts; the reason, if an existing file is set aside.
     New(Option<String>),
 }
 
-/// The reason why the file of an output with a number of outputs cannot be continued, if any: it is missing, damaged, of other
-/// points, or has other fields or columns. The history comes with its number of rows and with differences of its columns.
-/// Collective.
+/// The reason why the file of an output cannot be continued, if there is one: it is missing or damaged, or has other points,
+/// fields or columns. `outputs` is its number of outputs in the checkpoint. `history` is that of the main result, with its
+/// number of rows and the differences of its columns. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

@@ -52,7 +52,7 @@ pub struct Simulation<'a, const D: usize> {
     pub conditions: Conditions<D>,
     /// Factors on the loads.
     pub load_factors: LoadFactors,
-    /// Those of the other stages, by stage.
+    /// Loads and supports of the other stages, by stage.
     pub(super) waiting: Vec<Option<Conditions<D>>>,
     /// The stages of the run.
     pub stages: Vec<Stage>,

@@ -66,7 +66,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
     countable(problem, length, (step, steps))
 }
 
-/// The error of points without bonds, for which there is no `missing`.
+/// The error of a body whose points have no bonds; `missing` names the step that cannot be computed.
 fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     let from_mesh = |body: &Body| matches!(body.points, PointSource::Mesh { .. });
     let scale = if problem.bodies.iter().any(from_mesh) {
@@ -81,8 +81,7 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     Error::input(message).at(&problem.places.horizon)
 }
 
-/// A step (s) and the number of steps, or an error if there are more of these in a stage of some length (s) than can be
-/// counted.
+/// Return a step (s) and the number of steps in a stage of this length (s), or an error if there are too many to count.
 fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(

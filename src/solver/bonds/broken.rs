@@ -111,8 +111,8 @@ impl<const D: usize> Forces<D> {
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Recompute the numbers of some points. Book the energy that the points lose by it, except the part
-    /// that plastic flow dissipates.
+    /// Recompute the point numbers of some points. Book the energy that the points lose by this change, except
+    /// the part that plastic flow dissipates.
     fn find_numbers(
         &mut self,
         points: Range<usize>,
@@ -130,7 +130,7 @@ impl<const D: usize> Forces<D> {
             self.run(pass, points.clone(), force, BondUpdate::None);
             self.finish(pass, points.clone(), model, bond_update, plastic);
         }
-        // Lattice bonds read the point numbers that are copied to the grids.
+        // Lattice bonds read copies of the point numbers in the grids, so update these copies.
         self.update(HaloContent::OwnedOnly, Which::Owned);
         let after = self.held(model, points.clone(), plastic);
         for broken in &mut self.broken {
@@ -158,7 +158,7 @@ impl<const D: usize> Forces<D> {
         energy
     }
 
-    /// Send the new numbers of points to the ranks that read them. Return the owned points whose forces may
+    /// Send the new point numbers to the ranks that read them. Return the owned points whose forces may
     /// change.
     fn send_numbers(
         &mut self,

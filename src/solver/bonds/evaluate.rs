@@ -41,7 +41,7 @@ pub(super) enum HaloContent {
     Motion,
     Thresholds,
     PointNumbers,
-    /// Nothing is sent; numbers of owned points are copied to the grids.
+    /// Nothing is sent; the point numbers of owned points are copied to the grids.
     OwnedOnly,
     None,
 }

@@ -21,13 +21,13 @@ pub struct GridValues<const D: usize> {
     displacement: [Column; D],
     /// Thermal stretches by slot; empty in runs without temperatures.
     thermal_stretch: Column,
-    /// The point numbers that bonds read.
+    /// The values per point that laws compute and bonds read (`PointNumbers`), by slot.
     numbers: Vec<Column>,
     limits: LimitColumns,
 }
 
 impl<const D: usize> GridValues<D> {
-    /// Create the values of a grid at rest. Bonds read `numbers` numbers per point, the limits in `limits`,
+    /// Create the values of a grid at rest. Bonds read `numbers` point numbers, the limits in `limits`,
     /// and thermal stretches if `is_thermal`.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();
@@ -70,7 +70,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy numbers of some of the local points, starting with column `first`.
+    /// Copy the point numbers of some of the local points, starting with column `first`.
     pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);

@@ -1,4 +1,4 @@
-//! Sums over the bonds of points: forces, numbers of points, energies.
+//! Sums over the bonds of points: forces, point numbers, energies.
 //!
 //! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel serves all dimensions,
 //! laws and storages: the eight bonds belong to one point (lists) or to eight points (lattices).
@@ -21,9 +21,9 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub force_volume: Lanes,
     /// Influence function or volume fraction of the bonds at each end.
     pub weights: Weights,
-    /// Numbers of points i.
+    /// Point numbers of points i.
     pub own: &'a K::Point,
-    /// Numbers of points j.
+    /// Point numbers of points j.
     pub far: K::Point,
     /// Thresholds and truncation factors of points i.
     pub limits_i: &'a Limits,
@@ -44,7 +44,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
 }
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
-    /// Numbers of points i and j.
+    /// Point numbers of points i and j.
     #[inline(always)]
     pub fn points(&self) -> [&K::Point; 2] {
         [self.own, &self.far]
@@ -70,7 +70,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// Reduction of the lanes of a sum to the number of a point.
+/// Reduction of the lanes of a sum to one value per point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
     /// Sum.
@@ -88,7 +88,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// with such bonds.
     type Broken: LaneTuple;
 
-    /// Numbers of points i and j that it reads.
+    /// Point numbers of points i and j that it reads.
     type Point: LaneTuple;
 
     /// Bond history that it reads.
@@ -112,7 +112,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Load the bits of all bonds, broken ones included.
     const READS_BROKEN: bool = false;
 
-    /// Load the numbers of points j; otherwise they are 0.
+    /// Load the point numbers of points j; otherwise they are 0.
     const READS_FAR: bool = true;
 
     /// Quantities of the deformed bonds to compute.

@@ -76,7 +76,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // This kernel runs at every set-up, after every refinement, and for outputs.
+    // AVX2 is enough: this kernel runs only at set-up, after refinements, and for outputs.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const WANTED: Wanted = wanted(true);
 
@@ -147,7 +147,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
     type Point = AnyPoint;
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // This kernel runs at every set-up and after every refinement.
+    // AVX2 is enough: this kernel runs only at set-up and after refinements.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = wanted(false);

@@ -3,9 +3,10 @@
 //! A force evaluation is a list of passes, created once from the laws in use. Each pass is a sum over the
 //! bonds of every point. Later passes read its results at point i, or at both i and j. A pass begins with a
 //! halo exchange if it reads values that other ranks have changed: first the displacements, then thresholds
-//! or point numbers. Interior points are processed while messages are in flight.
+//! or the point numbers. Point numbers are values of a point that its law computes from sums over its bonds,
+//! such as the dilatation. Interior points are processed while messages are in flight.
 //!
-//! Bonds break in the pass that sums the forces, by the force states of both ends. The point numbers that
+//! Bonds break in the pass that sums the forces, by the force states of both ends. Those point numbers that
 //! depend on broken bonds are then recomputed, see `broken.rs`.
 
 mod bond_inputs;

@@ -1,4 +1,5 @@
-//! The numbers of points that laws declare, and their computation from sums over bonds.
+//! Point numbers: values of a point that its law declares and computes from sums over its bonds, such as the
+//! dilatation.
 
 use std::ops::Range;
 
@@ -13,22 +14,22 @@ use super::interaction::BlockLaws;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// Maximum number of numbers of a point.
+/// Maximum number of point numbers.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
 /// Index of the first column of the plastic state among the columns of a pass.
 const PLASTIC: usize = NUMBERS + MOST.sum;
 
-/// Maximum number of columns of a pass: numbers, sums and plastic state.
+/// Maximum number of columns of a pass: point numbers, sums and plastic state.
 const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 
 /// Plastic states of the owned points by column; empty if no law has a plastic state.
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
-/// Numbers of the local points by column: first those that bonds read (also of ghosts), then those that
-/// only a law reads (of owned points).
+/// Point numbers by column: first those that bonds read (of owned points and ghosts), then those that only a
+/// law reads (of owned points).
 pub struct PointNumbers {
-    /// The numbers by column; columns that a law does not have are 0.
+    /// The point numbers by column; columns that a law does not have are 0.
     pub columns: Vec<Column>,
     /// Number of columns that bonds read.
     pub read: usize,
@@ -43,7 +44,7 @@ pub struct PointNumbers {
 }
 
 impl PointNumbers {
-    /// Allocate the numbers for the laws of the blocks, which are the same on all ranks. All numbers are 0.
+    /// Allocate the point numbers for the laws of the blocks, which are the same on all ranks. All of them are 0.
     pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);
@@ -114,7 +115,7 @@ impl PointNumbers {
         }
     }
 
-    /// The numbers of an owned point.
+    /// The point numbers of an owned point.
     pub fn of(&self, point: usize) -> [f64; NUMBERS] {
         let get = |k: usize| self.columns.get(k).and_then(|column| column.get(point));
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
@@ -153,7 +154,7 @@ impl PointNumbers {
         });
     }
 
-    /// Compute the numbers of some owned points that follow from the sums of a pass. `keeps` says whether
+    /// Compute the point numbers of some owned points from the sums of a pass. `keeps` says whether
     /// plastic flow is stored.
     pub fn finish<const D: usize>(
         &mut self,

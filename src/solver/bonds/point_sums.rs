@@ -1,4 +1,4 @@
-//! The sums over bonds from which the numbers of points are computed.
+//! The sums over bonds from which point numbers are computed.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;

@@ -32,11 +32,11 @@ const CACHE_CAPACITY: usize = 256;
 pub struct PointData<'a, const D: usize> {
     /// Packed positions, displacements and volumes for lists; empty without lists.
     pub nodes: &'a [Node],
-    /// Numbers of the points by column, for lists.
+    /// Point numbers by column, for lists.
     pub numbers: &'a [Column],
     /// Thresholds, truncation factors and rotations, for lists.
     pub limits: &'a LimitColumns,
-    /// Point data for lattices (numbers, limits and geometry), by grid.
+    /// Point data for lattices (point numbers, limits and geometry), by grid.
     pub grids: &'a [GridValues<D>],
     /// Whether points have thermal stretches.
     pub is_thermal: bool,
@@ -44,7 +44,7 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// The columns of point numbers that a kernel adds to.
+/// The columns over the points to which a kernel adds its sums.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// Sums over the bonds of a point that break in a sweep.

@@ -3,14 +3,14 @@
 /// An odd number with random bits, 2⁶⁴ over the golden ratio.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only those of loads count.
+/// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only the factors of loads are used.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadFactors {
-    /// From the next step or load step on.
+    /// Factors from the next step or load step on.
     requested: Vec<f64>,
-    /// Of the present loads.
+    /// Factors of the present loads.
     present: Vec<f64>,
-    /// At the last equilibrium; the present ones in explicit stages.
+    /// Factors at the last equilibrium; in explicit stages, the present ones.
     at_equilibrium: Vec<f64>,
     /// A hash of all requests since the start or restart of the run.
     requests: u64,
@@ -53,34 +53,34 @@ impl LoadFactors {
         &self.at_equilibrium
     }
 
-    /// Let the requested factors act in the load step that begins.
+    /// Apply the requested factors in the load step that begins.
     pub fn begin_load_step(&mut self) {
         self.present.copy_from_slice(&self.requested);
     }
 
-    /// The load step has come to its equilibrium.
+    /// Store the present factors as those of an equilibrium, at the end of a load step.
     pub fn settle(&mut self) {
         self.at_equilibrium.copy_from_slice(&self.present);
     }
 
-    /// Let the requested factors act at the end of the explicit step that is made.
+    /// Apply the requested factors at the end of the present explicit step.
     pub fn end_step(&mut self) {
         self.begin_load_step();
         self.settle();
     }
 
-    /// Go back to the factors of the present loads before a step that is undone.
+    /// Restore the factors of the present loads before a step that is rolled back.
     pub fn undo(&mut self, present: &[f64]) {
         self.present.copy_from_slice(present);
         self.settle();
     }
 
-    /// A whole number below 2⁵² that tells different sequences of requests apart.
+    /// A whole number below 2⁵² that differs for different sequences of requests.
     pub fn fingerprint(&self) -> f64 {
         (self.requests >> 12) as f64
     }
 
-    /// All of it, as a checkpoint holds it; empty where all factors are 1.
+    /// Encode all factors for a checkpoint; empty if all are 1.
     pub fn words(&self) -> Vec<u64> {
         let all = [&self.requested, &self.present, &self.at_equilibrium];
         if all.iter().copied().flatten().all(|factor| *factor == 1.0) {
@@ -95,7 +95,7 @@ impl LoadFactors {
         3 * self.requested.len()
     }
 
-    /// What [`Self::words`] gave, for as many conditions as there are now.
+    /// Decode the words of [`Self::words`] for the present number of conditions.
     pub fn of_words(words: &[u64], conditions: usize) -> Self {
         if words.is_empty() {
             return Self::new(conditions);
@@ -133,7 +133,7 @@ mod tests {
         factors.settle();
         assert_eq!(factors.at_equilibrium(), [1.0, 0.5]);
         assert_ne!(factors.fingerprint(), LoadFactors::new(2).fingerprint());
-        // Ranks that set different factors are told apart, even if the last ones are equal.
+        // The hash differs for ranks that have set different factors, even if their last factors are equal.
         let mut other = LoadFactors::new(2);
         other.set(1, 0.25);
         other.set(1, 0.5);

@@ -12,7 +12,7 @@ pub struct Load<const D: usize> {
     factors: [f64; D],
     /// Index of its condition.
     condition: usize,
-    /// Factor of an observer.
+    /// Factor that an observer has set.
     scale: f64,
     now: [At; D],
     /// Whether it must be computed: it changes with time, or all loads are requested.
@@ -36,7 +36,7 @@ pub struct Loaded<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// Of the condition with this index. Each component is its expression times its factor, N/m³.
+    /// Create the load of the condition with this index. Each component is its expression times its factor, N/m³.
     pub fn new(condition: usize, values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
@@ -49,7 +49,7 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Gets ready for a time (s) and factors by condition; `all`: also where nothing changes.
+    /// Prepare the load for a time (s), with factors by condition. With `all`, it is due even if it has not changed.
     pub fn set_time(&mut self, time: f64, factors: &[f64], all: bool) {
         let scale = factors[self.condition];
         let is_rescaled = scale != self.scale;

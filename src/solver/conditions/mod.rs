@@ -256,8 +256,8 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Gets ready to find the external forces at `time` (s) with `factors` by condition; those that do not change are found
-    /// only where `all` are wanted.
+    /// Prepare the external forces at `time` (s), with `factors` by condition. Forces that have not changed are due only
+    /// with `all`.
     pub fn set_loads(&mut self, time: f64, factors: &[f64], all: bool) {
         for load in &mut self.loads {
             load.set_time(time, factors, all);

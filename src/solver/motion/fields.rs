@@ -672,14 +672,14 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Counts bonds that break from now on as new in one of the further results with this field.
+    /// Reset the count of newly broken bonds of one of the further results with this field.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);
         }
     }
 
-    /// The columns of a field, if decks may ask for it and it is one of the points'.
+    /// The columns of a field, if decks may ask for it and it is stored per point in this run; `None` otherwise.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
             let there = !columns.is_empty() && description.output == Some(field);

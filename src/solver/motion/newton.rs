@@ -125,7 +125,7 @@ pub struct NewtonKrylov<const D: usize> {
 }
 
 impl<const D: usize> NewtonKrylov<D> {
-    /// Create the method for a rule of the deck.
+    /// Create the method with the settings of `[time.static]`.
     pub fn new(rule: Static) -> Self {
         Self {
             rule,

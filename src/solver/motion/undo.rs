@@ -52,7 +52,7 @@ impl<const D: usize> Simulation<'_, D> {
             contact.undo(state, &self.model, &self.forces);
         }
         self.load_factors.undo(&kept.load_factors);
-        // Loads know their values at the present time.
+        // External forces are not part of the copy, so evaluate them at the restored time.
         self.apply_loads(clock.time(), true);
     }
 }

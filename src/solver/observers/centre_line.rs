@@ -19,7 +19,7 @@ type Vector = Vector3<f64>;
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
-/// A point of a crack's band.
+/// A damaged point, part of the band of a crack.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Damaged {
     /// Position, m.

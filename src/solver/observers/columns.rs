@@ -22,7 +22,7 @@ pub struct GlobalState {
     pub angular_momentum: Vec<f64>,
     /// Number of bonds broken since the start.
     pub broken: u64,
-    /// Number of points above the damage threshold, and the corners (m) of their bounding box.
+    /// Number of points above the damage threshold.
     pub cracked_points: u64,
     /// Corners of the bounding box of the cracked points, m.
     pub cracked_extent: [[f64; 3]; 2],
@@ -32,10 +32,9 @@ pub struct GlobalState {
     pub load_step: LoadStep,
     /// Number of force evaluations of the present load step.
     pub force_evaluations: u64,
-    /// Number of steps rolled back so far, and the largest number of bonds of a point that broke in one
-    /// step since the last row.
+    /// Number of steps rolled back so far.
     pub undone_steps: u64,
-    /// See `undone_steps`.
+    /// Largest number of bonds of one point that broke in one step since the last row.
     pub most_broken: u64,
     /// Energy that changes of the density scale have added, J.
     pub density_scale_energy: f64,

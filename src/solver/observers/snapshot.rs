@@ -127,14 +127,14 @@ impl Snapshot {
             }
             Field::Strain => strain(simulation),
             Field::Singular => simulation.forces.singular(model),
-            // No temperature is prescribed.
+            // Without prescribed temperatures, points have the reference temperature.
             Field::Temperature => {
                 let point = |point| model.expansion_of(point).reference_temperature;
                 (0..count).map(point).collect()
             }
             Field::Fragment => simulation.fragment_ids(),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
-            // Fields of runs without contact, damage or plasticity.
+            // Runs without contact, damage or plasticity do not store these fields; their values are 0.
             Field::ContactForceDensity => vec![0.0; 3 * count],
             Field::BrokenBonds | Field::NewlyBrokenBonds | Field::PlasticStrainEquivalent => {
                 vec![0.0; count]
