@@ -131,7 +131,7 @@ fn weibull(
         return match seed {
             None => Ok(None),
             Some(seed) => {
-                let message = format!("{key} seed: only `weibull_modulus` has a seed");
+                let message = format!("{key} seed: `seed` needs `weibull_modulus`");
                 Err(scope.error(seed.span(), message))
             }
         };

@@ -205,7 +205,7 @@ fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option
     let Some(share) = &grid.jitter else {
         return match &grid.seed {
             None => Ok(None),
-            Some(seed) => Err(scope.error(seed.span(), "[grid] seed: only `jitter` has a seed")),
+            Some(seed) => Err(scope.error(seed.span(), "[grid] seed: `seed` needs `jitter`")),
         };
     };
     let error = |message: &str| Err(scope.error(share.span(), format!("[grid] jitter: {message}")));

@@ -361,7 +361,7 @@ fn reason_for_new_result<const D: usize>(
     let points = comm::total(comm, own);
     let compare = || -> Result<Option<String>> {
         if !is_taken(path) {
-            return Ok(Some("the result so far is gone".to_owned()));
+            return Ok(Some("the result file is missing".to_owned()));
         }
         // A link to an unmounted file system is an error, not damage.
         std::fs::metadata(path).map_err(|error| {
@@ -396,22 +396,20 @@ fn reason_for_new_result<const D: usize>(
         }
         let found_points = reader.ids(0)?.into_iter().map(mix);
         if !changing && found_points.fold(0, u64::wrapping_add) != points {
-            return Ok(Some("other points are asked for".to_owned()));
+            return Ok(Some("the deck requests other points".to_owned()));
         } else if fields.iter().any(single) != (output.single && !requested.is_empty()) {
-            return Ok(Some("numbers of another length are asked for".to_owned()));
+            return Ok(Some("the deck requests another precision".to_owned()));
         } else if found != requested {
-            return Ok(Some("other fields are asked for".to_owned()));
+            return Ok(Some("the deck requests other fields".to_owned()));
         }
         let Some((observer, _, changed)) = history else {
             return Ok(None);
         };
         let names = columns.iter().map(|column| &column.name);
         if !names.eq(observer.columns().iter().map(|(name, _)| name)) {
-            return Ok(Some(
-                "other columns of the history are asked for".to_owned(),
-            ));
+            return Ok(Some("the deck requests other history columns".to_owned()));
         }
-        Ok(changed.map(|lines| format!("columns of the history mean something else: {lines}")))
+        Ok(changed.map(|lines| format!("history columns have another definition: {lines}")))
     };
     found_by_root(comm, compare)
 }

@@ -682,7 +682,7 @@ fn columns_of_the_history_keep_their_meaning() {
         let deck = plate("1e-5", "");
         assert!(deck.contains(from));
         let printed = continued_with(&folder, name, &deck.replace(from, to));
-        let expected = format!("columns of the history mean something else: {told}");
+        let expected = format!("history columns have another definition: {told}");
         assert!(printed.contains(&expected), "{printed}");
         let rows = |file: &str| {
             let reader = ResultReader::open(&folder.join(name).join(file)).unwrap();
@@ -715,7 +715,7 @@ fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
         ),
         ("zeroed", Some(&zeroed), "the result so far is damaged"),
         ("empty", Some(&[]), "the result so far is damaged"),
-        ("gone", None, "the result so far is gone"),
+        ("gone", None, "the result file is missing"),
     ];
     for (name, bytes, told) in damages {
         let out = folder.join(name);
@@ -848,7 +848,10 @@ fn a_refined_region_is_continued_in_its_result() {
         &["--restart", "--set", "end=3e-6"],
     ));
     let printed = text(&output);
-    assert!(printed.contains("other points are asked for"), "{printed}");
+    assert!(
+        printed.contains("the deck requests other points"),
+        "{printed}"
+    );
 }
 
 #[test]

@@ -200,10 +200,10 @@ fn a_restart_may_change_the_further_results() {
     let second = deck(&folder, "changed.toml", &[&changed]);
     let printed = printed_by(&mut run(2, &second, &out, &["--restart"]));
     assert!(
-        printed
-            .contains("warning: [output.often]: other fields are asked for: starting a new result")
-            && printed.contains("result_often_until_step_550.vtkhdf")
-            && printed.contains("warning: [output.slow]: the result so far is gone"),
+        printed.contains(
+            "warning: [output.often]: the deck requests other fields: starting a new result"
+        ) && printed.contains("result_often_until_step_550.vtkhdf")
+            && printed.contains("warning: [output.slow]: the result file is missing"),
         "{printed}"
     );
     assert_eq!(datasets(&out.join("result_once.vtkhdf")), once_before);

@@ -133,10 +133,16 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     }
     let message = format!(
         "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: its inelastic strain would depend \
-         on the thermal stress across; use plane stress, uniaxial stress or 3-D, or an elastic law",
+         on the thermal stress perpendicular to the {}, which the law does not know; use plane stress, \
+         uniaxial stress or 3-D, or an elastic law",
         body.name,
         law.declaration.name,
         dimension.name(),
+        if dimension.count() == 1 {
+            "bar"
+        } else {
+            "plane"
+        },
     );
     Err(Error::input(message).at(&body.span))
 }
