@@ -5,11 +5,15 @@ use crate::problem::{Body, StepRule};
 use crate::solver::Simulation;
 
 /// Names and values of the automatic choices; the same on all ranks. Collective.
-pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'static str, String)> {
+pub fn decisions<const D: usize>(
+    simulation: &mut Simulation<'_, D>,
+) -> Vec<(&'static str, String)> {
     let problem = simulation.problem;
+    let sent = sent(simulation);
     let lower = |rule: &dyn std::fmt::Debug| format!("{rule:?}").to_lowercase();
     let mut decided = vec![
         ("partition", partition(simulation)),
+        ("sent to ghosts", sent),
         ("bonds", bonds(simulation)),
         (
             "instructions",
@@ -62,6 +66,16 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
         range(2),
         100.0 * interior
     )
+}
+
+/// Numbers per ghost that each force evaluation sends, by content.
+fn sent<const D: usize>(simulation: &mut Simulation<'_, D>) -> String {
+    let is_thermal = simulation.problem.has_temperature();
+    let sizes = simulation.forces.halo_sizes(is_thermal).into_iter();
+    let parts: Vec<String> = sizes
+        .map(|(name, columns)| format!("{name} ({columns})"))
+        .collect();
+    format!("{}; numbers per ghost in each step", parts.join(", then "))
 }
 
 /// The quadrature of all bodies, or of each body if they differ.

@@ -201,7 +201,7 @@ impl<'a> Job<'a> {
             stable_step: simulation.scaled_stable_step(),
             survey,
         });
-        let decisions = decisions(&simulation);
+        let decisions = decisions(&mut simulation);
         self.observer.message(&Message::Decided(decisions));
         self.check_signals()?;
         let mut stepper = Stepper::new(simulation);

@@ -195,6 +195,7 @@ fn a_verbose_run_says_what_it_has_decided() {
     for words in [
         "partition        each rank has ",
         " ghosts of 1 other rank(s)",
+        "sent to ghosts   displacements (2); numbers per ghost in each step",
         " as bits of lattices, 0 in lists",
         "instructions     ",
         "s (chosen), 0.80 of the stable one",

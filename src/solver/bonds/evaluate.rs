@@ -207,6 +207,28 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
+    /// What ghosts receive in each force evaluation, in order, and in how many columns. If bonds break, the
+    /// point numbers are sent a second time.
+    pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
+        let mut thermal_stretch = Vec::new();
+        let mut sizes = Vec::new();
+        for turn in 0..self.passes.len() {
+            let name = match self.content(turn) {
+                HaloContent::Motion if is_thermal => "displacements and thermal stretches",
+                HaloContent::Motion => "displacements",
+                HaloContent::Thresholds => "critical stretches",
+                HaloContent::PointNumbers => "sums of the law",
+                HaloContent::OwnedOnly | HaloContent::None => continue,
+            };
+            let mut displacement = [const { Vec::new() }; D];
+            let thermal_stretch = is_thermal.then_some(&mut thermal_stretch[..]);
+            let (_, columns) =
+                self.halo_columns(self.content(turn), &mut displacement, thermal_stretch);
+            sizes.push((name, columns));
+        }
+        sizes
+    }
+
     /// Point data that a pass receives from other ranks.
     fn content(&self, turn: usize) -> HaloContent {
         match (
