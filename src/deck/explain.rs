@@ -24,7 +24,10 @@ pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> 
         let [times, values] = scope.tables[name].rows();
         *table.get_mut() = Table::of_rows(times, values);
     }
-    toml::to_string(&deck).map_err(|error| Error::run(format!("cannot write the deck: {error}")))
+    // Through a value, which needs no further serializer for each section.
+    toml::Value::try_from(&deck)
+        .and_then(|deck| toml::to_string(&deck))
+        .map_err(|error| Error::run(format!("cannot write the deck: {error}")))
 }
 
 /// Write defaults that depend on other values into the deck.

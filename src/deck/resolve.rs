@@ -217,7 +217,7 @@ impl<'a> Scope<'a> {
             return Ok(entries);
         }
         let message = format!(
-            "{key}: must have {} entries, one a dimension, has {}",
+            "{key}: must have {} entries, one per dimension, has {}",
             self.dimension,
             entries.len()
         );

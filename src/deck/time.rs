@@ -153,7 +153,10 @@ fn stage_end(
     let end = scope.positive(number, "[[stage]] end")?;
     let about = |other: f64| (end - other).abs() <= UP_TO_ROUNDING * whole;
     let words = if end <= start || about(start) {
-        format!("must be after its start, {} s", format_number(start))
+        format!(
+            "must be after its start, {} s (by more than round-off)",
+            format_number(start)
+        )
     } else if is_last && !about(whole) {
         let whole = format_number(whole);
         format!("the last stage ends with the run, [time] end = {whole} s; leave it out here")

@@ -9,7 +9,7 @@ macro_rules! register {
 
         /// Any of the laws.
         #[derive(Debug, Clone, Copy, PartialEq)]
-        #[expect(clippy::large_enum_variant, reason = "there is one a body, not one a point")]
+        #[expect(clippy::large_enum_variant, reason = "there is one per body, not one per point")]
         pub enum AnyLaw {
             $($law($law),)+
         }

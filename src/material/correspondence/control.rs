@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
-    reason = "there is one a law, not one a point"
+    reason = "there is one per law, not one per point"
 )]
 pub enum Control {
     /// B = 0.
