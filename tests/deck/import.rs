@@ -417,6 +417,25 @@ fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
     }
 }
 
+/// PeriLab rejects a plane problem without plane stress or plane strain; the import says what it assumes.
+#[test]
+fn a_plane_material_of_perilab_without_symmetry_is_named() {
+    let folder = Folder::new("symmetry");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let symmetry = "        Symmetry: \"isotropic plane stress\"\n";
+    let imported = (folder.import("bare.yaml", &STRIP.replacen(symmetry, "", 1))).unwrap();
+    let (fate, note) = fate(&imported, "PeriLab > Models > Material Models > Alu");
+    assert_eq!(fate, Fate::Approximated);
+    assert!(
+        note.contains("no `Symmetry`: dimension = \"plane-stress\""),
+        "{note}"
+    );
+}
+
 #[test]
 fn a_bond_of_perilab_has_its_micromodulus() {
     let folder = Folder::new("strip");

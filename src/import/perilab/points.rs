@@ -112,6 +112,10 @@ pub(super) fn setting(
     };
     for (_, material) in materials.tables() {
         let Some(symmetry) = material.get("Symmetry") else {
+            if translation.dimension == 2 {
+                let note = format!("has no `Symmetry`: dimension = \"{setting}\"");
+                translation.log.approximated(material, note);
+            }
             continue;
         };
         let text = symmetry.text().unwrap_or("").to_lowercase();
