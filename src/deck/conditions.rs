@@ -4,28 +4,49 @@ use super::grammar::{self, Deck};
 use super::number::Vector;
 use super::resolve::Scope;
 use super::sets::find_set;
+use super::time::first_method;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{Expression, POSITION, POSITION_AND_TIME};
+use crate::points::value_file;
 use crate::problem::{self, Action};
 
 /// Validate the initial values.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression, or a table with neither displacement nor velocity.
+/// On an unknown set, an invalid expression or file, a table without values, or a velocity in a run that begins
+/// with a method that computes equilibria.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,
     sets: &[problem::Set],
 ) -> Result<Vec<problem::Initial>> {
+    let first = first_method(deck);
     deck.initial
         .iter()
         .map(|(name, table)| {
             let initial = table.get_ref();
             let key = format!("[initial.{name}]");
-            if initial.displacement.is_none() && initial.velocity.is_none() {
-                let message = format!("{key}: give `displacement`, `velocity` or both");
+            let file = initial.file.as_ref();
+            let file = file.map(|file| initial_file(scope, deck, file, &key)).transpose()?;
+            if initial.displacement.is_none() && initial.velocity.is_none() && file.is_none() {
+                let message = format!("{key}: give `displacement`, `velocity` or both, or a `file`");
                 return Err(scope.error(table.span(), message));
+            }
+            let vector = initial.displacement.as_ref().or(initial.velocity.as_ref());
+            if let (Some(file), Some(_)) = (&initial.file, vector) {
+                let message = format!("{key} file: has all values; remove `displacement` and `velocity`");
+                return Err(scope.error(file.span(), message));
+            }
+            let by_file = file.as_ref().filter(|file| file.columns.has_velocity());
+            let velocity = initial.velocity.as_ref().map(|velocity| (velocity.span(), "velocity"));
+            let velocity = velocity.or(by_file.map(|file| (file.span.clone(), "file")));
+            if let (Some((place, name)), true) = (velocity, first.is_quasi_static()) {
+                let message = format!(
+                    "{key} {name}: initial velocities have no effect in a run that begins with {}; remove them",
+                    first.name()
+                );
+                return Err(scope.error(place, message));
             }
             let values = |vector: &Option<Vector>, name: &str| {
                 let resolve = |vector: &Vector| {
@@ -41,9 +62,33 @@ pub fn initials(
                 span: initial.set.span(),
                 displacement: values(&initial.displacement, "displacement")?,
                 velocity: values(&initial.velocity, "velocity")?,
+                file,
             })
         })
         .collect()
+}
+
+/// Validate the file of initial values.
+fn initial_file(
+    scope: &Scope,
+    deck: &Deck,
+    file: &grammar::Text,
+    key: &str,
+) -> Result<problem::InitialFile> {
+    let error = |message: String| scope.error(file.span(), format!("{key} file: {message}"));
+    if deck.refinement.is_some() {
+        let message =
+            "is not available with [refinement], whose points have other ids; use expressions";
+        return Err(error(message.to_owned()));
+    }
+    let folder = scope.source.path.parent().unwrap_or("".as_ref());
+    let path = folder.join(file.get_ref());
+    let columns = value_file::columns(&path, scope.dimension).map_err(error)?;
+    Ok(problem::InitialFile {
+        path,
+        span: file.span(),
+        columns,
+    })
 }
 
 /// Validate the loads and supports.

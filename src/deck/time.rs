@@ -50,9 +50,6 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         let message = "[time] static: only `method = \"static\"` has these keys";
         return Err(scope.error(table.span(), message));
     }
-    if methods[0].is_quasi_static() {
-        at_rest(scope, deck, methods[0])?;
-    }
     let stretch = TimeSegment {
         key: "[time]",
         length: end,
@@ -134,6 +131,11 @@ pub fn methods(deck: &Deck) -> Vec<(&'static str, &Spanned<grammar::Method>)> {
             None => of_time,
         });
     each.collect()
+}
+
+/// Return the method with which the run begins.
+pub fn first_method(deck: &Deck) -> grammar::Method {
+    *methods(deck)[0].1.get_ref()
 }
 
 /// Return the end of a stage, s. The end must be after the start of the stage and at most the end of the run.
@@ -343,19 +345,4 @@ impl TimeSegment<'_> {
             max_halvings,
         })
     }
-}
-
-/// Return an error if the deck has initial velocities, and the run begins with a method that computes
-/// equilibria.
-fn at_rest(scope: &Scope, deck: &Deck, method: grammar::Method) -> Result<()> {
-    for (name, table) in &deck.initial {
-        if let Some(velocity) = &table.get_ref().velocity {
-            let message = format!(
-                "[initial.{name}] velocity: initial velocities have no effect in a run that begins with {}; remove them",
-                method.name()
-            );
-            return Err(scope.error(velocity.span(), message));
-        }
-    }
-    Ok(())
 }

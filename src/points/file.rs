@@ -4,16 +4,15 @@
 //! columns that the deck or a heading names. Empty rows, comments and a heading are skipped. A heading is a
 //! first row without any number.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use crate::comm::{Communicator, agree, scan};
+use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result, excerpt};
 use crate::problem::{PointSource, Problem};
 
 use super::Point;
-use super::columns::{BYTE_ORDER_MARK, Columns, LONGEST_ROW, Layout, entries, is_comment, layout};
+use super::columns::{Columns, Layout, layout};
+use super::rows::{Part, for_each_row};
 
 /// The bodies that use a file: index, and the block number that they select.
 pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
@@ -35,18 +34,6 @@ const SAMPLED: u64 = 256;
 
 /// Largest absolute coordinate, m; squared distances then cannot overflow.
 const FARTHEST: f64 = 1e30;
-
-/// An invalid row: its line within the rank's part, from 0, and the message.
-type RowError = (u64, String);
-
-/// The parsed part of one rank.
-#[derive(Default)]
-struct Share {
-    points: Vec<Point>,
-    lines: u64,
-    /// The first invalid row.
-    error: Option<RowError>,
-}
 
 /// The columns that the deck names for a file. They are equal for all bodies that use the file.
 fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
@@ -86,20 +73,10 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     };
     let layout = layout_of(problem, path).map_err(unreadable).flatten();
     let layout = agree(comm, layout)?;
-    let share = read_share(path, &layout, &users, comm.rank(), comm.size());
-    let share = agree(comm, share.map_err(unreadable))?;
-    let (lines_before, _) = scan(comm, share.lines);
-    let checked = match share.error {
-        None => Ok(share.points),
-        Some((line, message)) => {
-            let line = lines_before + line + 1;
-            Err(Error::input(format!(
-                "{}:{line}: {message}",
-                path.display()
-            )))
-        }
-    };
-    agree(comm, checked)
+    let share = read_share(path, &layout, &users, [comm.rank(), comm.size()]);
+    let (points, part) = agree(comm, share.map_err(unreadable))?;
+    part.check(path, comm)?;
+    Ok(points)
 }
 
 /// Sample the points of a file. Return them and the number of points that each sample represents.
@@ -111,96 +88,32 @@ pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     let layout = layout_of(problem, path).ok()?.ok()?;
     let length = std::fs::metadata(path).ok()?.len();
     if length <= SAMPLED * PIECE {
-        let share = read_share(path, &layout, &users, 0, 1).ok()?;
-        return Some((share.points, 1.0));
+        let (points, _) = read_share(path, &layout, &users, [0, 1]).ok()?;
+        return Some((points, 1.0));
     }
     let pieces = length.div_ceil(PIECE);
     let mut points = Vec::new();
     for k in 0..SAMPLED {
         let piece = (u128::from(pieces) * u128::from(k) / u128::from(SAMPLED)) as usize;
-        points.extend(
-            read_share(path, &layout, &users, piece, pieces as usize)
-                .ok()?
-                .points,
-        );
+        let (piece, _) = read_share(path, &layout, &users, [piece, pieces as usize]).ok()?;
+        points.extend(piece);
     }
     Some((points, pieces as f64 / SAMPLED as f64))
 }
 
-/// Read the rows that start within a rank's part of the file's bytes.
+/// Read the points of part `part` of `parts` equal parts of a file's bytes.
 fn read_share(
     path: &Path,
     layout: &Layout,
     users: &[(usize, Option<u32>)],
-    rank: usize,
-    size: usize,
-) -> std::io::Result<Share> {
-    let mut file = File::open(path)?;
-    let length = file.metadata()?.len();
-    let border = |rank: usize| (u128::from(length) * rank as u128 / size as u128) as u64;
-    let (start, end) = (border(rank), border(rank + 1));
-    let mut share = Share::default();
-    let mut line = Vec::new();
-    let mut at = start;
-    let mut reader = if start == 0 {
-        BufReader::new(file)
-    } else {
-        // A row that crosses `start` belongs to the previous part.
-        file.seek(SeekFrom::Start(start - 1))?;
-        let mut reader = BufReader::new(file);
-        let skipped = (&mut reader).take(LONGEST_ROW + 1).skip_until(b'\n')? as u64;
-        if skipped > LONGEST_ROW {
-            // The rank whose part contains the start of this row reports the error.
-            return Ok(share);
-        }
-        at = start - 1 + skipped;
-        reader
-    };
-    while at < end {
-        line.clear();
-        let read = (&mut reader)
-            .take(LONGEST_ROW)
-            .read_until(b'\n', &mut line)? as u64;
-        if read == 0 {
-            break;
-        }
-        let bytes = match at {
-            0 => line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line),
-            _ => &line[..],
-        };
-        let is_heading = layout.heading == Some(at);
-        at += read;
-        if read == LONGEST_ROW && !bytes.ends_with(b"\n") {
-            let message = format!("is longer than {LONGEST_ROW} bytes; is this a point file?");
-            share.error.get_or_insert((share.lines, message));
-            break;
-        }
-        if !is_heading {
-            share.read_row(&layout.columns, users, bytes);
-        }
-        share.lines += 1;
-    }
-    Ok(share)
-}
-
-impl Share {
-    /// Parse the next row and append its point.
-    fn read_row(&mut self, columns: &Columns, users: &[(usize, Option<u32>)], row: &[u8]) {
-        let entries = match std::str::from_utf8(row) {
-            Ok(row) if is_comment(row) => return,
-            Ok(row) => entries(row),
-            Err(_) => Err("is not UTF-8 text".to_owned()),
-        };
-        if entries.as_ref().is_ok_and(Vec::is_empty) {
-            return;
-        }
-        match entries.and_then(|entries| point(columns, users, &entries)) {
-            Ok(point) => self.points.push(point),
-            Err(message) => {
-                self.error.get_or_insert((self.lines, message));
-            }
-        }
-    }
+    part_of_parts: [usize; 2],
+) -> std::io::Result<(Vec<Point>, Part)> {
+    let mut points = Vec::new();
+    let part = for_each_row(path, layout.heading, part_of_parts, |entries| {
+        points.push(point(&layout.columns, users, entries)?);
+        Ok(())
+    })?;
+    Ok((points, part))
 }
 
 /// Parse the point of a row.

@@ -11,8 +11,10 @@ pub mod lattice;
 pub(crate) mod mesh;
 mod polygon;
 mod region;
+mod rows;
 pub mod set;
 pub mod shape;
+pub mod value_file;
 
 pub use columns::Columns;
 pub use lattice::LatticeBody;

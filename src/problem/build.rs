@@ -153,6 +153,7 @@ impl Problem {
             span: 0..0,
             displacement: None,
             velocity: Some((velocity, 0..0)),
+            file: None,
         });
     }
 }

@@ -1,8 +1,10 @@
 //! Initial values, loads and supports.
 
 use std::ops::Range;
+use std::path::PathBuf;
 
 use crate::expression::Expression;
+use crate::points::value_file::ValueColumns;
 
 /// Initial values of a set.
 #[derive(Debug, Clone)]
@@ -17,6 +19,27 @@ pub struct Initial {
     pub displacement: Option<(Vec<Expression>, Range<usize>)>,
     /// Velocity (m/s) by component, and its span in the deck.
     pub velocity: Option<(Vec<Expression>, Range<usize>)>,
+    /// A file with the values of each point, in place of expressions.
+    pub file: Option<InitialFile>,
+}
+
+impl Initial {
+    /// Whether it moves points at the start.
+    pub fn displaces(&self) -> bool {
+        let by_file = |file: &InitialFile| file.columns.has_displacement();
+        self.displacement.is_some() || self.file.as_ref().is_some_and(by_file)
+    }
+}
+
+/// A file with initial values, one row per point.
+#[derive(Debug, Clone)]
+pub struct InitialFile {
+    /// Its path.
+    pub path: PathBuf,
+    /// Span of its path in the deck.
+    pub span: Range<usize>,
+    /// Its columns.
+    pub columns: ValueColumns,
 }
 
 /// A load or support.

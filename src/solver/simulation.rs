@@ -581,13 +581,13 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
 
 /// Whether bonds may break at the initial positions.
 fn starts_deformed(problem: &Problem) -> bool {
-    let displaced = |initial: &Initial| initial.displacement.is_some();
     let placed = |condition: &Condition| {
         let action = &condition.action;
         matches!(action, Action::Displacement(_) | Action::Temperature(_))
     };
     problem.has_damage()
-        && (problem.initials.iter().any(displaced) || problem.conditions.iter().any(placed))
+        && (problem.initials.iter().any(Initial::displaces)
+            || problem.conditions.iter().any(placed))
 }
 
 /// Break the bonds that cross a pre-crack, and count them by crack. Both ends test the bond with the lower

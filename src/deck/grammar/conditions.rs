@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Text;
 use crate::deck::number::{Number, Vector};
 
-/// Initial values of a set: an expression of x, y and z for each component.
+/// Initial values of a set: an expression of x, y and z for each component, or a file.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
@@ -19,6 +19,9 @@ pub struct Initial {
     /// Velocity in m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
+    /// Text file with a row of values for each point, in place of `displacement` and `velocity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<Text>,
 }
 
 /// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x,

@@ -1,8 +1,9 @@
 //! Initial displacements and velocities.
 
-use crate::comm::Communicator;
-use crate::error::Result;
-use crate::problem::Problem;
+use crate::comm::{Communicator, IdOrder, agree, all_gather};
+use crate::error::{Error, Result};
+use crate::points::value_file;
+use crate::problem::{Initial, InitialFile, Problem};
 use crate::solver::model::Model;
 use crate::solver::motion::Fields;
 
@@ -11,7 +12,7 @@ use super::{members, not_empty};
 /// Set the initial displacements and velocities.
 ///
 /// # Errors
-/// If a set is empty; the error is the same on all ranks.
+/// If a set is empty, or a file has an invalid row or lacks a point; the error is the same on all ranks.
 pub fn apply_initials<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -28,6 +29,9 @@ pub fn apply_initials<const D: usize>(
             &points,
             (&key, initial.span.clone()),
         )?;
+        if let Some(file) = &initial.file {
+            apply_file(initial, file, comm, model, &points, fields)?;
+        }
         for point in points {
             let position = model.position(point as usize);
             for d in 0..D {
@@ -41,4 +45,97 @@ pub fn apply_initials<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// Set the values of the set's points from a file. Collective.
+fn apply_file<const D: usize>(
+    initial: &Initial,
+    file: &InitialFile,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+    points: &[u32],
+    fields: &mut Fields<D>,
+) -> Result<()> {
+    let values = values_of_owned(file, comm, model)?;
+    let width = 2 * D;
+    let error = |message: String| {
+        let message = format!(
+            "[initial.{}] file: {}: {message}",
+            initial.name,
+            file.path.display()
+        );
+        Error::input(message).at(&file.span)
+    };
+    let row = |point: u32| &values[point as usize * width..][..width];
+    let mut missing = points.iter().filter(|point| row(**point)[0].is_nan());
+    let found = match missing.next() {
+        Some(point) => {
+            let id = model.ids[*point as usize];
+            Err(error(format!("has no row for the point {id} of the set")))
+        }
+        None => Ok(()),
+    };
+    agree(comm, found)?;
+    for point in points {
+        let (displacement, velocity) = row(*point).split_at(D);
+        for d in 0..D {
+            if file.columns.has_displacement() {
+                fields.displacement[d][*point as usize] = displacement[d];
+            }
+            if file.columns.has_velocity() {
+                fields.velocity[d][*point as usize] = velocity[d];
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Displacement and velocity of each owned point from a file, 2 D values per point; NaN for points without a
+/// row. Each rank reads a part of the rows and sends them to the rank with the range of ids that contains them.
+/// Collective.
+fn values_of_owned<const D: usize>(
+    file: &InitialFile,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+) -> Result<Vec<f64>> {
+    let rows = value_file::read(file, comm)?;
+    let order = IdOrder::new(comm, &model.ids[..model.owned()], model.coarsest);
+    let firsts = all_gather(comm, order.first());
+    let path = file.path.display();
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    let mut checked = Ok(());
+    for (id, values) in rows {
+        if id >= model.total {
+            let points = model.total;
+            checked = checked.and(Err(Error::input(format!(
+                "{path}: has a row for the point {id}; the last point is {}",
+                points - 1
+            ))));
+            continue;
+        }
+        let home = firsts.partition_point(|first| *first <= id) - 1;
+        outgoing[home].extend_from_slice(&id.to_ne_bytes());
+        let bytes = values.iter().flat_map(|value| value.to_ne_bytes());
+        outgoing[home].extend(bytes);
+    }
+    agree(comm, checked)?;
+    let width = 2 * D;
+    let mut of_range = vec![f64::NAN; order.count() * width];
+    let mut checked = Ok(());
+    for bytes in comm.all_to_all(outgoing) {
+        for words in bytemuck::pod_collect_to_vec::<u8, u64>(&bytes).chunks(1 + width) {
+            let row = (words[0] - order.first()) as usize;
+            let values = &mut of_range[row * width..][..width];
+            if !values[0].is_nan() {
+                let id = words[0];
+                let message = format!("{path}: has two rows for the point {id}");
+                checked = checked.and(Err(Error::input(message)));
+            }
+            for (value, word) in values.iter_mut().zip(&words[1..]) {
+                *value = f64::from_bits(*word);
+            }
+        }
+    }
+    agree(comm, checked)?;
+    Ok(order.spread(comm, &of_range, width))
 }

@@ -1,0 +1,143 @@
+//! Initial values of points from a text file: one row per point, with columns that the heading names.
+
+use std::path::Path;
+
+use crate::comm::{Communicator, agree};
+use crate::error::{Error, Result, excerpt};
+use crate::problem::InitialFile;
+
+use super::columns::heading;
+use super::rows::for_each_row;
+
+/// Names of the columns of displacements (m) and velocities (m/s), by component.
+const DISPLACEMENT: [&str; 3] = ["ux", "uy", "uz"];
+const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
+
+/// Name of the column with the ids of the points, from 0.
+const ID: &str = "id";
+
+/// Columns of the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ValueColumns {
+    /// Number of columns.
+    pub width: usize,
+    /// Offset of the heading in bytes.
+    pub heading: u64,
+    /// Column with the id of the point. Without it, the rows have the ids 0, 1, 2, …
+    pub id: Option<usize>,
+    /// Column of each component of the displacement; a missing component is 0.
+    pub displacement: Vec<Option<usize>>,
+    /// Column of each component of the velocity; a missing component is 0.
+    pub velocity: Vec<Option<usize>>,
+}
+
+impl ValueColumns {
+    /// Whether the file has a displacement.
+    pub fn has_displacement(&self) -> bool {
+        self.displacement.iter().any(Option::is_some)
+    }
+
+    /// Whether the file has a velocity.
+    pub fn has_velocity(&self) -> bool {
+        self.velocity.iter().any(Option::is_some)
+    }
+}
+
+/// Find the columns of a file by its heading; upper and lower case are equivalent.
+///
+/// # Errors
+/// If the file cannot be read, or its heading has no column of values.
+pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumns, String> {
+    let name = path.display();
+    let found = heading(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    let known = || {
+        let names = [&DISPLACEMENT[..dimension], &VELOCITY[..dimension]].concat();
+        format!("the known names are {ID} {}", names.join(" "))
+    };
+    let Some(heading) = found else {
+        return Err(format!("{name}: has no heading; {}", known()));
+    };
+    let column = |name: &str| {
+        let mut names = heading.names.iter();
+        names.position(|other| other.eq_ignore_ascii_case(name))
+    };
+    let of_each = |names: [&str; 3]| names[..dimension].iter().map(|name| column(name)).collect();
+    let columns = ValueColumns {
+        width: heading.names.len(),
+        heading: heading.offset,
+        id: column(ID),
+        displacement: of_each(DISPLACEMENT),
+        velocity: of_each(VELOCITY),
+    };
+    if !columns.has_displacement() && !columns.has_velocity() {
+        return Err(format!(
+            "{name}:{}: has no column of values, its columns are {}; {}",
+            heading.line,
+            excerpt(&heading.names.join(" ")),
+            known()
+        ));
+    }
+    Ok(columns)
+}
+
+/// Id of a point and its values: the components of the displacement, then those of the velocity.
+pub type Row = (u64, Vec<f64>);
+
+/// Read this rank's part of the rows. Collective.
+///
+/// # Errors
+/// If the file cannot be read or a row is invalid; the message gives file and line.
+pub fn read(file: &InitialFile, comm: &dyn Communicator) -> Result<Vec<Row>> {
+    let columns = &file.columns;
+    let mut rows = Vec::new();
+    let part = for_each_row(
+        &file.path,
+        Some(columns.heading),
+        [comm.rank(), comm.size()],
+        |entries| {
+            rows.push(row(columns, entries)?);
+            Ok(())
+        },
+    );
+    let part = part.map_err(|error| {
+        let message = format!("cannot read the file {}: {error}", file.path.display());
+        Error::input(message).at(&file.span)
+    });
+    agree(comm, part)?.check(&file.path, comm)?;
+    if columns.id.is_none() {
+        let (before, _) = crate::comm::scan(comm, rows.len() as u64);
+        for ((id, _), number) in rows.iter_mut().zip(before..) {
+            *id = number;
+        }
+    }
+    Ok(rows)
+}
+
+/// Parse a row.
+fn row(columns: &ValueColumns, entries: &[&str]) -> std::result::Result<Row, String> {
+    if entries.len() != columns.width {
+        return Err(format!(
+            "has {} entries, must have {} as the heading",
+            entries.len(),
+            columns.width
+        ));
+    }
+    let id = match columns.id {
+        None => 0,
+        Some(column) => entries[column].parse().map_err(|_| {
+            let entry = excerpt(entries[column]);
+            format!("id must be a whole number from 0, is {entry}")
+        })?,
+    };
+    let value = |column: &Option<usize>| {
+        let Some(column) = column else {
+            return Ok(0.0);
+        };
+        let value = entries[*column].parse::<f64>().ok();
+        value
+            .filter(|value| value.is_finite())
+            .ok_or_else(|| format!("must be a number, is {}", excerpt(entries[*column])))
+    };
+    let all = columns.displacement.iter().chain(&columns.velocity);
+    Ok((id, all.map(value).collect::<std::result::Result<_, _>>()?))
+}
