@@ -52,7 +52,7 @@ fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
     Err(Error::input(message).at(&pair.span))
 }
 
-/// Return an error if the bonds between two bodies cannot have their own damage.
+/// Return an error if the bonds between two bodies cannot have a separate damage law.
 fn pair_damage_is_possible(
     problem: &Problem,
     pair: &InterfacePair,
