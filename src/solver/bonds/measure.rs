@@ -211,8 +211,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// Flag singular owned points with 1, others with 0. A point is singular if its law cannot resist all
-    /// deformations: too few bonds are intact, or the bonds are too stiff in comparison.
+    /// Flag singular owned points with 1, others with 0. A point is singular if too few of its bonds are
+    /// intact for its law; the law then gives no force.
     pub fn singular(&self, model: &Model<D>) -> Vec<f64> {
         let flag = |point| f64::from(u8::from(self.is_singular(model, point)));
         (0..model.owned()).map(flag).collect()
