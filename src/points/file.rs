@@ -1,8 +1,8 @@
 //! Points from a text file; each rank reads a part of the bytes.
 //!
-//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Otherwise, it has the
-//! columns that the deck or a heading names. Empty rows, comments and a heading are skipped. A heading is a
-//! first row without any number.
+//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space, unless the deck or a
+//! heading names other columns. Empty rows, comments and a heading are skipped. A heading is a first row
+//! without any number.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -33,13 +33,13 @@ const PIECE: u64 = 1 << 16;
 /// Number of samples of a long file.
 const SAMPLED: u64 = 256;
 
-/// Largest absolute coordinate, m; squared distances then cannot overflow.
+/// Largest absolute value of a coordinate, m. With this limit, squared distances cannot overflow.
 const FARTHEST: f64 = 1e30;
 
-/// An invalid row: its line within the rank's part, from 0, and the message.
+/// An invalid row: its line in this rank's part of the file, from 0, and the message.
 type RowError = (u64, String);
 
-/// The parsed part of one rank.
+/// Points from one rank's part of the file.
 #[derive(Default)]
 struct Share {
     points: Vec<Point>,
@@ -48,7 +48,7 @@ struct Share {
     error: Option<RowError>,
 }
 
-/// The columns that the deck names for a file. They are equal for all bodies that use the file.
+/// The columns that the deck names for a file; all bodies that use the file have the same.
 fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
     match &problem.bodies[user].points {
         PointSource::File { columns, .. } => columns.as_ref(),
@@ -269,8 +269,8 @@ mod tests {
     use crate::elastic::Isotropic;
     use crate::problem::{Law, Material, Shape};
 
-    /// Read a 2-D file. Return the x coordinates of its points by id, or the error. Asserts that the result
-    /// is equal on any number of ranks.
+    /// Read a 2-D file. Return the x coordinates of its points by id, or the error. The result must be the
+    /// same on any number of ranks.
     fn read(name: &str, text: &[u8]) -> std::result::Result<Vec<f64>, String> {
         let folder = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();

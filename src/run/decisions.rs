@@ -64,7 +64,7 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
     )
 }
 
-/// The quadrature of all bodies, or of each body if they differ.
+/// Describe the quadrature of all bodies, or of each body if they differ.
 fn quadrature(bodies: &[Body]) -> String {
     let name = |body: &Body| format!("{:?}", body.quadrature()).to_lowercase();
     if bodies

@@ -84,8 +84,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Sums, eight lanes per quantity. Each quantity is added to one column of the points.
     type Sums: LaneTuple;
 
-    /// Sums over the bonds that break in this sweep, eight lanes per quantity. They are returned per point, only for points
-    /// with such bonds.
+    /// Sums over the bonds that break in this sweep, eight lanes per quantity. They are returned only for
+    /// points with such bonds.
     type Broken: LaneTuple;
 
     /// Point numbers of points i and j that the kernel reads.

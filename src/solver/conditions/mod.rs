@@ -47,7 +47,8 @@ pub struct OnPart<const D: usize> {
 /// Work of loads and supports from a stored state 0 to the present state.
 ///
 /// f is the force density of a load or a reaction, and V is the volume of a point. A load step in which bonds
-/// break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work is ½ (f₀ + f₁)·(u₁ − u₀) V.
+/// break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work is
+/// ½ (f₀ + f₁)·(u₁ − u₀) V.
 /// From 1 to 2, supports do not move, and the force density of loads remains f₁. Only u₀ is stored, so the
 /// work of loads is computed as
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
