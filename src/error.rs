@@ -18,7 +18,7 @@ pub enum ErrorKind {
     Stopped,
 }
 
-/// An error whose message names the key or the file and what is allowed.
+/// An error. The message names the wrong key or file, and what is allowed.
 #[derive(Debug, Clone)]
 pub struct Error {
     /// Category of the error.

@@ -275,7 +275,7 @@ mod tests {
                     let mut ordered = offset.map(f64::abs);
                     ordered.sort_by(|a, b| b.total_cmp(a));
                     let expected = overlap(ordered, horizon, 3);
-                    // All of these offsets have their own table entries, so the differences are only
+                    // The table or cache has an entry for each of these offsets, so the differences are only
                     // round-off.
                     assert!((share.at(offset) - expected).abs() < 1e-12, "{offset:?}");
                 }

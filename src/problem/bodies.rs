@@ -218,7 +218,7 @@ pub enum InterfaceRule {
     Average,
     /// The smaller of the moduli and of the horizons.
     Minimum,
-    /// Each end uses the constants of its own body for its half of the bond force.
+    /// Each end uses the constants of its body, for its half of the bond force.
     Own,
 }
 

@@ -69,7 +69,7 @@ impl EnergyWatch {
     ///
     /// # Errors
     /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last one, above
-    /// [`CERTAIN_GAIN`], or not finite.
+    /// [`CERTAIN_GAIN`] in one row, or not finite.
     pub fn check(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
         // Negative fracture energy means that breaking bonds have added energy, which would hide part of the

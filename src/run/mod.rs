@@ -274,7 +274,7 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // The energy check does not know the energy that changing temperatures add, so it is omitted.
+        // The work of changing temperatures is not computed, so the energy of such runs is not checked.
         let is_closed = !self.problem.is_quasi_static() && !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {

@@ -69,7 +69,7 @@ pub fn grids(
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };
-        // The grids of the refinement levels have a point at a cell centre.
+        // The grids of all refinement levels have a point at the centre of a level-0 cell.
         let is_shape = matches!(body.points, PointSource::Lattice { .. });
         let refinement = problem.refinement.as_ref().filter(|_| is_shape);
         for level in 0..=refinement.map_or(0, |refinement| refinement.levels) {

@@ -56,7 +56,7 @@ impl BlockLaws {
         self.damage.is_some() || self.pairs.breaks
     }
 
-    /// Whether each point has its own threshold.
+    /// Whether thresholds differ between points and are stored per point.
     pub fn has_thresholds(&self) -> bool {
         self.weibull.is_some() || self.follows_smallest_stretch()
     }

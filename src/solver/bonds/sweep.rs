@@ -432,7 +432,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Sums over all bonds of a vector, with the bits of the breaking bonds.
+/// Task that sums over all bonds of a vector and returns the bits of the breaking bonds.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the vector.
@@ -469,7 +469,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
     }
 }
 
-/// Sums over the breaking bonds of a vector; it clears their intact bits.
+/// Task that sums over the breaking bonds of a vector and clears their intact bits.
 struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the vector.
@@ -496,7 +496,7 @@ impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
     }
 }
 
-/// Sums over the breaking bonds of a row; it clears their intact bits.
+/// Task that sums over the breaking bonds of a row and clears their intact bits.
 struct BrokenOfRow<'t, 'r, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the list of the row.

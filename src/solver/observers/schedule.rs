@@ -28,8 +28,8 @@ impl Schedule {
         }
     }
 
-    /// Whether output is due: in the first step that reaches a multiple of the interval or a given time, up
-    /// to round-off.
+    /// Whether output is due: at the start, at the end, and in the first step that reaches a multiple of the
+    /// interval or a given time, up to round-off.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;

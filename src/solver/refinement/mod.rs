@@ -300,7 +300,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             own.binary_search(&model.ids[there]).is_ok()
         };
         let cut = |here: usize, there: usize| {
-            // Both points existed with the same blocks, so this bond existed before the refinement.
+            // Both points still have their previous blocks, so this bond existed before the refinement.
             if same[here] == 1.0 && same[there] == 1.0 {
                 return was_broken(here, there);
             }
