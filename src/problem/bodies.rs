@@ -383,7 +383,7 @@ pub enum Selector {
 pub struct IdFile {
     /// Path, relative to the working directory or absolute.
     pub path: PathBuf,
-    /// Id of the first point in the numbering of the file.
+    /// Number that the file uses for the first point.
     pub first: u64,
 }
 

@@ -29,7 +29,7 @@ impl Values {
         }
     }
 
-    /// Evaluate the expression at a time (s), if its value is the same for all points.
+    /// Prepare the values at a time (s). A value that is the same for all points is computed here.
     pub fn at(&self, time: f64) -> At {
         let same = || self.expression.evaluate([0.0; 3], time);
         At {

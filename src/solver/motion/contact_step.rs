@@ -1,4 +1,4 @@
-//! Adjusts the time step to contact: shorter before stiff contact, longer again afterwards.
+//! Adjustment of the time step to contact: shorter before stiff contact, longer again afterwards.
 
 use crate::error::{Error, Result};
 use crate::problem::{Rigid, StepRule};
@@ -30,8 +30,8 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// The stable step with contact (s), times the safety factor of the run; `None` if contact does not limit
-    /// the step.
+    /// The largest step that contact allows (s): the stable step with contact, times `safety` for automatic
+    /// steps. `None` in runs without contact.
     pub(in crate::solver) fn contact_limit(&self) -> Option<f64> {
         let contact = self.contact.as_ref()?;
         let safety = match self.time_rule().step {

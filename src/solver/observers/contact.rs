@@ -2,7 +2,7 @@
 //! of two such bodies that are nearer than their spacing. For bodies whose bonds have broken, it finds points
 //! that are nearer than half their spacing.
 //!
-//! Where the bounding boxes of two bodies overlap, their points are distributed to the ranks by spatial
+//! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks by spatial
 //! cells, so that each rank compares a part. Points of the second body are sent to the ranks of all cells
 //! that are near enough.
 
@@ -62,13 +62,13 @@ struct Pair {
     were_bonded: bool,
 }
 
-/// A pair of bodies whose bounding boxes overlap.
+/// A pair of bodies whose bounding boxes overlap or nearly touch.
 #[derive(Clone, Copy)]
 struct Meeting {
     pair: Pair,
     /// Largest distance of two points that is compared, m.
     radius: f64,
-    /// Corners of the box that contains all points of one body that are near the other body, m.
+    /// Corners of a box that contains all points of one body within `radius` of the other body, m.
     lower: [f64; 3],
     upper: [f64; 3],
 }
@@ -148,7 +148,7 @@ impl ContactWatch {
         agree_on_nearest(comm, nearest)
     }
 
-    /// Find the pairs of bodies whose bounding boxes overlap.
+    /// Find the pairs of bodies whose bounding boxes overlap or are at most the mean of their spacings apart.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();
