@@ -239,7 +239,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Copy received displacements and thermal stretches of ghosts to the arrays that bonds read.
-    /// [`BondInputs`] has already written those of owned points.
+    /// `BondInputs` has already written those of owned points.
     fn update_moved_ghosts(
         &mut self,
         model: &Model<D>,
