@@ -14,13 +14,13 @@ const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"]
 /// A component or invariant: a number computed from the values of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Component {
-    /// Entry of the values.
+    /// The value with this index.
     Entry(usize),
-    /// Length of a vector, √(A:A) of a tensor.
+    /// Length of a vector; √(A:A) of a tensor A.
     Magnitude,
     /// √(3/2 s:s) of the deviator s of a symmetric tensor.
     VonMises,
-    /// Eigenvalue of a symmetric tensor, the largest first.
+    /// Eigenvalue of a symmetric tensor; index 0 is the largest.
     Principal(usize),
     /// Sum of the diagonal entries.
     Trace,
@@ -28,7 +28,7 @@ pub enum Component {
     Determinant,
 }
 
-/// Names of the components of a field with this number of components; empty for a scalar.
+/// Names of the components of a field with this number of values per point; empty for a scalar.
 pub fn names(components: usize) -> &'static [&'static str] {
     match components {
         2 => &AXES[..2],
@@ -39,8 +39,8 @@ pub fn names(components: usize) -> &'static [&'static str] {
     }
 }
 
-/// Index and name of the components in a problem of this dimension; a scalar has one component without a name. Stress
-/// and strain are those of the body in space and have three normal components in any dimension.
+/// Index and name of each component that a field has in a problem of this dimension. A scalar has one
+/// component, without a name. Stress and strain have three normal components in any dimension.
 pub fn entries(
     components: usize,
     dimension: usize,
@@ -57,7 +57,7 @@ pub fn entries(
     all.iter().copied().enumerate().filter(is_there)
 }
 
-/// Names of the invariants of a field with this number of components.
+/// Names of the invariants of a field with this number of values per point.
 pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
     match components {
         2 | 3 => &[("magnitude", Component::Magnitude)],
@@ -79,7 +79,7 @@ pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
 }
 
 impl Component {
-    /// The component or invariant of these values.
+    /// Compute this component or invariant from the values of a point.
     pub fn of(self, values: &[f64]) -> f64 {
         match self {
             Self::Entry(entry) => values[entry],
@@ -98,7 +98,7 @@ impl Component {
             Self::Principal(number) => {
                 let [xx, yy, zz, xy, yz, xz] = six(values);
                 let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-                // The iteration for the eigenvalues would not end.
+                // The eigenvalue iteration does not end for values that are not finite.
                 if !values.iter().all(|entry| entry.is_finite()) {
                     return f64::NAN;
                 }
@@ -113,7 +113,7 @@ impl Component {
     }
 }
 
-/// The entries of a symmetric tensor.
+/// The six stored components of a symmetric tensor, in the order of [`SYMMETRIC`].
 fn six(values: &[f64]) -> [f64; 6] {
     std::array::from_fn(|k| values[k])
 }

@@ -7,29 +7,29 @@ pub enum Dimension {
     Line {
         /// Cross-section, m².
         cross_section: f64,
-        /// Condition across the bar.
+        /// Condition perpendicular to the bar.
         constraint: Constraint,
     },
     /// A thin plate.
     PlaneStress {
-        /// m.
+        /// Thickness, m.
         thickness: f64,
     },
     /// A slice of a long body.
     PlaneStrain {
-        /// m.
+        /// Thickness of the slice, m.
         thickness: f64,
     },
     /// A solid.
     Space,
 }
 
-/// Condition across a bar.
+/// Condition perpendicular to a bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Constraint {
-    /// No stress across the bar: its stiffness is E.
+    /// No stress perpendicular to the bar: its stiffness is E.
     UniaxialStress,
-    /// No strain across the bar: its stiffness is λ + 2G.
+    /// No strain perpendicular to the bar: its stiffness is λ + 2G.
     UniaxialStrain,
 }
 
@@ -43,7 +43,7 @@ impl Dimension {
         }
     }
 
-    /// Factor from length, area or volume to volume: m², m or 1.
+    /// Factor that converts a length, area or volume to a volume: cross-section (m²), thickness (m) or 1.
     pub fn out_of_plane_measure(self) -> f64 {
         match self {
             Self::Line { cross_section, .. } => cross_section,
@@ -52,13 +52,13 @@ impl Dimension {
         }
     }
 
-    /// Edge of a cube, square or line of a volume (m³), m.
+    /// Edge (m) of the line, square or cube with this volume (m³).
     pub fn edge(self, volume: f64) -> f64 {
         let extent = volume / self.out_of_plane_measure();
         libm::pow(extent, 1.0 / self.count() as f64)
     }
 
-    /// Poisson's ratio of bond-based laws.
+    /// Poisson's ratio of bond-based laws, where they have a fixed one.
     pub fn bond_based_poisson_ratio(self) -> f64 {
         match self {
             Self::PlaneStress { .. } => 1.0 / 3.0,
@@ -66,7 +66,8 @@ impl Dimension {
         }
     }
 
-    /// Bond-based laws allow any Poisson's ratio: true for a bar in uniaxial stress, whose stiffness is E.
+    /// Whether bond-based laws allow any Poisson's ratio. This is true for a bar in uniaxial stress, whose
+    /// stiffness is E.
     pub fn allows_any_poisson_ratio(self) -> bool {
         matches!(
             self,
@@ -77,7 +78,7 @@ impl Dimension {
         )
     }
 
-    /// Strain is 0 across the directions of the setting.
+    /// Whether the strain perpendicular to the plane or bar is 0.
     pub fn is_confined(self) -> bool {
         matches!(
             self,
@@ -89,7 +90,7 @@ impl Dimension {
         )
     }
 
-    /// The name in messages.
+    /// Name of the dimension and its condition, for messages.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};
         match self {
@@ -103,7 +104,7 @@ impl Dimension {
         }
     }
 
-    /// Description of the condition across a bar.
+    /// Description of the condition perpendicular to a bar; `None` in 2-D and 3-D.
     pub fn constraint(self) -> Option<&'static str> {
         match self {
             Self::Line { constraint, .. } => Some(match constraint {

@@ -1,6 +1,6 @@
 //! Isotropic elastic constants, computed from any two.
 
-/// The elastic constants of a deck.
+/// An elastic constant that a deck can give.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Constant {
     /// Young's modulus E, Pa.
@@ -25,7 +25,7 @@ pub struct Isotropic {
 }
 
 impl Isotropic {
-    /// From two different constants in any order; `None` if no stable solid has both.
+    /// Compute both from two different constants in any order; `None` if no stable solid has these values.
     pub fn from_two(a: (Constant, f64), b: (Constant, f64)) -> Option<Self> {
         use Constant::{Bulk, Lame, Poisson, Shear, Young};
         let order = |constant| match constant {

@@ -1,7 +1,7 @@
 //! The error type of the crate, and warnings. An error has a message for the user and a category.
 //!
-//! Both may name bytes of the deck by a span. [`Deck::locate`](crate::deck::Deck::locate) turns it into file,
-//! line and column.
+//! An error or warning may refer to bytes of the deck by a span. [`Deck::locate`](crate::deck::Deck::locate)
+//! converts the span to file, line and column.
 
 use std::fmt;
 use std::ops::Range;
@@ -13,28 +13,28 @@ pub enum ErrorKind {
     Input,
     /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
     Run,
-    /// A signal has ended the run before its first step: exit code 75, that of sysexits.h for "try
+    /// A signal has stopped the run before its first step: exit code 75, which `sysexits.h` defines as "try
     /// again".
     Stopped,
 }
 
-/// An error whose message names the key or the file and what is allowed.
+/// An error. The message names the wrong key or file, and what is allowed.
 #[derive(Debug, Clone)]
 pub struct Error {
     /// Category of the error.
     pub kind: ErrorKind,
     /// The message, without a leading `error:`; may span several lines.
     pub message: String,
-    /// Bytes of the deck that are wrong, unless the message names them.
+    /// Span of the wrong text in the deck; `None` if the message contains its location.
     pub span: Option<Range<usize>>,
 }
 
-/// A warning: something is allowed but probably a mistake.
+/// A warning: an allowed setting that is probably a mistake.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
     /// The message, without a leading `warning:`; one line.
     pub message: String,
-    /// Bytes of the deck that the warning refers to, unless the message names them.
+    /// Span of the text in the deck that the warning refers to; `None` if the message contains its location.
     pub span: Option<Range<usize>>,
 }
 
@@ -44,7 +44,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// A user's text for a message: in backticks, without control characters, and not too long.
+/// Format a user's text for a message: in backticks, without control characters, at most [`EXCERPT`]
+/// characters.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {
@@ -69,22 +70,22 @@ impl Error {
         }
     }
 
-    /// A wrong deck or wrong arguments.
+    /// Create an error about a wrong deck or wrong arguments.
     pub fn input(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Input, message)
     }
 
-    /// A run that failed.
+    /// Create an error about a run that failed.
     pub fn run(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Run, message)
     }
 
-    /// A run that a signal has ended before its first step.
+    /// Create an error for a run that a signal has stopped before its first step.
     pub fn stopped(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Stopped, message)
     }
 
-    /// The error, about these bytes of the deck.
+    /// Return the error with a span in the deck.
     pub fn at(self, span: &Range<usize>) -> Self {
         Self {
             span: Some(span.clone()),
@@ -92,7 +93,7 @@ impl Error {
         }
     }
 
-    /// Stopped by a signal, which is no failure.
+    /// Whether a signal has stopped the run, which is not a failure.
     pub fn is_stop(&self) -> bool {
         self.kind == ErrorKind::Stopped
     }
@@ -117,7 +118,7 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {}
 
 impl Warning {
-    /// A warning without a span in the deck.
+    /// Create a warning without a span in the deck.
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: message.into(),
@@ -125,7 +126,7 @@ impl Warning {
         }
     }
 
-    /// The warning, about these bytes of the deck.
+    /// Return the warning with a span in the deck.
     pub fn at(self, span: &Range<usize>) -> Self {
         Self {
             span: Some(span.clone()),

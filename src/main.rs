@@ -9,8 +9,8 @@ fn main() -> ExitCode {
     cli::main()
 }
 
-/// Return large arrays to the system as soon as they are freed, because the arrays of the set-up are as large as those
-/// of the run.
+/// Make the allocator return large arrays to the system as soon as they are freed. Otherwise, the memory of the
+/// set-up, which is as large as that of the run, would stay allocated.
 fn give_memory_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: only sets a parameter of the allocator, before there is another thread.

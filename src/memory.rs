@@ -2,23 +2,23 @@
 
 use std::fs;
 
-/// Size below which allocations are not checked, to save system calls, bytes. As much is reserved for
-/// other allocations.
+/// Allocations below this size (bytes) are not checked, to save system calls. A check leaves this much memory
+/// for other allocations.
 const LARGE: u64 = 64 << 20;
 
 /// Insufficient memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shortage {
-    /// Needed, bytes.
+    /// Needed memory, bytes.
     pub needed: u64,
-    /// Available to this process, bytes.
+    /// Memory available to this process, bytes.
     pub available: u64,
 }
 
 /// Check that this process can allocate `needed` more bytes.
 ///
 /// # Errors
-/// If it cannot.
+/// If the available memory is too small.
 pub fn check_room(needed: u64) -> Result<(), Shortage> {
     if needed < LARGE {
         return Ok(());

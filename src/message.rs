@@ -1,9 +1,9 @@
-//! Parts of messages: numbers and names as users read them.
+//! Parts of messages: numbers in short form, and suggestions for misspelled names.
 
-/// Longest name for which similar names are searched.
+/// Longest name for which [`nearest`] searches similar names, bytes.
 const LONGEST_NAME: usize = 64;
 
-/// A number for a message; with an exponent where it would be a long row of digits.
+/// Format a number for a message. Very large and very small numbers have an exponent.
 pub fn format_number(value: f64) -> String {
     match value.abs() {
         0.0 | 1e-3..1e6 => value.to_string(),

@@ -1,12 +1,12 @@
-//! Random numbers of points, such as the scatter of positions and strengths: they follow from a seed and the id of a point alone, so
-//! they do not depend on ranks, threads or restarts.
+//! Random numbers of points, such as the scatter of positions and strengths. They depend only on a seed and
+//! the id of a point, so they are the same for any number of ranks and threads and after a restart.
 
-/// What is scattered; each has random numbers of its own.
+/// A scattered quantity. The random numbers of different quantities are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scattered {
-    /// A component of the position.
+    /// A component of the position of a point.
     Position(usize),
-    /// The strength.
+    /// The strength of a point.
     Strength,
     /// A component of a vector that probes a matrix.
     Probe(usize),
@@ -15,22 +15,22 @@ pub enum Scattered {
 /// A Weibull distribution of strengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weibull {
-    /// The modulus m.
+    /// The modulus m: the larger m, the smaller the scatter.
     pub modulus: f64,
-    /// The seed.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
 impl Weibull {
-    /// The strength of a point divided by the characteristic strength: (−ln u)^(1/m). It is below x with a probability
-    /// of 1 − exp(−x^m).
+    /// The strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform random
+    /// number u. The probability that it is below x is 1 − exp(−x^m).
     pub fn strength(self, id: u64) -> f64 {
         let survival = uniform(self.seed, Scattered::Strength, id);
         libm::pow(-libm::log(survival), 1.0 / self.modulus)
     }
 }
 
-/// A random number between 0 and 1, both excluded, evenly distributed.
+/// Return a random number with a uniform distribution between 0 and 1, both excluded.
 pub fn uniform(seed: u64, what: Scattered, id: u64) -> f64 {
     let stream = match what {
         Scattered::Position(component) => component as u64,
@@ -38,11 +38,12 @@ pub fn uniform(seed: u64, what: Scattered, id: u64) -> f64 {
         Scattered::Probe(component) => 4 + component as u64,
     };
     let hash = mix(mix(mix(seed) ^ stream) ^ id);
-    // The middle of one of 2⁵² equal intervals, which is a float.
+    // The middle of one of 2⁵² equal intervals: this number is exact in floating point.
     ((hash >> 12) as f64 + 0.5) * 0.5_f64.powi(52)
 }
 
-/// A step of the generator SplitMix64 (Steele, Lea & Flood 2014): a bijection whose result looks random.
+/// Compute a step of the generator SplitMix64 (Steele, Lea & Flood 2014): a bijection with pseudo-random
+/// results.
 fn mix(value: u64) -> u64 {
     let mut mixed = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -56,13 +57,15 @@ mod tests {
 
     const COUNT: u64 = 20_000;
 
-    /// The largest difference of an empirical distribution function of so many values from the true one that is exceeded
-    /// once in a million samples (Dvoretzky, Kiefer & Wolfowitz, with Massart's constant).
+    /// Bound on the largest difference between the empirical distribution function of `count` values and the
+    /// true one. One in a million samples exceeds the bound (Dvoretzky, Kiefer & Wolfowitz, with Massart's
+    /// constant).
     fn bound(count: u64) -> f64 {
         (libm::log(2e6) / (2.0 * count as f64)).sqrt()
     }
 
-    /// The largest difference between the empirical distribution function of values and another one.
+    /// Compute the largest difference between the empirical distribution function of values and a given
+    /// distribution.
     fn difference(mut values: Vec<f64>, distribution: impl Fn(f64) -> f64) -> f64 {
         values.sort_by(f64::total_cmp);
         let count = values.len() as f64;

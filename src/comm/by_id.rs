@@ -1,8 +1,8 @@
 //! Redistribution of point values between owners and ranges of consecutive global ids.
 //!
-//! Files store points by id, so they do not depend on the number of ranks. Ids of refined levels are m + k
-//! n, where n is the number of level-0 points and k ≥ 1. In files, such a point follows the level-0 point
-//! m.
+//! Files store points by id, so files do not depend on the number of ranks. Points of refined levels have the
+//! id m + k n, where n is the number of level-0 points and k ≥ 1. In files, such a point follows the level-0
+//! point m.
 
 use std::ops::Range;
 
@@ -11,13 +11,13 @@ use rayon::prelude::*;
 
 use super::Communicator;
 
-/// The plan between the owned points of a rank and its range of ids.
+/// The exchange plan between the owned points of a rank and its range of ids.
 pub struct IdOrder {
     first: u64,
     count: usize,
-    /// For each rank: the owned points with ids in its range.
+    /// For each rank, the owned points of this rank whose ids are in its range.
     owned: Vec<Vec<u32>>,
-    /// For each rank: the rows of this rank's range of ids that it owns.
+    /// For each rank, the rows of this rank's range of ids whose points it owns.
     rows: Vec<Vec<u32>>,
 }
 
@@ -28,7 +28,7 @@ impl IdOrder {
         let size = comm.size() as u64;
         let border =
             |rank: u64| (u128::from(coarsest) * u128::from(rank) / u128::from(size)) as u64;
-        // The estimate can be one too low, because the limits are rounded down.
+        // The estimate may be one too low, because the limits of the ranges are rounded down.
         let home = |id: u64| {
             let id = id % coarsest;
             let guess = (u128::from(id) * u128::from(size) / u128::from(coarsest)) as u64;
@@ -66,7 +66,7 @@ impl IdOrder {
         }
     }
 
-    /// Number of points in the ranges of ids of the ranks before this one.
+    /// Number of points in the ranges of ids of all lower ranks.
     pub fn first(&self) -> u64 {
         self.first
     }
@@ -140,9 +140,9 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
     std::iter::once(0).chain(ends).collect()
 }
 
-/// Send rows of `values` to each rank. Write the received rows to a new array of length `size`.
+/// Send rows of `values` to the other ranks. Write the received rows to a new array of length `size`.
 ///
-/// `from_rows` and `to_rows` list the rows per rank. `from` and `to` map a row to its range.
+/// `from_rows` and `to_rows` list the rows for each rank. `from` and `to` map a row to its range of values.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),
@@ -202,7 +202,7 @@ mod tests {
                 let block = order.collect(comm, &values, 2);
                 assert_eq!(order.spread(comm, &block, 2), values);
                 assert_eq!(block.len(), 2 * order.count());
-                // Rows with id mod 3 entries.
+                // The row of a point has id mod 3 entries.
                 let length = |id: u64| (id % 3) as u32;
                 let lengths: Vec<u32> = ids.iter().map(|id| length(*id)).collect();
                 let block_ids = order.first()..order.first() + order.count() as u64;

@@ -26,7 +26,7 @@ pub struct Traffic {
     pub messages: u64,
     /// Bytes sent.
     pub bytes: u64,
-    /// Communication time: sending, progress and waiting, without the overlapped work.
+    /// Communication time: sending, calls that drive progress, and waiting, without the overlapped work.
     pub time: Duration,
 }
 
@@ -62,7 +62,7 @@ impl Halo {
         self.neighbours.len()
     }
 
-    /// Renumber the owned points; `new_index` maps old to new local indices.
+    /// Renumber the owned points. `new_index` maps old local indices to new ones.
     pub fn renumber(&mut self, new_index: &[u32]) {
         for neighbour in &mut self.neighbours {
             for index in &mut neighbour.send {
@@ -71,7 +71,7 @@ impl Halo {
         }
     }
 
-    /// Update the ghost entries of `components`, arrays over the local points. Collective.
+    /// Update the ghost entries of `components`, which are arrays over the local points. Collective.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, components: &mut [&mut [f64]]) {
         self.pack(components.iter().map(|component| &**component));
         self.exchange(comm, &mut |_| {});

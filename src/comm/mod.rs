@@ -1,8 +1,8 @@
 //! Communication between ranks. No other folder calls MPI.
 //!
-//! All other code uses [`Communicator`]: a few collective operations and one halo exchange that
-//! overlaps with computation. It has two implementations: [`mpi::World`], and [`threads`] for one rank
-//! without MPI and for tests with several ranks in one process.
+//! All other code uses [`Communicator`]: a few collective operations, and a halo exchange that overlaps with
+//! computation. It has two implementations: [`mpi::World`], and [`threads`] for one rank without MPI and for
+//! tests with several ranks in one process.
 
 mod by_id;
 mod file_sync;
@@ -54,7 +54,7 @@ pub trait Communicator {
     /// Replace `data` on every rank by that of rank `root`.
     fn broadcast(&self, root: usize, data: &mut Vec<u8>);
 
-    /// Send `outgoing[q]` to rank q; return the received buffers by rank.
+    /// Send `outgoing[q]` to rank q. Return the received buffers by rank.
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
 
     /// Gather the bytes of all ranks, concatenated in rank order. Ranks may have different numbers of
@@ -63,8 +63,8 @@ pub trait Communicator {
 
     /// Send and receive all buffers, and call `during` while messages are in flight.
     ///
-    /// Large messages progress only inside MPI calls. So `during` should call its argument from time to
-    /// time. This call drives progress and returns true while any message is in flight.
+    /// Large messages progress only inside MPI calls. Therefore `during` should call its argument from time
+    /// to time. This call drives progress and returns true while any message is in flight.
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>);
 
     /// Abort all ranks after an error that they can no longer report collectively.
@@ -112,8 +112,8 @@ pub struct Found<T, const N: usize = 1> {
     pub payload: T,
 }
 
-/// Find the candidate with the least key over all ranks; among equal keys, that with the least ids. `None`
-/// if there are no candidates. The result is the same on all ranks. Collective.
+/// Find the candidate with the smallest key over all ranks. Among equal keys, it is the candidate with the
+/// smallest ids. `None` if there are no candidates. The result is the same on all ranks. Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,
@@ -140,7 +140,7 @@ where
     found.min_by(|a: &Found<T, N>, b| a.key.total_cmp(&b.key).then(a.ids.cmp(&b.ids)))
 }
 
-/// The sum of `value` over the lower ranks, and the sum over all ranks.
+/// The sum of `value` over the lower ranks, and the sum over all ranks. Collective.
 pub fn scan(comm: &dyn Communicator, value: u64) -> (u64, u64) {
     let values = all_gather(comm, value);
     let before = values[..comm.rank()].iter().sum();

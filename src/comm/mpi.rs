@@ -29,9 +29,9 @@ const _: () = assert!(
      run `cargo clean -p mpi-sys`"
 );
 
-/// Whether the bindings are those of Open MPI.
+/// Whether `mpi-sys` was built for Open MPI.
 const OF_OPEN_MPI: bool = {
-    // The constant of Open MPI's bindings, if present, shadows the fallback below.
+    // If the bindings are those of Open MPI, their constant shadows the fallback below.
     #[allow(unused_imports)]
     use mpi_sys::*;
     OMPI_MAJOR_VERSION > 0
@@ -62,7 +62,7 @@ fn name_and_version(text: &str) -> String {
 
 /// All ranks that `mpirun` started; one rank without `mpirun`.
 ///
-/// It is not `Send`, for any type of the MPI library's handles:
+/// `World` is not `Send`, whatever types the handles of the MPI library have:
 ///
 /// ```compile_fail,E0277
 /// fn move_to_a_thread<T: Send>() {}
@@ -70,15 +70,15 @@ fn name_and_version(text: &str) -> String {
 /// ```
 pub struct World {
     world: SimpleCommunicator,
-    /// Reused, so that an exchange in the time loop does not allocate.
+    /// Request handles, whose memory is reused so that exchanges in the time loop do not allocate.
     requests: RefCell<Vec<MPI_Request>>,
     _not_send: PhantomData<*const ()>,
-    // Dropped last: it calls MPI_Finalize.
+    // This field is dropped last, because its drop calls `MPI_Finalize`.
     _universe: Universe,
 }
 
 impl World {
-    /// Starts MPI.
+    /// Start MPI.
     ///
     /// # Errors
     /// If MPI is already running in this process or lacks `MPI_THREAD_FUNNELED`.
@@ -98,12 +98,12 @@ impl World {
         })
     }
 
-    /// The empty set of requests; all previous ones have completed.
+    /// Take the empty set of requests; all earlier requests have completed.
     fn in_flight(&self) -> InFlight<'_> {
         InFlight(self.requests.borrow_mut())
     }
 
-    /// The number of hosts that the ranks run on.
+    /// Number of hosts on which ranks run.
     pub fn hosts(&self) -> usize {
         let name = mpi::environment::processor_name().unwrap_or_default();
         let outgoing = (0..self.size())
@@ -128,8 +128,8 @@ impl World {
     }
 }
 
-/// Non-blocking messages in flight. Drop waits for all of them, also during unwinding, so MPI never
-/// accesses a freed buffer.
+/// Non-blocking messages in flight. Drop waits for all messages, also during unwinding, so MPI never accesses
+/// a freed buffer.
 struct InFlight<'a>(RefMut<'a, Vec<MPI_Request>>);
 
 impl InFlight<'_> {
@@ -163,7 +163,8 @@ impl InFlight<'_> {
     /// The bytes must stay valid and unaccessed until `self` is dropped, and `self` must be dropped.
     unsafe fn receive(&mut self, bytes: &mut [u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks_mut(LARGEST_MESSAGE) {
-            // SAFETY: as for sending. MPI aborts the job if a message is longer than the chunk.
+            // SAFETY: the caller keeps the chunk valid and unaccessed, and its length fits a C integer. MPI
+            // aborts the job if a message is longer than the chunk.
             self.0.push(unsafe {
                 let mut request = mpi_sys::RSMPI_REQUEST_NULL;
                 mpi_sys::MPI_Irecv(
@@ -285,7 +286,7 @@ impl Communicator for World {
             self.world.all_gather_varcount_into(own, &mut parts);
             return all;
         }
-        // The displacements may not fit in 32 bits.
+        // Displacements of a single call may not fit in 32 bits, so each rank broadcasts its part.
         let mut rest = &mut all[..];
         for (rank, size) in sizes.into_iter().enumerate() {
             let (part, others) = rest.split_at_mut(size as usize);
@@ -311,7 +312,7 @@ impl Communicator for World {
         }
         for peer in buffers.iter() {
             let bytes = bytemuck::cast_slice(&peer.send);
-            // SAFETY: as above.
+            // SAFETY: `buffers` outlives `in_flight`, and its send parts are not changed before the drop.
             unsafe { in_flight.send(bytes, peer.rank, HALO_TAG) };
         }
         during(&mut || in_flight.advance());

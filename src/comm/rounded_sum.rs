@@ -1,13 +1,13 @@
 //! Sums of terms that are rounded to multiples of one unit.
 //!
-//! A sum of integers does not depend on the order of the terms. So the sum is bitwise the same for any
-//! number of ranks and threads. It needs 8 bytes, an [`ExactSum`](super::ExactSum) 560 bytes. The error is
-//! at most half a unit per term. Use it for sums that must be reproducible but not exact.
+//! A sum of integers does not depend on the order of the terms. It is therefore bitwise the same for any
+//! number of ranks and threads. A rounded sum needs 8 bytes, an [`ExactSum`](super::ExactSum) 560 bytes. The
+//! error is at most half a unit per term. Use rounded sums if the sum must be reproducible but not exact.
 
-/// Bits of the magnitude of a sum.
+/// Number of bits for the magnitude of a sum.
 const BITS: i32 = 62;
 
-/// The largest exponent of the factor; with it, the factor and its inverse are finite.
+/// Largest exponent of the factor, so that the factor and its inverse are finite.
 const MOST: i32 = 1000;
 
 /// The unit of the terms: a power of 2.
@@ -18,8 +18,8 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// The smallest unit with which a sum of `terms` terms of at most this magnitude does not overflow.
-    /// `None` if the magnitude is 0 or not finite.
+    /// The smallest unit for which the sum of `terms` terms does not overflow. No term may exceed
+    /// `magnitude`. `None` if the magnitude is 0 or not finite.
     pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
         if magnitude == 0.0 || !magnitude.is_finite() {
             return None;
@@ -33,13 +33,13 @@ impl Unit {
         })
     }
 
-    /// Round a term to a number of units.
+    /// Round a term to an integer number of units.
     #[inline]
     pub fn round(self, term: f64) -> i64 {
         libm::rint(term * self.factor) as i64
     }
 
-    /// The value of a sum of units.
+    /// Convert a sum of units to a number.
     #[inline]
     pub fn value(self, sum: i64) -> f64 {
         sum as f64 * self.size

@@ -7,7 +7,7 @@
 use super::Communicator;
 
 const LIMB_BITS: usize = 32;
-/// The range 2⁻¹⁰⁷⁴ … 2¹⁰²³ needs 2098 bits; two more limbs are for the carries of 2⁶³ terms.
+/// The range 2⁻¹⁰⁷⁴ … 2¹⁰²³ needs 2098 bits. Two more limbs hold the carries of 2⁶³ terms.
 const LIMBS: usize = 2098_usize.div_ceil(LIMB_BITS) + 2;
 /// Each term adds less than 2³² to a limb, so 2³⁰ terms fit before a carry.
 const TERMS_BEFORE_CARRY: u32 = 1 << 30;

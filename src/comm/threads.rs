@@ -1,11 +1,11 @@
-//! Ranks as threads of one process: for one rank without MPI, and for tests with several.
+//! Ranks as threads of one process: for one rank without MPI, and for tests with several ranks.
 
 use std::sync::{Arc, Barrier, Mutex};
 
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 
-/// The shared state of the ranks: a barrier, and a buffer for one message per pair of ranks. The buffer of
-/// a rank with itself is also used for its contribution to an all-gather.
+/// The state that the ranks share: a barrier, and a buffer for one message per pair of ranks. An all-gather
+/// uses the buffer of a rank with itself.
 struct Shared {
     barrier: Barrier,
     slots: Vec<Mutex<Vec<u8>>>,
@@ -61,7 +61,7 @@ impl ThreadRank {
             .expect("no rank panics while it holds a slot")
     }
 
-    /// Gather the values of all ranks, in rank order. All ranks have the same number of values.
+    /// Gather the values of all ranks, in rank order. All ranks must have the same number of values.
     fn gather<T: bytemuck::Pod>(&self, values: &[T]) -> Vec<Vec<T>> {
         let all = self.all_gather(bytemuck::cast_slice(values));
         let rows = (0..self.size).map(|rank| &all[rank * size_of_val(values)..]);

@@ -7,7 +7,7 @@ use crate::partition::Domain;
 
 use super::grid::GridFrame;
 
-/// Lines per tile in y and in z; a tile and its neighbours fit in the cache.
+/// Number of lines per tile in y and in z; a tile and its neighbours fit in the cache.
 const TILE: i64 = 8;
 
 /// A sort record of a grid point.
@@ -34,10 +34,10 @@ impl GridPoint {
 
 /// Sort the owned points of a domain.
 ///
-/// - Up to eight grid points adjacent along x get consecutive local indices. If one of them is a
-///   border point, all count as border points.
+/// - Up to eight grid points adjacent along x get consecutive local indices. If one of them is a border
+///   point, all of them count as border points.
 /// - Interior points come before border points.
-/// - Within each of these, points on no grid come first, in their previous order; the points of each grid
+/// - Both groups begin with the points that are on no grid, in their previous order. The points of each grid
 ///   follow.
 pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     if frames.is_empty() {

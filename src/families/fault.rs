@@ -7,7 +7,8 @@ use crate::points::Point;
 use crate::problem::Problem;
 use crate::problem::{Body, PointSource};
 
-/// Upper limit on the neighbours of a point, which is reached at a horizon of 16 spacings in 3-D and 80 in 2-D.
+/// Upper limit on the number of neighbours of a point. It is reached at a horizon of 16 spacings in 3-D and
+/// 80 in 2-D.
 pub const MOST_NEIGHBOURS: f64 = 20_000.0;
 
 /// An error of building families.
@@ -19,14 +20,14 @@ pub enum Fault {
     TooManyNeighbours {
         /// The blocks of the point and of its neighbours.
         blocks: [usize; 2],
-        /// Estimated number of neighbours, if it is known.
+        /// Estimated number of neighbours; `None` if it is not known.
         neighbours: Option<f64>,
-        /// Ratio of the horizon to the spacing of the neighbours, if they lie on a lattice.
+        /// Ratio of the horizon to the spacing of the neighbours; `None` if they do not lie on a lattice.
         spacings: Option<f64>,
     },
     /// Bonds that do not fit in memory.
     TooLittleMemory {
-        /// The blocks joined by most of the bonds.
+        /// The pair of blocks with the most bonds.
         blocks: [usize; 2],
         /// Needed and available memory.
         shortage: Shortage,
@@ -36,7 +37,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The error message, with the deck key that causes it.
+    /// Create the error message, with the deck key that causes the error.
     pub fn error(&self, problem: &Problem) -> Error {
         match self {
             Self::SamePlace(points) => same_place(problem, points),
@@ -124,7 +125,8 @@ fn too_many_neighbours(
     let [near, other] = blocks.map(|block| problem.block(block));
     let (body, other) = (near.body, other.body);
     let key = horizon_key(problem, body);
-    // The longest bond may exceed the horizon by part of a cell, so compute the ratio from the deck's horizon.
+    // The longest bond may exceed the horizon by part of a cell, so the ratio is computed from the deck's
+    // horizon.
     let spacings = match &other.points {
         PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),
         PointSource::File { .. } | PointSource::Mesh { .. } => spacings,

@@ -8,10 +8,10 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::offset::most_neighbours;
 use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
-/// Build the families of a domain, sorted by block pair, and the layouts of the grids.
+/// Build the families of a domain, sorted by pair of blocks, and the layouts of the grids.
 ///
-/// The domain has been [arranged](super::arrange) for these grids. `cutoffs` is the symmetric
-/// `blocks` × `blocks` matrix of longest bonds, m.
+/// The domain must have been [arranged](super::arrange) for these grids. `cutoffs` is the symmetric `blocks`
+/// × `blocks` matrix of longest bonds, m.
 ///
 /// # Errors
 /// If two points coincide, a point would have too many neighbours, or memory is insufficient.
@@ -48,7 +48,8 @@ pub fn find(
         .iter()
         .map(layout)
         .collect::<Result<Vec<_>, Fault>>()?;
-    // Grid::new has checked the points of one grid for coincidence; the list search checks the others.
+    // `Grid::new` has checked that points of the same grid do not coincide. The list search checks all other
+    // points.
     let listed: Vec<f64> = cutoffs
         .iter()
         .enumerate()

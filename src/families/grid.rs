@@ -2,7 +2,7 @@
 //!
 //! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
-//!   last. Lines are stored without gaps.
+//!   last. Lines are stored one after the other without gaps.
 //! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two
 //!   bands, and no line covers the space between them.
 
@@ -20,7 +20,7 @@ use super::offset::steps;
 /// The block number of a hole.
 pub(super) const HOLE: u16 = u16::MAX;
 
-/// Slots copied by one task.
+/// Number of slots that one task copies.
 const CHUNK: usize = 4096;
 
 /// The origin and spacing of a grid and the blocks on it.
@@ -41,7 +41,7 @@ impl GridFrame {
     }
 }
 
-/// Points with consecutive slots and consecutive local indices.
+/// A run: points with consecutive slots and consecutive local indices.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     slot: u32,
@@ -64,11 +64,11 @@ pub(super) struct Line {
 
 /// The layout of a grid's local points, including ghosts.
 ///
-/// Holes pad the layout at both ends. So a load of eight slots at any offset from an occupied slot
-/// stays in bounds.
+/// Holes pad the layout at both ends. Therefore a load of eight slots is in bounds at any offset from an
+/// occupied slot.
 #[derive(Debug)]
 pub struct Grid {
-    /// The grid.
+    /// Origin, spacing and blocks of the grid.
     pub frame: GridFrame,
     pub(super) lines: Vec<Line>,
     /// Block of the point in each slot, or [`HOLE`].
@@ -124,8 +124,8 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // Padding, so that every x of a band, plus the longest bond, is in bounds relative to each of its
-        // lines.
+        // Width of the padding. Any x of a band, plus or minus the longest bond, must be in bounds relative
+        // to each line of the band.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];
@@ -173,7 +173,7 @@ impl Grid {
         self.blocks.len()
     }
 
-    /// The slots and local indices of the owned points, by slot.
+    /// The slots and local indices of the owned points, in the order of slots.
     pub(super) fn owned(&self) -> impl Iterator<Item = (usize, u32)> {
         let (runs, _) = &self.runs[0];
         runs.iter()
@@ -198,7 +198,7 @@ impl Grid {
         Some(&self.lines[*index as usize])
     }
 
-    /// Scatter the values of the selected local points to their slots.
+    /// Copy the values of the selected local points to their slots.
     pub fn update(&self, which: Which, values: &[f64], slots: &mut [f64]) {
         let kinds = match which {
             Which::Owned => 0..1,
@@ -219,7 +219,8 @@ impl Grid {
             });
     }
 
-    /// Split a range of owned points into ranges with consecutive slots: each first slot and its points.
+    /// Split a range of owned points into ranges with consecutive slots. Each item is the first slot and the
+    /// range of points.
     pub fn slots_of(&self, points: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
         let end = |run: &Run| (run.point + run.length) as usize;
         let first = (self.by_point).partition_point(|run| end(run) <= points.start);
@@ -277,11 +278,11 @@ pub enum Which {
     Owned,
     /// Points owned by other ranks.
     Ghosts,
-    /// Both.
+    /// Owned points and ghosts.
     All,
 }
 
-/// The first x of each band: no point lies within `reach` steps before it.
+/// The first x of each band. No point lies within `reach` steps before the start of a band.
 fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
     let mut all: Vec<i64> = cells.iter().map(|([_, _, x], _)| *x).collect();
     all.par_sort_unstable();
@@ -310,7 +311,8 @@ fn by_point(runs: &[Run]) -> Vec<Run> {
     sorted
 }
 
-/// The longest runs of the selected slots, split at chunk boundaries, and the first run of each chunk.
+/// The longest runs of the selected slots, split at the boundaries of chunks, and the first run of each
+/// chunk.
 fn runs(points: &[u32], selected: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut starts = Vec::new();

@@ -16,10 +16,10 @@ use super::offset::{Offset, offsets};
 use super::store::{Store, bit_bytes};
 use super::vectors::{LatticeTables, Vector, Vectors, vectors};
 
-/// Vectors set up by one task.
+/// Number of vectors that one task sets up.
 const CHUNK: usize = 256;
 
-/// The bonds from points i of one block to points j of one block on the same grid.
+/// The bonds from points i of one block to points j of one block, both on the same grid.
 #[derive(Debug, Clone)]
 pub struct BondLattice {
     /// Block of i, the points that sum over these bonds.
@@ -37,12 +37,12 @@ pub struct BondLattice {
     offsets: Vec<Offset>,
     /// Whether some weights differ from 1, and whether the weights of i and j differ.
     weighted: [bool; 2],
-    /// Sorted by local index.
+    /// The vectors, sorted by local index.
     vectors: Vec<Vector>,
     /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
-    /// For each line of the grid and each line offset: the difference between slots with equal x in both
-    /// lines.
+    /// Shift for each line of the grid and each line offset: the difference between the slots of points with
+    /// equal x in both lines.
     shifts: Vec<i32>,
     /// State of the bonds: a group for each vector and offset.
     pub(super) store: Store,
@@ -63,7 +63,7 @@ impl BondLattice {
         dimension: usize,
     ) -> Result<Self, Fault> {
         let (offsets, line_offsets) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
-        // With a cutoff below the spacing, there are no offsets.
+        // If the cutoff is below the spacing, there are no offsets.
         let none = offsets.is_empty();
         let vectors = if none { Vec::new() } else { vectors(&grid) };
         let shift_bytes = size_of::<i32>() * grid.lines.len() * line_offsets.len();
@@ -77,7 +77,7 @@ impl BondLattice {
             .zip(shifts.chunks_mut(line_offsets.len().max(1)))
         {
             for ([y, z], shift) in line_offsets.iter().zip(shifts) {
-                // Without a line at the offset, there is no bond, so the shift is never used.
+                // If there is no line at the offset, no bond uses the shift.
                 if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
                     *shift = (origin(other) - origin(line)) as i32;
                 }
@@ -108,7 +108,7 @@ impl BondLattice {
         Ok(lattice)
     }
 
-    /// Set the bits of all bonds and drop the vectors without any.
+    /// Set the bits of all bonds, and remove vectors without bonds.
     fn find_bonds(&mut self) {
         let count = self.offsets.len().max(1);
         let mut intact = vec![0; self.vectors.len() * count];
@@ -392,7 +392,7 @@ impl BondLattice {
         }
     }
 
-    /// The bits of all bonds, intact or broken: a byte for each vector and offset.
+    /// The bits of all bonds, intact or broken. There is a byte for each vector and offset.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
         let mut filled = vec![0; self.store.intact.len()];

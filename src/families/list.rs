@@ -7,7 +7,7 @@ use super::neighbours::{NeighbourGroups, Neighbours};
 use super::store::{Groups, Store};
 use crate::lanes::{Lanes, WIDTH};
 
-/// Rows handled by one task.
+/// Number of rows that one task processes.
 const CHUNK: usize = 512;
 
 /// The bonds from points i of one block to points j of one block.
@@ -26,8 +26,8 @@ pub struct BondList {
     pub(super) neighbours: Neighbours,
     /// State of the bonds; the bits of padding are clear.
     pub(super) store: Store,
-    /// Volume weights of the ends i and j, 0 for padding. If those of i are `None`, all weights are 1. If
-    /// only those of j are `None`, the weights of i apply to both ends.
+    /// Volume weights of the ends i and j, 0 for padding. If the weights of i are `None`, all weights are 1.
+    /// If only those of j are `None`, the weights of i apply to both ends.
     pub(super) weights: [Option<Vec<Lanes>>; 2],
     /// The largest local index in the list, plus one.
     pub(super) reach: usize,
@@ -41,8 +41,8 @@ pub struct Row<'a> {
     pub neighbours: NeighbourGroups<'a>,
     /// State of the bonds.
     pub groups: Groups<'a>,
-    /// Volume weights of the ends i and j. If those of i are `None`, all weights are 1. If only those of j
-    /// are `None`, the weights of i apply to both ends.
+    /// Volume weights of the ends i and j. If the weights of i are `None`, all weights are 1. If only those
+    /// of j are `None`, the weights of i apply to both ends.
     pub weights: [Option<&'a [Lanes]>; 2],
 }
 
@@ -236,8 +236,8 @@ impl BondList {
         }
     }
 
-    /// Call `visit(row, point, bytes)` for each row: its index, its point and the length of its
-    /// checkpoint row.
+    /// Call `visit(row, point, bytes)` for each row. The arguments are the index of the row, its point, and
+    /// the length of its checkpoint row.
     pub fn for_each_row(&self, mut visit: impl FnMut(usize, usize, usize)) {
         let bytes = 1 + WIDTH * self.store.history_bytes_per_bond();
         for (row, point) in self.points.iter().enumerate() {

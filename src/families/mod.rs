@@ -1,8 +1,8 @@
 //! Families: the bonds between points.
 //!
 //! Bonds are stored per ordered pair of blocks, so one law applies to all bonds of a [`BlockBonds`].
-//! The sum over the bonds of a point has the same order of operations on any number of ranks: lists
-//! are sorted by global id, lattices by offset.
+//! Lists are sorted by global id, lattices by offset. Therefore the sum over the bonds of a point has the
+//! same order of operations on any number of ranks.
 
 mod arrange;
 mod fault;
@@ -41,7 +41,7 @@ pub enum BlockBonds {
     Lattice(BondLattice),
 }
 
-/// Dispatches on the storage of the bonds.
+/// Call the same method for either storage of the bonds.
 macro_rules! with {
     ($all:expr, $bonds:ident => $body:expr) => {
         match $all {
@@ -57,7 +57,7 @@ impl BlockBonds {
         with!(self, bonds => [bonds.block_i, bonds.block_j])
     }
 
-    /// Number of bonds ij, intact or broken; a bond of two owned points counts at each end.
+    /// Number of bonds ij, intact or broken. A bond between two owned points counts twice.
     pub fn bonds(&self) -> u64 {
         with!(self, bonds => bonds.bonds())
     }
@@ -87,7 +87,7 @@ impl BlockBonds {
         with!(self, bonds => bonds.for_each_neighbour(point, visit));
     }
 
-    /// The consecutive owned points that share a lane group with a point.
+    /// The range of owned points that are in the same lane group as a point.
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,
@@ -115,8 +115,8 @@ impl BlockBonds {
         with!(self, bonds => &mut bonds.store)
     }
 
-    /// Call `visit(i, bytes)` for each point with bonds: its local index and the length of its
-    /// checkpoint row. Rows are the same on any number of ranks.
+    /// Call `visit(i, bytes)` for each point with bonds. The arguments are its local index and the length of
+    /// its checkpoint row. The rows do not depend on the number of ranks.
     pub fn row_lengths(&self, mut visit: impl FnMut(usize, usize)) {
         match self {
             Self::List(list) => list.for_each_row(|_, point, length| visit(point, length)),

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use crate::lanes::WIDTH;
 
-/// Flag of [`Compact::first`]. If it is set, the other bits are an index into the full groups. Local
-/// indices are smaller than the flag.
+/// Flag of [`Compact::first`]. If it is set, the other bits are an index into the full groups. Local indices
+/// are always below this value.
 const IN_FULL: u32 = 1 << 31;
 
 /// A group of eight indices.
@@ -127,7 +127,7 @@ impl Neighbours {
     }
 }
 
-/// [`Compact::first`] of a full group.
+/// The value of [`Compact::first`] for the full group with this index.
 fn in_full(index: usize) -> u32 {
     assert!(index < IN_FULL as usize, "too many bonds for one rank");
     IN_FULL | index as u32

@@ -2,7 +2,7 @@
 
 use crate::points::distance_squared;
 
-/// The offset of one bond of every lattice point.
+/// An offset of a lattice: one bond of every point whose family is complete.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
     /// ξ, m.
@@ -19,11 +19,11 @@ pub struct Offset {
     pub weights: [f64; 2],
     /// Steps along x.
     pub(super) x: i32,
-    /// Index of the line offset.
+    /// Index of the line offset (the steps along y and z).
     pub(super) line: u32,
 }
 
-/// Steps of a spacing (m) within a length `cutoff` (m), limited by the extent of the points (m).
+/// Number of spacings (m) within a length `cutoff` (m), limited by the extent of the points (m).
 pub(super) fn steps(cutoff: f64, spacing: f64, extent: f64) -> i64 {
     let limit = (extent / spacing).ceil();
     (cutoff / spacing).floor().min(limit) as i64
@@ -41,7 +41,7 @@ pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimensio
     within.min(widths.product())
 }
 
-/// The offsets up to the length `cutoff` (m), sorted by z, y and x, and the line offsets they use.
+/// The offsets up to the length `cutoff` (m), sorted by z, y and x. Also the line offsets that occur in them.
 /// `extent` is the extent of the points per direction, m.
 pub(super) fn offsets(
     spacing: [f64; 3],

@@ -14,14 +14,15 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
 use super::neighbours::Neighbours;
 
-/// Relative tolerance of the cutoff, so that round-off does not decide whether a bond as long as the
-/// horizon exists.
+/// Relative tolerance of the cutoff. Without it, round-off would decide whether bonds as long as the horizon
+/// exist.
 const HORIZON_TOLERANCE: f64 = 1e-9;
 
-/// Points searched by one task.
+/// Number of points that one task searches.
 const CHUNK: usize = 512;
 
-/// Number of chunks that are searched before their rows are appended; it limits the buffer memory.
+/// Number of chunks that are searched before their rows are appended to the lists. It limits the memory of
+/// buffers.
 const WAVE: usize = 32;
 
 /// The longest bond (m) for a horizon (m).
@@ -29,20 +30,20 @@ pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }
 
-/// The points of a domain sorted by block, then by global id. The search returns indices into this
-/// order, so sorting them sorts a row.
+/// The points of a domain, sorted by block, then by global id. The search returns indices into this order. If
+/// these indices are sorted, the neighbours are sorted by id.
 struct Order {
     /// Local index of each sorted index.
     local: Vec<u32>,
     /// Sorted index of the first point of each block, followed by the number of points.
     first: Vec<u32>,
-    /// Bins of each block, by sorted index relative to the block's first. There is one set of bins per
-    /// block, so points without bonds to a block do not search its bins.
+    /// Bins of the points of each block, by index relative to the block's first point. Each block has
+    /// separate bins, so points without bonds to the block do not search these points.
     bins: Vec<Bins>,
 }
 
 impl Order {
-    /// `cutoffs` is the matrix of longest bonds, m.
+    /// Sort the points and build the bins. `cutoffs` is the matrix of longest bonds, m.
     fn new(points: &[Point], blocks: usize, cutoffs: &[f64]) -> Self {
         let mut keys: Vec<(u32, u64, u32)> = points
             .iter()
@@ -56,7 +57,7 @@ impl Order {
         drop(keys);
         let bins = first.windows(2).enumerate().map(|(block_j, ends)| {
             let cutoffs = cutoffs.iter().skip(block_j).step_by(blocks).copied();
-            // Most points search this block with the shortest cutoff, so the bin size follows from it.
+            // The shortest cutoff sets the bin size, because most points search this block with it.
             let shortest = cutoffs.filter(|cutoff| *cutoff > 0.0).reduce(f64::min);
             let searched = &local[ends[0] as usize..ends[1] as usize];
             let sorted = shortest.map_or(&[][..], |_| searched).iter();
@@ -70,7 +71,7 @@ impl Order {
         }
     }
 
-    /// Find another point of a block at the position of point `index`.
+    /// Find another point of a block at the same position as the point with sorted index `index`.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
         let sorted = self.first[block] as usize..self.first[block + 1] as usize;
         let points = self.local[sorted].iter().map(|k| *k as usize);
@@ -110,7 +111,7 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
             ..BondList::default()
         })
         .collect();
-    // Allocated once and reused by all waves.
+    // The chunks are allocated once and reused.
     let mut wave: Vec<Chunk> = (0..WAVE).map(|_| Chunk::default()).collect();
     for first in (0..domain.owned).step_by(WAVE * CHUNK) {
         wave.par_iter_mut().enumerate().try_for_each(|(k, chunk)| {
@@ -136,8 +137,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
     Ok(lists)
 }
 
-/// Extrapolate the memory of the lists from the fraction `done` of the points. Return an error if it does
-/// not fit.
+/// Return an error if the lists will not fit in memory. Their memory is extrapolated from the fraction `done`
+/// of the points.
 fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
     let remaining = bytes as f64 * (1.0 / done - 1.0);
@@ -149,7 +150,7 @@ fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
 }
 
 impl Chunk {
-    /// Replace the rows by those of a range of points.
+    /// Replace the rows of the chunk by those of a range of points.
     fn search(
         &mut self,
         domain: &Domain,

@@ -1,5 +1,5 @@
-//! The state of bonds in groups of eight: intact bits, breakable bits and the bond history of the law. In a
-//! list, a group contains eight neighbours of one point; in a lattice, eight points at one offset.
+//! The state of bonds in groups of eight: intact bits, breakable bits, and the bond history of the law. A
+//! group contains eight neighbours of one point in a list, or eight points at one offset in a lattice.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ pub struct Store {
     pub(super) breakable: Option<Vec<u8>>,
     /// Number of history values per bond.
     width: usize,
-    /// `width` vectors per group.
+    /// History values: `width` vectors per group.
     history: Vec<Lanes>,
 }
 
@@ -127,7 +127,7 @@ impl<'a> Groups<'a> {
     }
 }
 
-/// Bytes of a bit set with one bit per bond.
+/// Number of bytes for one bit per bond.
 pub(super) fn bit_bytes(bonds: usize) -> usize {
     bonds.div_ceil(WIDTH)
 }

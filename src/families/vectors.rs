@@ -8,7 +8,7 @@ use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
-/// Up to eight adjacent points. The slot, the local index and the line are those of the first point.
+/// Up to eight points that are adjacent along x. Slot, local index and line are those of the first point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
     pub(super) slot: u32,
@@ -26,7 +26,7 @@ pub struct VectorBonds<'a> {
     pub point: usize,
     /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Range of this vector's groups among the groups of all vectors.
+    /// Range of this vector's groups among those of all vectors, in the order of `BondLattice::whole`.
     pub bits: Range<usize>,
     /// The offsets of the lattice.
     pub offsets: &'a [Offset],
@@ -56,7 +56,7 @@ pub(super) struct LatticeTables<'a> {
     pub(super) lines: usize,
 }
 
-/// The vectors of a grid, sorted by local index; all their points are members.
+/// Create the vectors of a grid, sorted by local index. All their points are members at first.
 pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
     let mut vectors: Vec<Vector> = Vec::new();
     let mut line = 0;
@@ -153,15 +153,16 @@ impl<'a> Vectors<'a> {
 }
 
 impl VectorBonds<'_> {
-    /// The slot of the first of eight consecutive neighbours at an offset. It is in bounds even if none of
-    /// the eight bonds exists.
+    /// The slot of the first of the eight neighbours at an offset, which have consecutive slots. The slot is
+    /// in bounds even if none of the eight bonds exists.
     ///
     /// # Safety
     /// The offset must be an element of [`Self::offsets`].
     #[inline(always)]
     pub unsafe fn far(&self, offset: &Offset) -> usize {
         debug_assert!((offset.line as usize) < self.shifts.len());
-        // SAFETY: an offset's line is below the number of line offsets, and there is a shift for each.
+        // SAFETY: the line of an offset is below the number of line offsets, and each line offset has a
+        // shift.
         let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
         (self.slot as isize + (shift + offset.x) as isize) as usize
     }

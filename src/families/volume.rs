@@ -1,8 +1,8 @@
 //! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family.
 //!
-//! - `linear`: the factor falls from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families contain points
-//!   beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). In LAMMPS (Parks et al. 2008), the
-//!   same taper ends at δ.
+//! - `linear`: the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families
+//!   contain points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). In LAMMPS (Parks et
+//!   al. 2008), the factor drops from 1/2 to 0 at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
 //!   Schweitzer 2016, eq. 2). It has a closed form in 1-D and 2-D, and is computed by quadrature over slices
 //!   in 3-D.
@@ -16,28 +16,28 @@ use crate::problem::VolumeCorrection;
 
 use super::search::cutoff;
 
-/// Quadrature slices of a cell in 3-D.
+/// Number of quadrature slices of a cell in 3-D.
 const SLICES: u32 = 256;
 
-/// Resolution of cached offsets, in cell edges.
+/// Resolution of the offsets in the cache, in cell edges.
 const RESOLUTION: f64 = 1e-6;
 
-/// A quarter of the edge in units of [`RESOLUTION`]; offsets on a refined grid are multiples of it.
+/// A quarter of the edge in units of [`RESOLUTION`]. Offsets on a refined grid are multiples of a quarter.
 const QUARTER: i64 = 250_000;
 
-/// Largest size of the direct lookup table.
+/// Maximum number of entries of the lookup table.
 const MOST_MULTIPLES: usize = 1 << 17;
 
 /// Bit pattern of a table entry that has not been computed.
 const UNKNOWN: u64 = u64::MAX;
 
-/// The longest bond (m) with a positive factor, for a factor that is 0 at `length` (m). The tolerance
-/// excludes bonds whose weight is 0 except for round-off.
+/// The longest bond (m) with a positive factor, if the factor is 0 from `length` (m) on. Bonds whose factor
+/// would be round-off are excluded by a tolerance.
 fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }
 
-/// The volume correction factors for one horizon and one cell size; safe to share between threads.
+/// The volume correction factors for one horizon and one cell size. Several threads can use it at once.
 pub struct CellShare {
     correction: VolumeCorrection,
     horizon: f64,
@@ -49,14 +49,14 @@ pub struct CellShare {
     reach_squared: f64,
     /// Table entries per direction, one per quarter of the edge; 0 if the table would be too large.
     multiples: usize,
-    /// Factors (bit patterns) at multiples of a quarter of the edge.
+    /// Factors at multiples of a quarter of the edge, as bit patterns.
     table: OnceLock<Vec<AtomicU64>>,
     /// Factors at all other offsets.
     cache: Mutex<FxHashMap<[i64; 3], f64>>,
 }
 
 impl CellShare {
-    /// Factors for a horizon (m) and cells of an edge (m).
+    /// Create the factors for a horizon (m) and cells with this edge (m).
     pub fn new(correction: VolumeCorrection, horizon: f64, edge: f64, dimension: usize) -> Self {
         let mut share = Self {
             correction,
@@ -77,8 +77,8 @@ impl CellShare {
         share
     }
 
-    /// The longest bond (m) with a positive factor. For `exact`, the ball then touches a corner of the
-    /// cell.
+    /// The longest bond (m) with a positive factor. For `exact`, the ball of radius δ then touches a corner
+    /// of the cell.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {
@@ -125,7 +125,8 @@ impl CellShare {
         }
     }
 
-    /// The table entry of an offset, and the offset in quarters of the edge, if the table contains it.
+    /// The table entry of an offset, and the offset in quarters of the edge; `None` if the table does not
+    /// contain it.
     #[inline]
     fn multiple(&self, offset: [f64; 3]) -> Option<(&AtomicU64, [i64; 3])> {
         let quarters = offset.map(|x| x.abs() * self.per_resolution / QUARTER as f64);
@@ -161,7 +162,7 @@ fn ordered(mut steps: [i64; 3]) -> [i64; 3] {
     steps
 }
 
-/// The volume of a unit cell within a ball that is centred at the origin.
+/// The volume of the unit cell around `centre` that lies within a ball around the origin.
 fn overlap(centre: [f64; 3], radius: f64, dimension: usize) -> f64 {
     let range = |k: usize| [centre[k] - 0.5, centre[k] + 0.5];
     match dimension {
@@ -189,7 +190,7 @@ fn rectangle_in_disc(x: [f64; 2], y: [f64; 2], radius: f64) -> f64 {
     area.max(0.0)
 }
 
-/// The area of [0, x] × [0, y] within the disc.
+/// The area of [0, x] × [0, y] within the disc around the origin.
 fn quadrant_in_disc(x: f64, y: f64, radius: f64) -> f64 {
     if x * x + y * y <= radius * radius {
         return x * y;
@@ -198,7 +199,7 @@ fn quadrant_in_disc(x: f64, y: f64, radius: f64) -> f64 {
     if radius == 0.0 {
         return 0.0;
     }
-    // The upper boundary is the edge y up to `a`, and the circle from there on.
+    // The upper boundary of the area is the edge y up to `a`, and the circle beyond.
     let a = (radius * radius - y * y).max(0.0).sqrt().min(x);
     let under_circle = |u: f64| {
         let height = (radius * radius - u * u).max(0.0).sqrt();
@@ -212,7 +213,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// The sum over all offsets of a lattice, including ξ = 0.
+    /// Sum of the factors at all offsets of a lattice, including ξ = 0.
     fn whole(correction: VolumeCorrection, dimension: usize, horizon: f64) -> f64 {
         let share = CellShare::new(correction, horizon, 1.0, dimension);
         let reach = horizon.ceil() as i32 + 1;
@@ -274,7 +275,7 @@ mod tests {
                     let mut ordered = offset.map(f64::abs);
                     ordered.sort_by(|a, b| b.total_cmp(a));
                     let expected = overlap(ordered, horizon, 3);
-                    // All of these offsets have their own table entries, so the differences are only
+                    // The table or cache has an entry for each of these offsets, so the differences are only
                     // round-off.
                     assert!((share.at(offset) - expected).abs() < 1e-12, "{offset:?}");
                 }

@@ -2,22 +2,22 @@
 
 use std::ops::{Deref, DerefMut};
 
-/// Number of sets of a first-level cache; consecutive 64-byte lines lie in different sets.
+/// Number of sets of a first-level cache. Consecutive cache lines of 64 bytes lie in consecutive sets.
 const SETS: usize = 64;
 
-/// Offset between the starts of consecutive columns, in lines: no two of eighteen columns are within two
-/// lines of each other.
+/// Offset between the starts of consecutive columns, in cache lines. With this offset, the starts of eighteen
+/// columns are at least three lines apart, modulo [`SETS`].
 const STEP: usize = 27;
 
-/// Numbers in a line.
+/// Number of values in a cache line.
 const LINE: usize = 8;
 
 /// One of several columns of numbers that loops read at the same index.
 ///
-/// The allocator requests large arrays from the system one by one (from 1 MB on in the `fissure` command).
-/// All of them start at the same offset within a page. One index of many such columns would fall into the
-/// same set of the cache, which contains only eight or twelve lines. Therefore, each column starts some
-/// lines later than the previous one.
+/// The allocator requests large arrays from the system one by one (arrays of 1 MB and more in the `fissure`
+/// command). All of them start at the same offset within a page. Entries with the same index in many such
+/// columns would then lie in the same set of the cache, which holds only eight or twelve lines. Therefore,
+/// each column starts some cache lines later than the previous one.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,
@@ -25,7 +25,8 @@ pub struct Column {
 }
 
 impl Column {
-    /// Create column `number` of those that are read together, with `count` entries of `value`.
+    /// Create a column with `count` entries of `value`. `number` is its index among the columns that loops
+    /// read together.
     pub fn new(number: usize, count: usize, value: f64) -> Self {
         let lead = number * STEP % SETS * LINE;
         Self {

@@ -1,6 +1,6 @@
 //! Instruction sets of the loops over bonds. The best set that all ranks have is selected at run time.
 //!
-//! All sets round a product and a sum once and give bitwise the same results, see [`super::simd`].
+//! All sets round each multiply-add once and give bitwise the same results, see [`super::simd`].
 
 use crate::comm::{self, Communicator, agree};
 use crate::error::{Error, Result};
@@ -22,7 +22,7 @@ pub enum Instructions {
     Avx512(Avx512),
 }
 
-/// Environment variable with the name of the largest set to use, for tests.
+/// Environment variable with the name of the largest set that may be used, for tests.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
 /// Names of the sets that the program was built for, the smallest first.
@@ -52,12 +52,12 @@ impl Instructions {
         Self::up_to(level[0] as usize).ok_or_else(unsupported)
     }
 
-    /// The largest set that this machine has.
+    /// The largest set that this machine has; `None` if it has none of the sets.
     pub fn of_this_machine() -> Option<Self> {
         Self::up_to(BUILT.len() - 1)
     }
 
-    /// The largest set of this machine that is not above a level.
+    /// The largest set of this machine up to a level, which is an index in [`BUILT`].
     #[cfg(target_arch = "x86_64")]
     fn up_to(level: usize) -> Option<Self> {
         match Avx512::detect() {
@@ -66,7 +66,7 @@ impl Instructions {
         }
     }
 
-    /// The set of this machine.
+    /// The only set of this machine.
     #[cfg(not(target_arch = "x86_64"))]
     fn up_to(_: usize) -> Option<Self> {
         Some(Self::Portable)
@@ -84,7 +84,7 @@ impl Instructions {
         }
     }
 
-    /// Name of the set, as in the summary.
+    /// Name of the set, as printed in the summary.
     pub fn name(self) -> &'static str {
         BUILT[self.level()]
     }
@@ -99,7 +99,7 @@ fn unsupported() -> Error {
 /// Index in [`BUILT`] of the instruction set with this name.
 ///
 /// # Errors
-/// If there is none.
+/// If no set has this name.
 fn named(name: &str) -> Result<usize> {
     let short = |name: &str| name.replace('-', "").to_lowercase();
     let found = BUILT.iter().position(|known| short(known) == short(name));

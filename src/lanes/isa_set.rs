@@ -6,7 +6,7 @@
 pub enum IsaSet {
     /// AVX-512 and AVX2.
     Each,
-    /// Only AVX2, which is not much slower than AVX-512.
+    /// AVX2 only; AVX-512 would be little faster.
     Avx2,
     /// No vector instructions and no fused multiply-adds.
     One,

@@ -48,8 +48,8 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// The column of a quantity, to add to.
     fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64];
 
-    /// Whether every column has at least `entries` entries. Columns that are missing because of
-    /// [`Self::PADDED`] count as long enough.
+    /// Whether every column has at least `entries` entries. Quantities without a column, see
+    /// [`Self::PADDED`], are ignored.
     fn covers(columns: &Self::Columns<'_>, entries: usize) -> bool {
         (0..Self::COUNT).all(|k| {
             let column = Self::column(columns, k);
@@ -57,7 +57,7 @@ pub trait LaneTuple: Copy + Send + Sync {
         })
     }
 
-    /// Load each quantity from its column with `take`. Quantities without a column are 0.
+    /// Load each quantity by calling `take` with its column. Quantities without a column are 0.
     #[inline(always)]
     fn load(columns: &Self::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
         Self::each(|k| {
@@ -194,7 +194,8 @@ impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     }
 }
 
-/// At most `N` quantities; those without a column to read are 0. For laws that are known only at run time.
+/// At most `N` quantities, for laws that are known only at run time. Quantities without a column are read as
+/// 0.
 #[derive(Debug, Clone, Copy)]
 pub struct UpTo<const N: usize>([Lanes; N]);
 
@@ -312,7 +313,7 @@ impl<A: LaneTuple, B: LaneTuple> LaneTuple for (A, B) {
 #[inline(always)]
 pub unsafe fn eight(column: &[f64], first: usize) -> Lanes {
     debug_assert!(first + WIDTH <= column.len());
-    // SAFETY: passed on to the caller.
+    // SAFETY: the caller guarantees eight entries from `first` on.
     Lanes(unsafe { column.as_ptr().add(first).cast::<[f64; WIDTH]>().read() })
 }
 
@@ -325,7 +326,7 @@ pub unsafe fn gather(column: &[f64], indices: &[u32; WIDTH]) -> Lanes {
     let mut lanes = Lanes::splat(0.0);
     for (lane, index) in lanes.0.iter_mut().zip(indices) {
         debug_assert!((*index as usize) < column.len());
-        // SAFETY: passed on to the caller.
+        // SAFETY: the caller guarantees that the column is longer than the index.
         *lane = unsafe { *column.get_unchecked(*index as usize) };
     }
     lanes

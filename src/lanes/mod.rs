@@ -17,7 +17,7 @@ pub use simd::Simd;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// Number of bonds that are evaluated together.
+/// Number of lanes: eight bonds are computed together.
 pub const WIDTH: usize = 8;
 
 /// One number for each of eight bonds.
@@ -26,20 +26,21 @@ pub const WIDTH: usize = 8;
 pub struct Lanes(pub [f64; WIDTH]);
 
 impl Lanes {
-    /// The same number in all lanes.
+    /// Create a vector with the same number in all lanes.
     #[inline(always)]
     pub fn splat(value: f64) -> Self {
         Self([value; WIDTH])
     }
 
-    /// Apply a function to each lane. It is written out, because the compiler processes very many of these.
+    /// Apply a function to each lane. The lanes are written out instead of looped over, because the function
+    /// is compiled very often.
     #[inline(always)]
     fn map(self, of: impl Fn(f64) -> f64) -> Self {
         let [a, b, c, d, e, f, g, h] = self.0;
         Self([of(a), of(b), of(c), of(d), of(e), of(f), of(g), of(h)])
     }
 
-    /// Apply a function to each pair of lanes.
+    /// Apply a function to each pair of lanes, written out like [`Self::map`].
     #[inline(always)]
     fn zip(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         let (a, b) = (self.0, other.0);
@@ -61,7 +62,7 @@ impl Lanes {
         self.map(f64::sqrt)
     }
 
-    /// Exponential. It is a call per lane, with the same result on every processor.
+    /// Exponential. Each lane is a call of a function that gives the same result on every processor.
     #[inline(always)]
     pub fn exp(self) -> Self {
         self.map(libm::exp)
@@ -85,7 +86,7 @@ impl Lanes {
         self.map(f64::abs)
     }
 
-    /// A bit for each lane that is larger than `limit`.
+    /// Bits of the lanes that are larger than `limit`.
     #[inline(always)]
     pub fn above(self, limit: f64) -> u8 {
         let mut bits = 0;

@@ -1,8 +1,8 @@
-//! Operations for which compilers do not select the vector instructions, or that depend on the machine.
+//! Operations for which the compiler does not select vector instructions, or that depend on the machine.
 //!
-//! All other operations on [`Lanes`] are plain loops over eight numbers, which the compiler vectorizes.
-//! Every operation here is correctly rounded or only moves numbers. So all types give bitwise the same
-//! results, except [`Portable`] without fused multiply-add.
+//! All other operations on [`Lanes`] are plain loops over eight numbers, which the compiler vectorizes. Every
+//! operation in this module is correctly rounded or only moves numbers. Therefore all implementations give
+//! bitwise the same results, except [`Portable`] without fused multiply-add.
 
 use super::Lanes;
 
@@ -11,7 +11,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// a b + c, rounded once.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
 
-    /// A bit for each lane of `a` that is at least as large as that of `b`.
+    /// Bits of the lanes in which `a` is at least as large as `b`.
     #[inline(always)]
     fn at_least(self, a: Lanes, b: Lanes) -> u8 {
         let mut bits = 0;
@@ -42,7 +42,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Run a rarely needed task out of line, so it uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
-    /// The same value, as one vector that is opaque to the compiler. Otherwise, the compiler may split
+    /// Return the same value in a form that is opaque to the compiler. Otherwise, the compiler may split
     /// operations by lane.
     #[inline(always)]
     fn whole(self, a: Lanes) -> Lanes {
@@ -57,9 +57,9 @@ pub trait Simd: Copy + Send + Sync + 'static {
 }
 
 /// Work that can run out of line with an instruction set.
-///
-/// [`Self::run`] must be `#[inline(always)]`. A closure is not sufficient: it is a function without these
-/// instructions. If the compiler does not inline a large closure, every vector operation in it is a call.
+/// [`Self::run`] must be `#[inline(always)]`. A closure is not sufficient, because it is a separate function
+/// that is compiled without these instructions. If the compiler does not inline a large closure, every vector
+/// operation in it is a call.
 pub trait Task {
     /// The result.
     type Output;
@@ -68,7 +68,8 @@ pub trait Task {
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// Portable fallback. `ONCE` selects fused multiply-add, which is slow on processors without an instruction for it.
+/// Portable fallback. `ONCE` selects fused multiply-add, which is slow on processors without this
+/// instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Portable<const ONCE: bool>;
 
@@ -151,31 +152,31 @@ mod x86 {
 
         #[inline(always)]
         fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX2.
             unsafe { select_avx2(a, bits, otherwise) }
         }
 
         #[inline(always)]
         fn keep(self, a: Lanes, bits: u8) -> Lanes {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX2.
             unsafe { keep_avx2(a, bits) }
         }
 
         #[inline(always)]
         fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX2.
             unsafe { transpose_avx2(rows) }
         }
 
         #[inline(always)]
         fn aside<T: Task>(self, task: T) -> T::Output {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX2.
             unsafe { aside_avx2(self, task) }
         }
 
         #[inline(always)]
         fn whole(self, a: Lanes) -> Lanes {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX2.
             unsafe { joined(halves(a).map(|half| opaque_half(half))) }
         }
     }
@@ -195,31 +196,31 @@ mod x86 {
 
         #[inline(always)]
         fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { select_avx512(a, bits, otherwise) }
         }
 
         #[inline(always)]
         fn keep(self, a: Lanes, bits: u8) -> Lanes {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { keep_avx512(a, bits) }
         }
 
         #[inline(always)]
         fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { transpose_avx512(rows) }
         }
 
         #[inline(always)]
         fn aside<T: Task>(self, task: T) -> T::Output {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { aside_avx512(self, task) }
         }
 
         #[inline(always)]
         fn whole(self, a: Lanes) -> Lanes {
-            // SAFETY: as above.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { lanes(opaque(vector(a))) }
         }
     }
@@ -263,7 +264,7 @@ mod x86 {
         unsafe { std::mem::transmute(a) }
     }
 
-    /// Masks of four lanes by their four bits; all bits of a selected lane are set.
+    /// Masks of four lanes by their four bits. All 64 bits of a selected lane are set.
     static MASKS: [[u64; 4]; 16] = {
         let mut masks = [[0; 4]; 16];
         let mut bits = 0;
@@ -338,7 +339,7 @@ mod x86 {
                 let row: &[f64; 4] = rows[first + k][column..column + 4]
                     .try_into()
                     .expect("four");
-                // SAFETY: four numbers.
+                // SAFETY: the row has four numbers.
                 unsafe { _mm256_loadu_pd(row.as_ptr()) }
             };
             let (a, b, c, d) = (load(0), load(1), load(2), load(3));
@@ -410,10 +411,10 @@ mod x86 {
         [a, b, c, d, e, f, g, h].map(|column| lanes(opaque(column)))
     }
 
-    /// Make a value opaque to the compiler. The compiler then keeps the operations before and after it in
-    /// whole vectors instead of splitting them by lane. Without it, with rustc 1.95 on AMD Zen 3 (AVX2),
-    /// PMB in lists reaches only 0.68 of its rate with it, and LPS in lattices 0.75. PMB in lattices does
-    /// not need it, and correspondence is faster without it.
+    /// Make a value opaque to the compiler. The compiler then keeps the operations before and after this call
+    /// in whole vectors instead of splitting them by lane. Measured with rustc 1.95 on AMD Zen 3 (AVX2):
+    /// without this call, PMB in lists reaches only 0.68 of its rate, and LPS in lattices 0.75. PMB in
+    /// lattices does not need the call, and correspondence is faster without it.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {
@@ -472,7 +473,7 @@ mod tests {
 
     /// Check that an implementation uses fused multiply-add.
     fn rounds_once(simd: impl Simd) {
-        // (1 + e)² − 1 − 2e = e², which is lost when the result is rounded twice.
+        // (1 + e)² − 1 − 2e = e². This result is lost if multiplication and addition are rounded separately.
         let a = Lanes::splat(1.0 + f64::EPSILON);
         let c = Lanes::splat(-1.0 - 2.0 * f64::EPSILON);
         let e = f64::EPSILON;

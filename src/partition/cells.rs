@@ -4,20 +4,20 @@ use crate::comm::{self, Communicator};
 use crate::points::Point;
 use crate::points::bins::boxes;
 
-/// Number of cells that is allowed for any number of ranks.
+/// This number of cells is allowed on any number of ranks.
 const ALWAYS_ALLOWED: usize = 100_000;
 
-/// Number of cells per rank above which borders do not get smoother.
+/// Above this number of cells per rank, the borders between ranks do not get smoother.
 const SUFFICIENT_PER_RANK: usize = 2000;
 
-/// Number of cells above which there are fewer cells per rank, because one rank partitions all cells, and
-/// every rank stores all owners.
+/// Above this total, the number of cells per rank is reduced, because one rank partitions all cells, and
+/// every rank stores the owners of all cells.
 const LARGE_TOTAL: usize = 4_000_000;
 
-/// Cells per rank needed for an even partition.
+/// Number of cells per rank that an even partition needs.
 const MIN_PER_RANK: usize = 64;
 
-/// The largest number of cells for a number of ranks.
+/// The maximum number of cells for a number of ranks.
 pub fn max_cells(ranks: usize) -> usize {
     ALWAYS_ALLOWED
         .max(SUFFICIENT_PER_RANK * ranks)
@@ -32,13 +32,13 @@ pub struct Cells {
     upper: [f64; 3],
     /// Edge of a box, about the cutoff, m.
     edge: f64,
-    /// Boxes per cell edge.
+    /// Number of boxes per cell edge.
     boxes: usize,
-    /// Cells per direction.
+    /// Number of cells per direction.
     counts: [usize; 3],
 }
 
-/// The state of the cells before rebalancing.
+/// Costs and owners of the cells before a rebalance.
 pub struct CellLoads {
     /// Measured time of the points of each cell, ns.
     pub costs: Vec<u64>,
@@ -102,15 +102,16 @@ impl Cells {
         x + self.counts[0] * (y + self.counts[1] * z)
     }
 
-    /// Sort key of a position (m), by cell, then by box. Points close in space then are close in memory.
+    /// Sort key of a position (m): cell first, then box. Points that are close in space are then close in
+    /// memory.
     pub fn order(&self, position: [f64; 3]) -> u64 {
         let [x, y, z] = self.box_of(position).map(|at| at % self.boxes);
         let within = x + self.boxes * (y + self.boxes * z);
         (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
-    /// The cells adjacent across faces, edges and corners, and the directions in which each of them is
-    /// displaced.
+    /// The cells that share a face, an edge or a corner with a cell. For each of them, also the directions in
+    /// which it is displaced.
     pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
         let position = [cell % nx, cell / nx % ny, cell / nx / ny];
@@ -120,7 +121,7 @@ impl Cells {
             let displaced = offset.map(|steps| steps != 1);
             let mut other = [0; 3];
             for k in 0..3 {
-                // The offsets 0, 1, 2 mean −1, 0, +1.
+                // The offsets 0, 1, 2 stand for −1, 0, +1.
                 other[k] = (position[k] + offset[k]).checked_sub(1)?;
                 if other[k] >= counts[k] {
                     return None;

@@ -25,8 +25,8 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Permute the owned points: `order[new]` is the old local index. The first `interior` are interior
-    /// points.
+    /// Permute the owned points. `order[new]` is the old local index of the point with local index `new`. The
+    /// first `interior` points are interior points.
     pub fn reorder(&mut self, order: &[u32], interior: usize) {
         let mut new_index = vec![0; order.len()];
         for (new, old) in (0..).zip(order) {

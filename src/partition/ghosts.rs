@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! Ranks exchange the points of cells adjacent to each other's cells. Each rank then requests the points
-//! within the cutoff of one of its own points.
+//! Each rank sends its points in cells adjacent to the cells of another rank to that rank. The receiver then
+//! requests those within the cutoff of one of its owned points as ghosts.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -39,7 +39,8 @@ pub fn domain(
     let bins = Bins::new(&positions, cutoff);
     let mut border = vec![false; owned.len()];
     let mut ghosts = Vec::new();
-    // For each rank: the ids of its points that are ghosts, and their local indices.
+    // For each rank, the ids of the points that become ghosts on this rank, and the local indices of these
+    // ghosts.
     let mut requests = Vec::new();
     for bytes in offered {
         let mut candidates: Vec<Point> = received(&bytes).collect();
@@ -58,7 +59,7 @@ pub fn domain(
         ghosts.extend(candidates);
     }
 
-    // A stable partition into interior and border points.
+    // Partition the points into interior and border points, without changing the order within each group.
     let mut is_border = border.iter();
     let border_points: Vec<Point> = owned
         .extract_if(.., |_| *is_border.next().expect("one for each point"))
@@ -78,8 +79,9 @@ pub fn domain(
     }
 }
 
-/// For each rank, the points in cells adjacent to its cells. Also the indices of all points that are
-/// offered to any rank; only these can have ghosts as neighbours. `owned` is sorted by cell.
+/// Select the points of this rank that lie in cells adjacent to the cells of each other rank. Also return the
+/// indices of all points that are sent to any rank; only these points can have ghosts as neighbours. `owned`
+/// is sorted by cell.
 fn offers(
     comm: &dyn Communicator,
     cells: &Cells,
@@ -110,10 +112,8 @@ fn offers(
     (offers, edge)
 }
 
-/// Build the halo plan. Collective.
-///
-/// `requests` are the ids and local indices of the ghosts from each rank. `border` are the border
-/// points; the first has the local index `interior`.
+/// Build the halo plan. `requests` are the ids and local indices of the ghosts from each rank. `border` are
+/// the border points; the first of them has the local index `interior`. Collective.
 fn halo(
     comm: &dyn Communicator,
     requests: Vec<(Vec<u64>, Range<usize>)>,

@@ -9,13 +9,14 @@ use super::cells::{CellLoads, Cells};
 /// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
-/// Additional factor on the edge weight of bonds along x, because lane groups lie along x.
+/// Additional factor on the weight of graph edges along x: lane groups lie along x, so cuts across x are
+/// costly.
 const ALONG_X: f64 = 1.5;
 
 /// Owner of cells without points.
 pub const NO_OWNER: u32 = u32::MAX;
 
-/// Below this number of cells per part, recursive bisection is used, because the k-way method leaves parts
+/// With fewer cells per part than this, recursive bisection is used, because the k-way method leaves parts
 /// empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
@@ -24,7 +25,7 @@ const FEW_CELLS_PER_PART: usize = 30;
 /// - `occupation` is the number of points in each cell.
 /// - The weight of a cell is the number of bonds of its points. The weight of an edge is the number of
 ///   bonds across it.
-/// - With measured loads, cell weights are scaled by the cost per point, and parts are numbered so that few
+/// - With measured loads, cell weights are multiplied by the cost per point. Parts are numbered so that few
 ///   points migrate.
 ///
 /// # Errors
@@ -60,7 +61,8 @@ pub fn partition(
             if occupation[other] == 0 {
                 continue;
             }
-            // The fraction of bonded pairs decreases with the number of directions of displacement.
+            // The fraction of point pairs with bonds is smaller for cells that are displaced in several
+            // directions.
             let directions = displaced.iter().filter(|displaced| **displaced).count();
             let across = count * occupation[other] as f64 * 0.4_f64.powi(directions as i32);
             sum += across;
@@ -97,7 +99,8 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Renumber parts so that few points migrate. `current(cell)` is the present rank and the number of points.
+/// Renumber parts so that few points migrate. For a cell, `current` returns the present rank and the number
+/// of points.
 fn renumber(part: &mut [metis::Idx], ranks: usize, current: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {

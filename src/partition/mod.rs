@@ -28,8 +28,8 @@ pub fn distribute(
     distribute_by_cost(comm, pieces, total, cutoff, None)
 }
 
-/// Same as [`distribute`], with the measured cost of this rank's points. Cells are weighted by cost, and
-/// few points migrate.
+/// Same as [`distribute`], with the measured cost of this rank's points. Cells are weighted by cost, and few
+/// points migrate.
 ///
 /// # Errors
 /// Same as for [`distribute`].
@@ -44,7 +44,7 @@ pub fn distribute_by_cost(
     distribute_by_cells(comm, pieces, total, cutoff, most, cost)
 }
 
-/// The cost of a rank's points.
+/// The computing cost of a rank's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cost {
     /// Time per point, ns.
@@ -52,7 +52,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Create the cost of `points` points from their total time `time`, ns.
+    /// Create the cost of `points` points, which took `time` (ns) in total.
     pub fn of(time: u64, points: usize) -> Self {
         Self {
             each: (time / points.max(1) as u64).max(1),
@@ -60,7 +60,7 @@ impl Cost {
     }
 }
 
-/// Same as [`distribute_by_cost`], with at most `most` cells.
+/// Same as [`distribute_by_cost`], with at most `most` partition cells.
 fn distribute_by_cells(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
@@ -124,7 +124,7 @@ fn migrate(
     owned
 }
 
-/// Decode the points of a message.
+/// Decode the points of a message from another rank.
 fn received(bytes: &[u8]) -> impl Iterator<Item = Point> {
     let records = bytes.chunks_exact(size_of::<Point>());
     records.map(bytemuck::pod_read_unaligned)
@@ -158,7 +158,8 @@ mod tests {
                 let piece = all[start(comm.rank())..start(comm.rank() + 1)].to_vec();
                 let total = all.len() as u64;
                 let mut domain = distribute_by_cells(comm, piece, total, 1.0, most, None).unwrap();
-                // The exchange must set the entry of each ghost to its id.
+                // Each entry is the id of its point, so the exchange must reproduce the entries of the
+                // ghosts.
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);
                 domain.halo.pack([&ids[..]].into_iter());

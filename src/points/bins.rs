@@ -2,8 +2,8 @@
 
 use super::distance_squared;
 
-/// Boxes over a cloud of positions, with an edge of at least half the search radius. With boxes of the full
-/// radius, a search would read more points that are out of range.
+/// Boxes over a cloud of positions, for searches within a radius. The edge of a box is at least half the
+/// radius. Boxes with a full radius as edge would contain more points out of range.
 pub struct Bins {
     lower: [f64; 3],
     inverse_edge: f64,
@@ -76,15 +76,15 @@ impl Bins {
         });
     }
 
-    /// Append the index of every point with 0 < distance² ≤ `square` (m²) from a position to `found`.
-    /// Return the number of points at the position itself.
+    /// Append to `found` the index of every point with 0 < distance² ≤ `square` (m²) from a position. Return
+    /// the number of points at the position itself.
     pub fn collect(&self, position: [f64; 3], square: f64, found: &mut Vec<u32>) -> usize {
         let mut coincident = 0;
         self.for_each_run(position, square, |entries| {
             let start = found.len();
             found.resize(start + entries.len(), 0);
             let mut end = start;
-            // The loop has no branches, because the comparison is hard to predict.
+            // The loop has no branches, because the result of the comparison is hard to predict.
             for (index, other) in entries {
                 let squared = distance_squared(position, *other);
                 found[end] = *index;
@@ -107,12 +107,14 @@ impl Bins {
         if self.entries.is_empty() {
             return;
         }
-        // In box edges. The tolerance keeps points that are exactly at the radius despite round-off.
+        // Lengths are in box edges. With the tolerance, points exactly at the radius are found despite
+        // round-off.
         let radius_squared = square * (self.inverse_edge * self.inverse_edge);
         let radius_squared = radius_squared * (1.0 + 1e-6);
         let centre: [f64; 3] =
             std::array::from_fn(|k| (position[k] - self.lower[k]) * self.inverse_edge);
-        // Squared radius that remains for the other directions, after the gap to a layer of boxes.
+        // Squared radius that is left for the other directions, after the gap to a layer of boxes is
+        // subtracted.
         let remaining = |radius_squared: f64, k: usize, layer: isize| {
             let [below, above] = [layer as f64 - centre[k], centre[k] - (layer + 1) as f64];
             let gap = below.max(above).max(0.0);
@@ -177,7 +179,7 @@ mod tests {
                     .filter(|k| distance_squared(*centre, positions[*k]) <= radius * radius)
                     .collect();
                 prop_assert_eq!(&found, &expected);
-                // Search with another radius, excluding points at the position.
+                // Search with a smaller radius; the point at the position itself is not counted.
                 let square = (0.3 * radius).powi(2);
                 let mut found = Vec::new();
                 let at_position = bins.collect(*centre, square, &mut found);

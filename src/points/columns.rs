@@ -1,4 +1,4 @@
-//! Columns of a point file: named by its header or by the deck, or in the default order.
+//! Columns of a point file: named by its heading or by the deck, or in the default order.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -103,7 +103,7 @@ impl Columns {
 pub struct Layout {
     /// The columns.
     pub columns: Columns,
-    /// Offset of the heading in bytes; the heading contains no point.
+    /// Offset of the heading in bytes; `None` if the file has no heading.
     pub heading: Option<u64>,
 }
 
@@ -152,7 +152,7 @@ pub fn layout(
     Ok(Ok(layout))
 }
 
-/// The heading of a file: its first row, if that contains no number.
+/// The heading of a file: the first row, if it contains no number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
     /// Entries of the heading, without quotes.
@@ -187,7 +187,7 @@ pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
             0 => row.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&row),
             _ => &row[..],
         };
-        // A row that is too long or not text is reported later, when the rows are read.
+        // A row that is too long or is not text is reported when the rows are read.
         let Some(text) = std::str::from_utf8(bytes).ok().map(str::trim) else {
             return Ok(None);
         };

@@ -70,8 +70,8 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     }
 }
 
-/// Test with bounding boxes whether a bond of a length (m) from a position (m) can cross the crack. False
-/// positives occur.
+/// Test with bounding boxes whether a bond can cross the crack. The bond starts at a position (m) and has at
+/// most this length (m). The result may be true for bonds that do not cross.
 pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     let (corners, width) = match crack {
         Crack::Segment { from, to, width } => ([*from, *to, *from, *to], width),
@@ -103,8 +103,8 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     })
 }
 
-/// The part of a bond between the faces of a crack with mid-plane through `origin`. Without width, both
-/// ends are the point where the bond crosses the plane.
+/// Part of a bond between the faces of a crack whose mid-plane contains `origin`. For a crack without width,
+/// both ends of the part are the point where the bond crosses the plane.
 fn between_faces(
     origin: Vector,
     normal: Vector,
@@ -119,7 +119,7 @@ fn between_faces(
     within(bond, height, [-0.5, 0.5])
 }
 
-/// The part of a segment on which a linear coordinate is in [low, high], where high − low = 1.
+/// Part of a segment on which a linear coordinate lies in an interval [low, high] of length 1.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,
@@ -153,7 +153,7 @@ fn nearest_to_origin(from: Vector, to: Vector) -> Vector {
     from + (-from.dot(&edge) / square).clamp(0.0, 1.0) * edge
 }
 
-/// The point where a segment crosses a plane, if its ends lie on different sides.
+/// The point where a segment crosses a plane; `None` if its ends lie on the same side.
 fn plane_crossing(origin: Vector, normal: Vector, [from, to]: [Vector; 2]) -> Option<Vector> {
     let height_from = (from - origin).dot(&normal);
     let height_to = (to - origin).dot(&normal);

@@ -8,8 +8,8 @@ use crate::error::excerpt;
 /// Maximum length of a file, bytes.
 const LONGEST: u64 = 1 << 32;
 
-/// Read ids from a file. The returned ids start from 0, are sorted, and have no repeats. `first` is the
-/// number of the first point in the numbering of the file.
+/// Read ids from a file. The returned ids are counted from 0, sorted, and without repeats. `first` is the number
+/// that the file uses for the first point.
 ///
 /// Numbers are separated by white space or commas. Comments and a heading are skipped.
 ///
@@ -53,7 +53,7 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     Ok(ids)
 }
 
-/// The first line, from 1, with a number; `None` if the file cannot be read or lacks it.
+/// The first line (from 1) that contains a number; `None` if no line contains it or the file cannot be read.
 pub fn line_of(path: &Path, number: u64) -> Option<u64> {
     let heading = heading(path).ok()?.map(|heading| heading.line);
     let text = std::fs::read_to_string(path).ok()?;

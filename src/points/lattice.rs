@@ -8,7 +8,7 @@ use crate::problem::{Body, PointSource, Problem, Quadrature, Shape};
 use super::region::{Region, TOLERANCE};
 use super::{MAX_PER_RANK, Point, distance_squared, shape};
 
-/// Binary logarithm of the maximum number of cells per rank; so many cells need some minutes.
+/// Binary logarithm of the maximum number of cells per rank; this number of cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
 /// Number of cells sampled to estimate the fraction of a region within a body.
@@ -40,7 +40,7 @@ pub struct LatticeBody<'a> {
 }
 
 impl<'a> LatticeBody<'a> {
-    /// The lattice of a body, by index; `None` if its points come from a file.
+    /// Create the lattice of the body with this index; `None` if its points do not come from a shape.
     ///
     /// # Errors
     /// If its cells are too far from the origin to be numbered.
@@ -88,7 +88,7 @@ impl<'a> LatticeBody<'a> {
         self.centre_of(self.region.cell(index))
     }
 
-    /// The centre (m) of a cell, if it belongs to the body.
+    /// The centre (m) of a cell; `None` if the cell does not belong to the body.
     fn centre_of(&self, cell: [i64; 3]) -> Option<[f64; 3]> {
         let centre = self.position(cell.map(|x| x as f64));
         self.contains(centre).then_some(centre)
@@ -142,7 +142,7 @@ impl<'a> LatticeBody<'a> {
         u64::from(self.quadrature.points(self.dimension))
     }
 
-    /// Number of points; estimated from sampled cells for a large region.
+    /// Number of points. For a large region, it is estimated from sampled cells.
     pub fn points(&self) -> f64 {
         let belongs = |index: &u64| self.centre(*index).is_some();
         let (cells, all) = (self.cells(), self.cells() as f64);
@@ -197,8 +197,8 @@ impl<'a> LatticeBody<'a> {
         count * self.points_of_cell()
     }
 
-    /// Estimate the volume (m³) of the shape without the parts that later bodies occupy, from evenly
-    /// distributed positions.
+    /// Estimate the volume of the shape, without the parts that later bodies occupy, m³. The estimate uses
+    /// evenly distributed positions.
     pub fn shape_volume(&self) -> f64 {
         let (region, all) = (&self.overlap, self.overlap.total() as f64);
         let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);

@@ -1,7 +1,7 @@
 //! Points from the elements of a mesh.
 //!
-//! Rank 0 reads the file, generates the points and sends each rank an equal part. It stores the mesh only
-//! during this time. The order of points is that of the elements, for any number of ranks.
+//! Rank 0 reads the file, generates the points and sends each rank an equal part. It then frees the mesh. The
+//! points have the order of the elements, for any number of ranks.
 
 use std::ops::Range;
 use std::path::Path;
@@ -13,10 +13,10 @@ use crate::problem::{PointSource, Problem, Selector};
 
 use super::Point;
 
-/// Mark of an element without a body.
+/// Value for an element that belongs to no body.
 const NO_BODY: u16 = u16::MAX;
 
-/// Mark of an element without a point.
+/// Value for an element without a point.
 const NO_POINT: u32 = u32::MAX;
 
 /// Maximum number of corners of an element.
@@ -33,7 +33,7 @@ struct User<'a> {
     block_span: &'a Range<usize>,
 }
 
-/// The points of a mesh, and the ids of the points in each of the problem's sets.
+/// The points of a mesh, and the ids of the points in each set of the problem.
 pub struct Found {
     /// The points, with ids from 0.
     pub points: Vec<Point>,
@@ -43,7 +43,7 @@ pub struct Found {
     pub names: Vec<String>,
 }
 
-/// Index of the first body whose points come from a mesh.
+/// Index of the first body whose points come from this mesh.
 pub fn first_user(problem: &Problem, path: &Path) -> usize {
     let users = users(problem, path);
     users.first().expect("a body names the mesh").body
@@ -237,7 +237,8 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
     Ok(bodies)
 }
 
-/// The points of the elements that belong to bodies, and each element's point or [`NO_POINT`].
+/// Generate the points of the elements that belong to bodies. Also return the point of each element, or
+/// [`NO_POINT`].
 fn points(
     problem: &Problem,
     mesh: &Mesh,
@@ -305,7 +306,8 @@ fn points(
     Ok((points, point_of))
 }
 
-/// Check that an element lies in the line or plane of a problem, through the first node of the mesh.
+/// Check that an element lies in the line or plane of the problem. The line or plane contains the first node
+/// of the mesh.
 fn lies_in_plane(
     nodes: &[[f64; 3]],
     dimension: usize,
@@ -374,7 +376,7 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     Some([pair[0].1, pair[1].1])
 }
 
-/// The ids of the points of a group. They are the points of
+/// The ids of the points of a group. The points are those of
 ///
 /// - the elements of the group;
 /// - elements that have all corners of one of its faces, edges or points;

@@ -32,7 +32,7 @@ use crate::scatter::{Scattered, uniform};
 /// Maximum number of points per rank.
 pub const MAX_PER_RANK: f64 = 2_147_483_647.0;
 
-/// A point, as sent between ranks.
+/// A point, in the form in which ranks exchange points.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Point {
@@ -49,7 +49,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// A point with the given fields.
+    /// Create a point.
     pub fn new(id: u64, position: [f64; 3], volume: f64, block: usize) -> Self {
         Self {
             id,
@@ -67,9 +67,8 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     difference.dot(&difference)
 }
 
-/// Generate this rank's piece of the points. Return it with the number of points of all ranks.
-///
-/// The ids of a piece are contiguous per body. Collective.
+/// Generate this rank's piece of the points. Return the piece and the number of points of all ranks. The ids
+/// of a piece are contiguous per body. Collective.
 ///
 /// # Errors
 /// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, or a
@@ -106,7 +105,7 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
             let dimension = problem.dimension.count();
             scatter(&mut piece, jitter, &spacing[..dimension]);
         }
-        // Appending would copy the first piece, which is usually the only one.
+        // The first piece is moved, because appending would copy it. Usually, it is the only piece.
         if points.is_empty() {
             points = piece
         } else {
@@ -129,7 +128,7 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     Ok((points, total))
 }
 
-/// Move points from the centres of their cells, which have edges of `spacing` (m).
+/// Displace points randomly from the centres of their cells. `spacing` contains the edges of the cells, m.
 fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     for point in points {
         for (k, edge) in spacing.iter().enumerate() {
@@ -139,8 +138,8 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     }
 }
 
-/// Resolve the sets that name groups of meshes. `meshes` also contains the id of the first point of each
-/// mesh.
+/// Set the ids of the sets that name groups of meshes. `meshes` contains the points of each mesh and the id
+/// of the first point.
 ///
 /// # Errors
 /// On rank 0, if no mesh has a group of that name, or if the points differ from those of an earlier call.
@@ -198,13 +197,13 @@ fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
     Ok(())
 }
 
-/// The message for an id of a file that no point has.
+/// Create the message for an id in a file that no point has.
 fn wrong_number(file: &IdFile, ids: &[u64], id: u64, total: u64) -> String {
     let IdFile { path, first } = file;
     let number = id + first;
     let line = id_file::line_of(path, number).map_or(String::new(), |line| format!(":{line}"));
     let last = total - 1 + first;
-    // With numbers from 1 to the number of points, only the first number is wrong.
+    // If the numbers are 1 to the number of points, the file only counts from another first number.
     let hint = if *first == 0 && id == total && ids[0] > 0 {
         "; if the file counts from 1, set `first_id = 1`"
     } else {

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-/// Upper limit on the additional index entries per edge.
+/// Upper limit on the number of index entries per edge, in addition to the first.
 const MOST_ENTRIES: f64 = 8.0;
 
 /// Round-off of the distance to an edge, as a fraction of the polygon's extent.
@@ -90,8 +90,8 @@ impl Polygon {
         (self.lower, self.upper)
     }
 
-    /// Test a position by the even-odd rule. Positions that are closer to an edge than |tolerance| (m)
-    /// count as inside if the tolerance is positive, and as outside if it is negative.
+    /// Test a position by the even-odd rule. A position that is closer to an edge than |tolerance| (m) counts
+    /// as inside if the tolerance is positive, and as outside if it is negative.
     pub fn contains(&self, position: [f64; 2], tolerance: f64) -> bool {
         let (along, across) = (self.axis, 1 - self.axis);
         let at = position[along];
@@ -105,7 +105,8 @@ impl Polygon {
         if near.any(|strip| self.edges_of(strip).iter().any(is_near)) {
             return tolerance > 0.0;
         }
-        // Every edge that crosses the line through the position is in the strip of this line.
+        // The strip of the horizontal or vertical line through the position contains every edge that crosses
+        // this line.
         let crossings = self.edges_of(self.strip(at)).iter().filter(|edge| {
             let [a, b] = self.edge(**edge as usize);
             let spans = (a[along] > at) != (b[along] > at);
@@ -144,7 +145,7 @@ fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
     let [a, b, p] = [a, b, p].map(Vector2::from);
     let (edge, offset) = (b - a, p - a);
     let along = edge.dot(&offset) / edge.dot(&edge);
-    // A repeated vertex creates an edge of zero length. Its distance is that of the vertex.
+    // A repeated vertex creates an edge of length 0. The distance to the edge is then that to the vertex.
     let along = if along.is_nan() {
         0.0
     } else {

@@ -1,7 +1,7 @@
-//! The candidate cells of a lattice: cells whose centres can lie within a shape. They are ordered with x
-//! fastest, then y and z.
+//! The candidate cells of a lattice: cells whose centres can lie within a shape. Their order is x fastest,
+//! then y, then z.
 //!
-//! The cells between distant parts of a union are excluded.
+//! If the shape is a union of distant parts, the cells between the parts are excluded.
 
 use std::ops::RangeInclusive;
 
@@ -12,10 +12,11 @@ use super::shape;
 /// Tolerance of containment, as a fraction of the cell edge.
 pub(super) const TOLERANCE: f64 = 1e-9;
 
-/// Largest cell number per direction; an `f64` represents it exactly.
+/// Largest cell number per direction; integers up to this number are exact in floating point.
 const FARTHEST: f64 = 1e15;
 
-/// Above this number of parts, overlapping parts are merged per direction, to limit the number of spans.
+/// Above this number of parts of a union, overlapping parts are merged per direction, to limit the number of
+/// spans.
 const MANY_PARTS: usize = 32;
 
 /// The cells whose centres can lie within a shape.
@@ -26,14 +27,14 @@ pub struct Region {
     hull: CellBox,
 }
 
-/// The cells `first` to `end` − 1 per direction.
+/// A box of cells: cells `first` to `end` − 1 in each direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct CellBox {
     first: [i64; 3],
     end: [i64; 3],
 }
 
-/// A range of layers along one direction with the same cells in the lower directions.
+/// A range of layers along one direction that have the same cells in the lower directions.
 #[derive(Debug)]
 struct Span {
     first: i64,
@@ -141,7 +142,7 @@ fn cells(
     Some(cells)
 }
 
-/// The union of boxes, in the given and the lower directions.
+/// The union of boxes as spans in this direction and the lower ones.
 fn spans_along(boxes: &[&CellBox], direction: usize) -> Vec<Span> {
     let span = |cells: &CellBox| [cells.first[direction], cells.end[direction]];
     let mut spans: Vec<[i64; 2]> = boxes.iter().map(|cells| span(cells)).collect();

@@ -7,7 +7,7 @@ use super::shape;
 /// Tolerance of membership in a shape, as a fraction of the horizon.
 const TOLERANCE: f64 = 1e-9;
 
-/// Test whether a point belongs to a set, by its id, reference position (m) and index of body.
+/// Test whether a point belongs to a set, given its id, its reference position (m) and the index of its body.
 pub fn contains(set: &Set, horizon: f64, id: u64, position: [f64; 3], body: usize) -> bool {
     match &set.selector {
         Selector::All => true,

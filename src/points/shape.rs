@@ -30,7 +30,7 @@ pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
     }
 }
 
-/// Test whether a position lies within the shape or at most `tolerance` (m) outside. With the tolerance,
+/// Test whether a position lies within the shape, or at most `tolerance` (m) outside. With a tolerance,
 /// points on the boundary count as inside despite round-off.
 pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     match shape {
@@ -55,7 +55,7 @@ pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
                 && base.contains([position[0], position[1]], tolerance)
         }
         Shape::Union(parts) => parts.iter().any(|part| contains(part, position, tolerance)),
-        // A subtracted shape excludes its own boundary, so points on this boundary belong to the
+        // A subtracted shape does not contain its boundary, so points on this boundary belong to the
         // difference.
         Shape::Difference(parts) => {
             contains(&parts[0], position, tolerance)

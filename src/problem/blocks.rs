@@ -1,39 +1,40 @@
-//! The blocks of a problem: its bodies or, with refinement, the parts of each body by level.
+//! The blocks of a problem. Without refinement, a block is a body; otherwise, the points of a body with one
+//! level and kind.
 //!
-//! All points of a block have the same law and horizon. They also have the same volume, except in some blocks of
-//! refined bodies.
+//! All points of a block have the same law and horizon. Except in some blocks of refined bodies, they also
+//! have the same volume.
 
 use super::{Body, HorizonRule, PointSource, Problem};
 
-/// Number of blocks for each level of a refined body.
+/// Number of block kinds for each level of a refined body.
 const KINDS: usize = 3;
 
-/// The common property of the points of a block, in addition to their level.
+/// A property that the points of a block have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Points with the cell volume of their level; they lie on a lattice.
     Whole,
-    /// Points with another volume, next to finer points or at the edge of the body.
+    /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,
-    /// Points with coarser points within their horizon, which is enlarged for this reason.
+    /// Points with coarser points within their horizon, which is enlarged by a factor.
     AtCoarser,
 }
 
 /// A block of a problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Block<'a> {
-    /// Its body.
+    /// The body of the block.
     pub body: &'a Body,
-    /// The level of its points, 0 without refinement.
+    /// The refinement level of the points; 0 without refinement.
     pub level: u32,
-    /// The common property of its points.
+    /// The kind of the points.
     pub kind: Kind,
     /// Horizon δ, m.
     pub horizon: f64,
 }
 
 impl<'a> Block<'a> {
-    /// A body without refinement.
+    /// Create the block of a body without refinement.
     pub fn unrefined(body: &'a Body) -> Self {
         Self {
             body,
@@ -43,7 +44,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Edges of a cell (m), if the points lie in lattice cells.
+    /// Edges of a cell (m); `None` if the points do not lie in lattice cells.
     pub fn spacing(&self) -> Option<[f64; 3]> {
         match self.body.points {
             PointSource::Lattice { spacing, .. } => Some(spacing.map(|edge| edge * self.scale())),
@@ -51,7 +52,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// 2^−level.
+    /// Spacing relative to that of level 0: 2^−level.
     fn scale(&self) -> f64 {
         0.5_f64.powi(self.level as i32)
     }
@@ -65,17 +66,17 @@ impl Problem {
         parts * self.bodies.len()
     }
 
-    /// The number of the block of some points of a body.
+    /// Number of the block with this body, level and kind.
     pub fn block_number(&self, body: usize, level: u32, kind: Kind) -> usize {
         body + self.bodies.len() * (KINDS * level as usize + kind as usize)
     }
 
-    /// The index of the body that a block belongs to.
+    /// Index of the body that a block belongs to.
     pub fn body_of(&self, block: usize) -> usize {
         block % self.bodies.len()
     }
 
-    /// A block, by its number.
+    /// The block with this number.
     pub fn block(&self, number: usize) -> Block<'_> {
         let body = &self.bodies[self.body_of(number)];
         let part = number / self.bodies.len();

@@ -12,14 +12,14 @@ use crate::mesh::{GroupKey, Runs};
 use crate::points::{Columns, Polygon};
 use crate::scatter::Weibull;
 
-/// A body, which is a block with its own material and damage.
+/// A body: points with one material and damage law.
 #[derive(Debug, Clone)]
 pub struct Body {
-    /// Its name in the deck.
+    /// Name in the deck.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
-    /// The material's name.
+    /// Name of the material.
     pub material_name: String,
     /// The material.
     pub material: Material,
@@ -27,29 +27,29 @@ pub struct Body {
     pub damage: Option<Damage>,
     /// Horizon δ, m.
     pub horizon: f64,
-    /// Span of its horizon in the deck: the horizon of the body or of the grid.
+    /// Span of the horizon in the deck, in the section of the body or of the grid.
     pub horizon_place: Range<usize>,
-    /// Source of its points.
+    /// Source of the points.
     pub points: PointSource,
 }
 
 impl Body {
-    /// Whether its bonds can break, by a damage law or by the law of its material.
+    /// Whether bonds of the body can break, by a damage law or by the law of its material.
     pub fn can_break(&self) -> bool {
         self.damage.is_some() || self.material.law.declaration.breaks_by_itself()
     }
 
-    /// Whether its points are the centres of the cells of a lattice, or its Gauss points.
+    /// Whether the points are the centres or Gauss points of the cells of a lattice.
     pub fn is_on_lattice(&self, jitter: Option<Jitter>) -> bool {
         jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })
     }
 
-    /// Whether its cells have several points.
+    /// Whether the cells have several points.
     pub fn has_gauss_points(&self) -> bool {
         self.quadrature() == Quadrature::Gauss
     }
 
-    /// Positions of the points in a cell; the centre for points from a file or a mesh.
+    /// Positions of the points in a cell. Points from a file or a mesh count as centres.
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
             PointSource::Lattice { quadrature, .. } => quadrature,
@@ -63,24 +63,24 @@ impl Body {
 pub struct Material {
     /// The law.
     pub law: Law,
-    /// kg/m³.
+    /// Density, kg/m³.
     pub density: f64,
-    /// E and ν; a bond-based law fixes ν.
+    /// Elastic constants E and ν; a bond-based law fixes ν.
     pub elastic: Isotropic,
-    /// Viscous damping r, 1/s: a force density −r ρ u̇.
+    /// Rate r of viscous damping, 1/s. The damping exerts the force density −r ρ u̇.
     pub damping: f64,
-    /// Thermal expansion; none by default.
+    /// Thermal expansion; 0 by default.
     pub expansion: ThermalExpansion,
 }
 
-/// Volume correction of points near the edge of a family.
+/// Volume correction for cells at the edge of a family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VolumeCorrection {
     /// No correction: the factor is 1 within the horizon and 0 beyond it.
     None,
     /// The factor falls linearly with the distance, from 1 at δ − dx/2 to 0 at δ + dx/2.
     Linear,
-    /// The same linear factor up to δ, where it drops from 1/2 to 0.
+    /// The same linear factor up to the distance δ, and 0 beyond it.
     LinearInside,
     /// The factor is the fraction of the cell that lies within the horizon.
     Exact,
@@ -105,63 +105,63 @@ impl Quadrature {
     }
 }
 
-/// Random displacement of the points of shapes from the centres of their cells.
+/// Random displacement of the points of lattices from the centres of their cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jitter {
     /// The largest displacement in each direction, as a fraction of the cell's edge.
     pub share: f64,
-    /// The seed.
+    /// Seed of the random displacements.
     pub seed: u64,
 }
 
-/// How bonds are stored.
+/// Storage of bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FamilyRule {
-    /// In lattice families for bodies on a lattice, in lists for other bodies.
+    /// Lattice families for bodies on a lattice, lists for other bodies.
     Auto,
-    /// In lists.
+    /// Lists for all bodies.
     List,
-    /// In lattice families; every body must lie on a lattice.
+    /// Lattice families for all bodies, each of which must lie on a lattice.
     Lattice,
 }
 
-/// The bonds between blocks.
+/// Rules for the bonds between bodies.
 #[derive(Debug, Clone)]
 pub struct Interface {
-    /// The rule of pairs without their own rule.
+    /// Default for pairs of bodies that are not in `pairs`.
     pub rule: InterfaceRule,
-    /// Pairs of bodies with their own rule or damage.
+    /// Pairs of bodies for which the deck gives a separate rule or damage.
     pub pairs: Vec<InterfacePair>,
 }
 
-/// The bonds between two bodies.
+/// Rules for the bonds between two bodies.
 #[derive(Debug, Clone)]
 pub struct InterfacePair {
-    /// Its name in the deck.
+    /// Name in the deck.
     pub name: String,
     /// Names of the two bodies, in any order.
     pub bodies: [String; 2],
-    /// Constants of the bonds.
+    /// Elastic constants of the bonds.
     pub rule: InterfaceRule,
-    /// When the bonds break.
+    /// Breaking of the bonds.
     pub damage: InterfaceDamage,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
 }
 
-/// When the bonds between two bodies break.
+/// Breaking of the bonds between two bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
-    /// By the damage laws of both bodies, at the smaller of their thresholds.
+    /// By the damage laws of both bodies: a bond breaks at the smaller of their thresholds.
     OfBodies,
     /// Never.
     Unbreakable,
-    /// By their own damage law, which replaces the damage laws of the bodies.
+    /// By a separate damage law, which replaces the damage laws of the bodies.
     Own(Damage),
 }
 
 impl InterfaceDamage {
-    /// The bonds' own damage law, if they have one.
+    /// The separate damage law; `None` for other variants.
     pub fn own(&self) -> Option<&Damage> {
         match self {
             Self::Own(damage) => Some(damage),
@@ -171,7 +171,7 @@ impl InterfaceDamage {
 }
 
 impl Interface {
-    /// The pair of two bodies, in any order, if it is listed.
+    /// The entry of [`Self::pairs`] for two bodies, in any order; `None` if there is none.
     pub fn pair(&self, here: &Body, there: &Body) -> Option<&InterfacePair> {
         self.pairs.iter().find(|pair| {
             let [a, b] = &pair.bodies;
@@ -179,8 +179,8 @@ impl Interface {
         })
     }
 
-    /// The rule of the bonds between two bodies, independent of their order. Within a body, each end has its own
-    /// constants.
+    /// The rule of the bonds between two bodies, which does not depend on their order. Within a body, each
+    /// end uses its own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
@@ -189,7 +189,8 @@ impl Interface {
         own.map_or(self.rule, |pair| pair.rule)
     }
 
-    /// When the bonds between two bodies break, independent of their order. Within a body, its damage law decides.
+    /// Breaking of the bonds between two bodies, which does not depend on their order. Within a body, the
+    /// damage law of the body decides.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
@@ -197,7 +198,7 @@ impl Interface {
 }
 
 impl InterfacePair {
-    /// Its own damage law, if it has one.
+    /// The separate damage law of the pair; `None` if the pair has none.
     pub fn own_damage(&self) -> Option<&Damage> {
         self.damage.own()
     }
@@ -208,7 +209,7 @@ impl InterfacePair {
     }
 }
 
-/// Constants of the bonds between two blocks.
+/// Elastic constants and horizon of the bonds between two blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InterfaceRule {
     /// No bonds join the blocks.
@@ -217,11 +218,11 @@ pub enum InterfaceRule {
     Average,
     /// The smaller of the moduli and of the horizons.
     Minimum,
-    /// Each end exerts its own half.
+    /// Each end uses the constants of its body, for its half of the bond force.
     Own,
 }
 
-/// A damage law: when bonds break.
+/// A damage law, which decides when bonds break.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Damage {
     /// The quantity that decides whether a bond breaks.
@@ -230,9 +231,9 @@ pub struct Damage {
     pub toughness: Toughness,
     /// α in the criterion s ≥ s0 − α s_min.
     pub alpha: f64,
-    /// Scatter of the strength of the points, if there is any.
+    /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
-    /// Indices of sets whose bonds never break.
+    /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
 }
 
@@ -243,56 +244,56 @@ pub enum DamageRule {
     CriticalStretch,
     /// The work done on the bond.
     Energy {
-        /// How the critical work follows from the toughness.
+        /// Derivation of the critical work from the toughness.
         calibration: Calibration,
-        /// How the work is looked at; for laws that are not bond-based.
+        /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
 }
 
-/// Toughness, in one of three measures.
+/// Toughness, as one of three quantities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Toughness {
     /// G0, J/m².
     FractureEnergy(f64),
     /// K_Ic, Pa·√m.
     FractureToughness(f64),
-    /// s0 itself, for laws with a critical stretch.
+    /// Critical stretch s0, for laws with a critical stretch.
     CriticalStretch(f64),
 }
 
 /// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// The points of lattice cells whose centres lie within a shape.
+    /// Points in the cells of a lattice, if the centre of the cell lies within a shape.
     Lattice {
         /// The shape.
         shape: Shape,
         /// Edges of a cell, m.
         spacing: [f64; 3],
-        /// A corner of a cell, m.
+        /// Position of a corner of a cell, m.
         origin: [f64; 3],
         /// Positions of the points in a cell.
         quadrature: Quadrature,
     },
-    /// The rows of a file.
+    /// Points from the rows of a file.
     File {
-        /// Path, already relative to the working directory.
+        /// Path, relative to the working directory or absolute.
         path: PathBuf,
-        /// Only rows with this block number.
+        /// Block number of the rows that are used; `None` for all rows.
         block: Option<u32>,
-        /// The columns of a row, if the deck names them.
+        /// Meaning of the columns; `None` if the deck does not name them.
         columns: Option<Columns>,
         /// Span of the file's name in the deck.
         span: Range<usize>,
     },
-    /// The elements of a mesh.
+    /// Points from the elements of a mesh.
     Mesh {
-        /// Path, already relative to the working directory.
+        /// Path, relative to the working directory or absolute.
         path: PathBuf,
-        /// The group of its elements; if not given, all elements that belong to no other body.
+        /// Group of the elements; `None` for all elements that belong to no other body.
         block: Option<GroupKey>,
-        /// Metres per unit of length of the mesh.
+        /// Length of a unit of the mesh, m.
         scale: f64,
         /// Span of the file's name in the deck.
         span: Range<usize>,
@@ -301,7 +302,7 @@ pub enum PointSource {
     },
 }
 
-/// A region of space, lengths in m.
+/// A region of space; lengths are in m.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A box, rectangle or interval between two corners.
@@ -327,13 +328,13 @@ pub enum Shape {
         /// Radius.
         radius: f64,
     },
-    /// A polygon in x and y, between two values of z.
+    /// A polygon in the xy plane, extended between two values of z.
     Prism {
-        /// The polygon.
+        /// The polygon of the cross-section.
         base: Polygon,
-        /// Lower z; −∞ in the plane.
+        /// Lower z; −∞ in 2-D.
         bottom: f64,
-        /// Upper z; ∞ in the plane.
+        /// Upper z; ∞ in 2-D.
         top: f64,
     },
     /// The union of shapes.
@@ -345,59 +346,59 @@ pub enum Shape {
 /// A named set of points.
 #[derive(Debug, Clone)]
 pub struct Set {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
-    /// Which points.
+    /// Rule that selects the points.
     pub selector: Selector,
 }
 
-/// How points are chosen.
+/// Rule that selects the points of a set.
 #[derive(Debug, Clone)]
 pub enum Selector {
     /// All points.
     All,
     /// The points of a body, by index.
     Body(usize),
-    /// Points whose reference position fulfils this condition.
+    /// Points whose reference position fulfils the condition.
     Where(Expression),
     /// Points within a region.
     Within(Shape),
     /// Points with these global ids.
     Ids {
-        /// Sorted.
+        /// Global ids, ascending.
         ids: Vec<u64>,
-        /// The file that has them, if it is not the deck.
+        /// The file that contains the ids; `None` if the deck contains them.
         file: Option<IdFile>,
-        /// Where the largest one stands in the deck.
+        /// Span of the largest id in the deck.
         largest: Range<usize>,
     },
-    /// Points of a group of the meshes that define the points of bodies.
+    /// Points of a group of the meshes from which bodies get their points.
     Mesh(MeshSet),
 }
 
 /// A file with the ids of points.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct IdFile {
-    /// Path, already relative to the working directory.
+    /// Path, relative to the working directory or absolute.
     pub path: PathBuf,
-    /// Number of the first point in it.
+    /// Number that the file uses for the first point.
     pub first: u64,
 }
 
-/// The points of a named group of the problem's meshes. They are known once the points have been generated.
+/// The points of a named group of meshes. Their ids are known once the points have been generated.
 #[derive(Clone)]
 pub struct MeshSet {
-    /// The group's name or number.
+    /// Name or number of the group.
     pub group: GroupKey,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     ids: OnceLock<Runs>,
 }
 
 impl MeshSet {
-    /// The points of a group that is named at `span` in the deck.
+    /// Create the set of a group. The deck names the group at `span`.
     pub fn new(group: GroupKey, span: Range<usize>) -> Self {
         Self {
             group,
@@ -406,7 +407,7 @@ impl MeshSet {
         }
     }
 
-    /// Set the ids of the points. Return whether they equal the ids of an earlier call; true for the first call.
+    /// Set the ids of the points at the first call. Return whether the ids are those of the first call.
     pub fn resolve(&self, ids: Runs) -> bool {
         let ids = &ids;
         self.ids.get_or_init(|| ids.clone()) == ids
@@ -418,19 +419,19 @@ impl MeshSet {
     }
 }
 
-/// Omit the ids, which do not belong to the description.
+/// The debug output omits the ids, because they are not part of the problem's description.
 impl fmt::Debug for MeshSet {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "MeshSet({:?})", self.group)
     }
 }
 
-/// A pre-crack; bonds that cross it start broken.
+/// A pre-crack: bonds that cross its surface start broken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PreCrack {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// The surface.
     pub surface: Crack,
@@ -439,11 +440,11 @@ pub struct PreCrack {
 /// A surface that cuts bonds; lengths in m.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Crack {
-    /// A segment, in plane problems.
+    /// A segment, in 2-D.
     Segment {
         /// One end.
         from: [f64; 3],
-        /// The other.
+        /// The other end.
         to: [f64; 3],
         /// Width of the slot, half on each side; 0 for a cut without width.
         width: f64,
@@ -452,9 +453,9 @@ pub enum Crack {
     Rectangle {
         /// A corner.
         corner: [f64; 3],
-        /// One edge from it.
+        /// Vector along one edge, from the corner.
         edge_a: [f64; 3],
-        /// The other edge from it.
+        /// Vector along the other edge, from the corner.
         edge_b: [f64; 3],
         /// Width of the slot, half on each side of the surface; 0 for a cut without width.
         width: f64,
@@ -473,7 +474,7 @@ pub enum Crack {
 }
 
 impl Crack {
-    /// Whether it is a slot with two faces instead of a cut.
+    /// Whether the crack is a slot with a width.
     pub fn has_width(&self) -> bool {
         let (Self::Segment { width, .. }
         | Self::Rectangle { width, .. }
@@ -483,7 +484,8 @@ impl Crack {
 }
 
 impl DamageRule {
-    /// Whether it is calibrated with the energy that separates a block, and this energy has not been computed yet.
+    /// Whether the damage is calibrated with the separation energy ratio, and this ratio has not been
+    /// computed yet.
     pub fn is_unmeasured(self) -> bool {
         matches!(
             self,

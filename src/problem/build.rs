@@ -1,4 +1,4 @@
-//! Problems made in Rust, without a deck.
+//! Problems that are built in Rust, without a deck.
 
 use super::{
     Action, Body, CheckpointRule, Condition, Crack, DEFAULT_DAMAGE_THRESHOLD, DEFAULT_FIELDS,
@@ -10,12 +10,12 @@ use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 
-/// Default of the time step, as a fraction of the stable step.
+/// Default of `safety`: the automatic time step as a fraction of the stable step.
 const DEFAULT_SAFETY: f64 = 0.8;
 
 impl Problem {
-    /// Create a problem without bodies from a horizon (m) and an end time (s). Everything else has the defaults of a
-    /// deck.
+    /// Create a problem without bodies from a horizon (m) and an end time (s). All other settings have the
+    /// defaults of a deck.
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
             warnings: Vec::new(),
@@ -77,8 +77,8 @@ impl Problem {
         }
     }
 
-    /// Add a body that fills a shape with cubic (or square) cells of this edge (m), and a set of its points with the
-    /// same name. Return the index of the set.
+    /// Add a body that fills a shape with cubic (or square) cells of edge `spacing` (m). Also add the set of
+    /// its points, with the same name. Return the index of the set.
     pub fn add_body(
         &mut self,
         name: &str,
@@ -132,7 +132,7 @@ impl Problem {
         });
     }
 
-    /// Add a load or a support of a set, given by the index of the set.
+    /// Add a load or a support on a set, given by the index of the set.
     pub fn add_condition(&mut self, name: &str, set: usize, action: Action) {
         self.conditions.push(Condition {
             name: name.to_owned(),
@@ -145,7 +145,8 @@ impl Problem {
         });
     }
 
-    /// Add an initial velocity (m/s) of a set, given by the index of the set: an expression for each component.
+    /// Add an initial velocity (m/s) of a set, given by the index of the set. `velocity` has an expression
+    /// for each component.
     pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
         self.initials.push(Initial {
             name: name.to_owned(),
@@ -159,7 +160,7 @@ impl Problem {
 }
 
 impl Action {
-    /// The deck's key for this condition. Traction and pressure are body forces here.
+    /// The deck's key for this condition. A traction or pressure is stored as a body force.
     fn quantity(&self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",
@@ -180,7 +181,7 @@ impl Problem {
 }
 
 impl Material {
-    /// A material without damping and thermal expansion; the density is in kg/m³.
+    /// Create a material without damping and thermal expansion; the density is in kg/m³.
     pub fn new(law: Law, density: f64, elastic: Isotropic) -> Self {
         Self {
             law,
@@ -193,7 +194,7 @@ impl Material {
 }
 
 impl Damage {
-    /// Damage by critical stretch or work, without scatter, the same for all bonds.
+    /// Create a damage law by critical stretch or work, without scatter and no-failure sets.
     pub fn new(rule: DamageRule, toughness: Toughness) -> Self {
         Self {
             rule,

@@ -1,4 +1,4 @@
-//! Initial values, loads and supports.
+//! Initial values, loads, supports and temperatures.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use crate::points::value_file::ValueColumns;
 /// Initial values of a set.
 #[derive(Debug, Clone)]
 pub struct Initial {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Index of the set.
     pub set: usize,
@@ -42,20 +42,21 @@ pub struct InitialFile {
     pub columns: ValueColumns,
 }
 
-/// A load or support.
+/// A load, support or prescribed temperature.
 #[derive(Debug, Clone)]
 pub struct Condition {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Index of the set.
     pub set: usize,
     /// Span of the set's name in the deck.
     pub span: Range<usize>,
-    /// The key of what it prescribes, such as `traction`.
+    /// Key of the prescribed quantity in the deck, such as `traction`.
     pub quantity: &'static str,
     /// Span of this key in the deck.
     pub place: Range<usize>,
-    /// Thickness (m) of the layer that carries a traction or pressure, if it is the spacing by default.
+    /// Thickness (m) of the layer that carries a traction or pressure, if the deck does not give it. It is
+    /// then the spacing.
     pub default_depth: Option<f64>,
     /// The prescribed quantity and its values.
     pub action: Action,
@@ -64,25 +65,25 @@ pub struct Condition {
 /// The effect of a condition on its points, by component.
 #[derive(Debug, Clone)]
 pub enum Action {
-    /// Prescribes displacement (m); `None` is free.
+    /// Prescribed displacement (m); `None` for free components.
     Displacement(Vec<Option<Expression>>),
-    /// Prescribes velocity (m/s); `None` is free.
+    /// Prescribed velocity (m/s); `None` for free components.
     Velocity(Vec<Option<Expression>>),
-    /// Adds a body force density: each expression times its factor (N/m³).
+    /// Additional force density (N/m³): each expression is multiplied by its factor.
     BodyForce(Vec<Expression>, Vec<f64>),
-    /// Adds a total force (N), spread by volume.
+    /// Additional total force (N), distributed over the points by volume.
     Force(Vec<Expression>),
-    /// Prescribes the temperature.
+    /// Prescribed temperature.
     Temperature(Expression),
 }
 
 impl Action {
-    /// Whether it adds forces.
+    /// Whether the condition adds forces.
     pub fn is_load(&self) -> bool {
         matches!(self, Self::BodyForce(..) | Self::Force(_))
     }
 
-    /// Whether it prescribes the motion.
+    /// Whether the condition prescribes displacement or velocity.
     pub fn is_support(&self) -> bool {
         matches!(self, Self::Displacement(_) | Self::Velocity(_))
     }

@@ -1,20 +1,20 @@
-//! Contact: forces between points that no intact bond joins.
+//! Contact settings: forces between points that no intact bond joins.
 
 use super::Body;
 
 /// Contact rules of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
-    /// The rule of pairs without their own rule.
+    /// Default for pairs of bodies that are not in `pairs`; `None` for no contact.
     pub rule: Option<ContactRule>,
-    /// Pairs of bodies with their own rule.
+    /// Pairs of bodies with separate rules.
     pub pairs: Vec<ContactPair>,
 }
 
-/// Two bodies (or one body and itself) with their own rule.
+/// Separate contact rule for two bodies, or for the points of one body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPair {
-    /// Its name in the deck.
+    /// Name in the deck.
     pub name: String,
     /// Names of the bodies.
     pub bodies: [String; 2],
@@ -22,34 +22,35 @@ pub struct ContactPair {
     pub rule: Option<ContactRule>,
 }
 
-/// Contact between points of two bodies, or of one body.
+/// Contact rule for the points of two bodies, or of one body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactRule {
-    /// How the force follows from the overlap.
+    /// Model of the repulsive force.
     pub model: ContactModel,
-    /// Modulus of the force, Pa; from the materials if not given.
+    /// Modulus of the repulsion, Pa; `None` for the moduli of the materials.
     pub stiffness: Option<f64>,
-    /// Distance at which points begin to touch, m; from their volumes if not given.
+    /// Contact distance, m; `None` if it follows from the volumes of the points.
     pub radius: Option<f64>,
     /// Coefficient of static friction.
     pub static_friction: f64,
     /// Coefficient of sliding friction.
     pub kinetic_friction: f64,
-    /// Relative speed of two points after a collision, divided by the speed before it; above 0, and 1 without damping.
+    /// Coefficient of restitution: relative speed of two points after a collision, divided by the speed
+    /// before. It is above 0; 1 means no damping.
     pub restitution: f64,
 }
 
-/// How the force follows from the overlap.
+/// Model of the repulsive force as a function of the overlap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactModel {
-    /// The stiffness of a material layer between the points, as thick as the horizon.
+    /// Stiffness of a layer of material between the points, with a thickness of one horizon.
     Penalty,
     /// Short-range forces (Silling & Askari 2005, §5; Macek & Silling 2007).
     ShortRange,
 }
 
 impl Contact {
-    /// The rule of contact between points of two bodies, independent of their order; `None` for no contact.
+    /// The contact rule for points of two bodies, independent of their order; `None` for no contact.
     pub fn between(&self, here: &Body, there: &Body) -> Option<ContactRule> {
         let names = [&here.name, &there.name];
         let own = self.pairs.iter().find(|pair| pair.is_of(names));
@@ -58,7 +59,7 @@ impl Contact {
 }
 
 impl ContactPair {
-    /// Whether its bodies have these names, in any order.
+    /// Whether the pair consists of bodies with these names, in any order.
     pub fn is_of(&self, [first, second]: [&String; 2]) -> bool {
         let [a, b] = &self.bodies;
         [a, b] == [first, second] || [a, b] == [second, first]
@@ -66,7 +67,7 @@ impl ContactPair {
 }
 
 impl ContactRule {
-    /// Contact by a model without friction and damping, with the stiffness of the materials.
+    /// Create a rule without friction and damping, with the stiffness of the materials.
     pub fn new(model: ContactModel) -> Self {
         Self {
             model,

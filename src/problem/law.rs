@@ -1,4 +1,4 @@
-//! The law of a material: which one, and the values of its own keys.
+//! The law of a material, with the values of its keys.
 
 use super::{Damage, DamageRule, Sense};
 use crate::dimension::Dimension;
@@ -8,25 +8,25 @@ use crate::material::{Declaration, Key, Kind, LawFault, OfLength, Value, Values,
 use crate::message::format_number;
 use crate::message::suggestion;
 
-/// A law with the values of its own keys.
+/// A law with the values of its keys.
 #[derive(Debug, Clone)]
 pub struct Law {
-    /// The law.
+    /// Declaration of the law.
     pub declaration: &'static Declaration,
-    /// The values of its keys.
+    /// Values of the keys that this law declares.
     pub values: Values,
 }
 
 impl Law {
-    /// The law of this name, with the defaults of its keys.
+    /// Create the law with this name and the defaults of its keys.
     ///
     /// # Errors
-    /// When there is no such law.
+    /// If no law has this name.
     pub fn named(name: &str) -> Result<Self> {
         find(name).map(Self::of).map_err(Error::input)
     }
 
-    /// A law with the defaults of its keys.
+    /// Create the law of a declaration, with the defaults of its keys.
     pub fn of(declaration: &'static Declaration) -> Self {
         Self {
             declaration,
@@ -34,10 +34,11 @@ impl Law {
         }
     }
 
-    /// Set one of its keys to a number, a word, or an [expression](Expression::of_length) of a bond's length.
+    /// Set a key of the law to a number, a word, or an [expression](Expression::of_length) of a bond's
+    /// length.
     ///
     /// # Errors
-    /// When the law has no such key, or the key cannot be that.
+    /// If the law has no such key, or the key does not allow this value.
     pub fn with(mut self, key: &str, value: impl Into<Value>) -> Result<Self> {
         let (name, value) = (self.declaration.name, value.into());
         let Some(declared) = self.declaration.key(key) else {
@@ -57,7 +58,8 @@ impl Law {
         Ok(self)
     }
 
-    /// Check that all required keys are given and that the law supports this dimension.
+    /// Check that all required keys are given and that the law supports this dimension. Return the first
+    /// fault.
     pub fn fault(&self, dimension: Dimension) -> Option<LawFault> {
         for key in self.declaration.keys {
             let required = matches!(key.kind, Kind::Number { .. });
@@ -87,7 +89,7 @@ impl Law {
         })
     }
 
-    /// The reason why bodies of the law cannot have this damage; `None` if they can.
+    /// Reason why bodies of this law cannot have this damage; `None` if they can.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
@@ -135,21 +137,21 @@ impl Law {
         ))
     }
 
-    /// The key that is an expression of the bond's length, if the law has one that is given.
+    /// Name of the key whose value is an expression of the bond's length; `None` if no key has such a value.
     pub fn key_of_length(&self) -> Option<&'static str> {
         let mut names = self.declaration.keys.iter().map(|key| key.name);
         names.find(|name| self.values.of_length(name).is_some())
     }
 }
 
-/// The declaration of the law of this name, or an error that lists the known laws.
+/// Return the declaration of the law with this name, or an error that lists the known laws.
 pub fn find(name: &str) -> std::result::Result<&'static Declaration, String> {
     let mut all = declarations();
     all.find(|law| law.name == name)
         .ok_or_else(|| unknown(name, declarations().map(|law| law.name)))
 }
 
-/// Check a value of a key; the error says which values are allowed.
+/// Check a value of a key. The error says which values are allowed.
 pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     match (&key.kind, value) {
         (
@@ -176,7 +178,7 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     }
 }
 
-/// The values that a key allows, for error messages.
+/// Description of the values that a key allows, for error messages.
 pub fn wanted(key: &Key) -> String {
     match &key.kind {
         Kind::Number { .. } | Kind::Optional { .. } | Kind::OfLength => {
@@ -193,12 +195,12 @@ fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     format!("unknown name `{name}`{}", suggestion(name, known))
 }
 
-/// The names of laws in backticks: `a`, `b` and `c`.
+/// Names of laws in backticks, such as `a`, `b` and `c`. `and` is the last conjunction.
 pub fn names(laws: impl IntoIterator<Item = &'static Declaration>, and: &str) -> String {
     listed(laws.into_iter().map(|law| format!("`{}`", law.name)), and)
 }
 
-/// `a, b and c`.
+/// Join the items to a list such as `a, b and c`.
 fn listed(items: impl IntoIterator<Item = String>, and: &str) -> String {
     let items: Vec<String> = items.into_iter().collect();
     match items.split_last() {

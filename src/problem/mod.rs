@@ -1,6 +1,7 @@
-//! The validated description of a run: every number known, every name resolved.
+//! The validated description of a run: all values are checked, and all names are resolved.
 //!
-//! Spans are byte ranges of the deck that a problem was made from. They are only used in errors and warnings.
+//! Spans are byte ranges of the deck from which a problem was read. They are used only in errors and
+//! warnings.
 //!
 //! Positions and vectors have three components; those beyond the dimension are 0.
 
@@ -36,69 +37,70 @@ pub use statistics::*;
 pub use thermal::ThermalExpansion;
 pub use time::*;
 
-/// Everything that a run needs to know.
+/// All settings of a run.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Warnings: allowed settings of the deck that are probably mistakes.
     pub warnings: Vec<Warning>,
     /// Title, one line.
     pub title: String,
-    /// Spans of some values in the deck.
+    /// Spans of values in the deck, for errors.
     pub places: Places,
-    /// The setting.
+    /// Dimension and out-of-plane condition.
     pub dimension: Dimension,
-    /// Horizon δ of the grid, m; bodies may have their own.
+    /// Horizon δ of the grid, m; bodies may have other horizons.
     pub horizon: f64,
     /// Volume correction of points near the edge of a family.
     pub volume_correction: VolumeCorrection,
-    /// Random displacement of the points of shapes, if there is any.
+    /// Random displacement of lattice points; `None` without it.
     pub jitter: Option<Jitter>,
-    /// How bonds are stored.
+    /// Storage of bonds.
     pub family: FamilyRule,
-    /// The bonds between blocks.
+    /// Rules for the bonds between bodies.
     pub interface: Interface,
-    /// Contact between points that no bond joins.
+    /// Contact between points that no bond joins; `None` without contact.
     pub contact: Option<Contact>,
     /// Rigid bodies that points can touch.
     pub rigid: Vec<Rigid>,
     /// Bodies in the order of the deck.
     pub bodies: Vec<Body>,
-    /// Finer grids in parts of the bodies.
+    /// Finer grids in parts of the bodies; `None` without refinement.
     pub refinement: Option<Refinement>,
-    /// Sets: `all`, then the bodies, then those of the deck.
+    /// Sets: `all`, then one per body, then the sets of the deck.
     pub sets: Vec<Set>,
     /// Pre-cracks.
     pub cracks: Vec<PreCrack>,
-    /// Initial values, applied in order.
+    /// Initial values. If several apply to a point, the last one counts.
     pub initials: Vec<Initial>,
-    /// Loads and supports, applied in order.
+    /// Loads, supports and temperatures. If several supports or temperatures apply to a point, the last one
+    /// counts.
     pub conditions: Vec<Condition>,
-    /// The time axis.
+    /// Time settings.
     pub time: Time,
-    /// The stages of the run in their order. Without stages, the run is a single stage in which all conditions act.
-    /// With stages, the last one ends with [`Self::time`], and only the end of `time` is used.
+    /// Stages of the run in order. If empty, the run is a single stage in which all conditions act.
+    /// Otherwise, the last stage ends with [`Self::time`], of which only the end is used.
     pub stages: Vec<Stage>,
-    /// The result file.
+    /// The main result file.
     pub output: Output,
-    /// Further result files with their own fields and times.
+    /// Further result files, with separate fields and times.
     pub further_outputs: Vec<Output>,
     /// The history.
     pub history: History,
-    /// When checkpoints are written.
+    /// Schedule of checkpoints.
     pub checkpoint: CheckpointRule,
-    /// When points are rebalanced between ranks.
+    /// Schedule and threshold of rebalancing; `None` for no rebalancing.
     pub balance: Option<Balance>,
 }
 
-/// Spans of values whose errors are only detected after the points are generated.
+/// Spans of values for errors that are found after the deck has been read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Places {
     /// The horizon of the grid.
     pub horizon: Range<usize>,
     /// The end time.
     pub end: Range<usize>,
-    /// The time step; the end time if the step is automatic.
+    /// The time step; the span of the end time if the step is automatic.
     pub step: Range<usize>,
-    /// The first rule of an adaptive step; the end time if there is none.
+    /// The first setting of `[time.adaptive]`; the span of the end time without an adaptive step.
     pub adaptive: Range<usize>,
 }

@@ -8,56 +8,56 @@ use crate::component::Component;
 /// Interval between outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Interval {
-    /// Seconds of simulated time.
+    /// Simulated time, s.
     Seconds(f64),
-    /// Time steps.
+    /// Number of time steps.
     Steps(u64),
-    /// Seconds of simulated time, but only at steps that are multiples of a number.
+    /// Simulated time, checked only at steps that are multiples of a number.
     SecondsAtSteps {
-        /// Simulated time, s.
+        /// Interval of simulated time, s.
         seconds: f64,
-        /// Steps.
+        /// Number of steps between checks.
         steps: u64,
     },
 }
 
-/// When checkpoints are written.
+/// Schedule of checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CheckpointRule {
-    /// At intervals of wall-clock time, s.
+    /// Interval of wall-clock time, s.
     WallClock(f64),
-    /// At intervals of steps or simulated time.
+    /// Interval of steps or simulated time.
     Simulation(Interval),
 }
 
-/// When points are rebalanced between ranks.
+/// Schedule and threshold of rebalancing points between ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
-    /// Steps between comparisons of the ranks' times.
+    /// Number of steps between comparisons of rank times.
     pub every_steps: u64,
-    /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced.
+    /// Ratio of the slowest rank's time to the mean, above which points are rebalanced.
     pub imbalance: f64,
 }
 
-/// The main result file or a further one.
+/// Settings of the main result file or a further one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// Name of a further output; `None` for the main one.
+    /// Name of a further result; `None` for the main result.
     pub name: Option<String>,
-    /// How often; `None` for the given times only.
+    /// Interval of outputs; `None` if outputs are written only at `times`.
     pub every: Option<Interval>,
-    /// Simulated times of further outputs in ascending order, s.
+    /// Simulated times of additional outputs in ascending order, s.
     pub times: Vec<f64>,
     /// Fields that are written.
     pub fields: Vec<Field>,
     /// Whether the fields are rounded to 4-byte numbers.
     pub single: bool,
-    /// Index of the set whose points the result holds, and the span of its name; `None` for all points.
+    /// Index of the set whose points the result contains, and the span of its name; `None` for all points.
     pub set: Option<(usize, Range<usize>)>,
 }
 
 impl Output {
-    /// The section of the deck, for messages.
+    /// Section of this output in the deck, for messages.
     pub fn section(&self) -> String {
         match &self.name {
             None => "[output]".to_owned(),
@@ -65,20 +65,20 @@ impl Output {
         }
     }
 
-    /// Whether the result has the number of bonds that have broken since its last output.
+    /// Whether the result contains the number of bonds that have broken since its last output.
     pub fn counts_newly_broken(&self) -> bool {
         self.fields.contains(&Field::NewlyBrokenBonds)
     }
 }
 
-/// The history.
+/// Settings of the history.
 #[derive(Debug, Clone)]
 pub struct History {
     /// Interval of rows; if `None`, [`Problem::row_interval`](super::Problem::row_interval) decides.
     pub every: Option<Interval>,
     /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
-    /// Forces of supports along a direction.
+    /// Components of support forces along given directions.
     pub support_forces: Vec<SupportForce>,
     /// Whether fragments are counted.
     pub fragments: bool,
@@ -88,13 +88,13 @@ pub struct History {
     pub damage_threshold: f64,
     /// Sums and extremes of fields over sets.
     pub statistics: Vec<FieldStatistics>,
-    /// Probes: positions whose nearest point is recorded.
+    /// Probes: positions; the history contains values of the point nearest to each.
     pub probes: Vec<Probe>,
-    /// Fronts that are tracked.
+    /// Tracked fronts.
     pub fronts: Vec<Front>,
     /// Cracks whose path is computed.
     pub cracks: Vec<CrackPath>,
-    /// Crack tips that are tracked.
+    /// Tracked crack tips.
     pub tips: Vec<Tip>,
 }
 
@@ -103,16 +103,16 @@ pub struct History {
 pub struct Reaction {
     /// Index of the set.
     pub set: usize,
-    /// Span of its name in the deck.
+    /// Span of the name of the set in the deck.
     pub span: Range<usize>,
 }
 
 /// A set whose reaction force along a direction is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportForce {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// Index of the set.
     pub set: usize,
@@ -123,9 +123,9 @@ pub struct SupportForce {
 /// A crack whose path is computed.
 #[derive(Debug, Clone)]
 pub struct CrackPath {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// Start position, m.
     pub from: [f64; 3],
@@ -135,12 +135,12 @@ pub struct CrackPath {
     pub threshold: f64,
 }
 
-/// A probe: a position whose nearest point is recorded.
+/// A probe: a position; the history contains values of the point nearest to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// The position, m.
     pub at: [f64; 3],
@@ -157,12 +157,12 @@ pub struct Line {
     pub direction: [f64; 3],
 }
 
-/// A front: the position that a field has reached along a line.
+/// A front: the farthest position along a line at which a field exceeds a threshold.
 #[derive(Debug, Clone)]
 pub struct Front {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// The line.
     pub line: Line,
@@ -170,20 +170,20 @@ pub struct Front {
     pub length: f64,
     /// Largest distance from the line at which points are evaluated, m.
     pub radius: f64,
-    /// The field.
+    /// Field whose values are compared with the threshold.
     pub field: Field,
     /// Component or invariant of the field.
     pub component: Component,
-    /// Threshold that the absolute value of the field must exceed.
+    /// Threshold for the absolute value of the component.
     pub threshold: f64,
 }
 
 /// A crack tip: the farthest damaged point in a direction.
 #[derive(Debug, Clone)]
 pub struct Tip {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// Start and direction of the crack.
     pub line: Line,
@@ -193,41 +193,46 @@ pub struct Tip {
     pub threshold: f64,
 }
 
-/// A field of the result that changes with time.
+/// A field of the result that is written at each output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
-    /// u, m.
+    /// Displacement u, m.
     Displacement,
-    /// u̇, m/s.
+    /// Velocity u̇, m/s.
     Velocity,
-    /// ü, m/s².
+    /// Acceleration ü, m/s².
     Acceleration,
-    /// Internal force density, N/m³, including contact.
+    /// Internal force density including contact, N/m³.
     ForceDensity,
     /// Force density of contact, N/m³.
     ContactForceDensity,
-    /// Damage φ: fraction of the family's volume with broken bonds.
+    /// Damage φ: fraction of the family's volume with broken bonds, from 0 to 1.
     Damage,
-    /// W, J/m³.
+    /// Strain energy density W, J/m³.
     StrainEnergyDensity,
-    /// θ, the trace of the three-dimensional strain. In plane stress, it is (1 − 2ν)/(1 − ν) times the trace of the
-    /// strain in the plane; under uniaxial stress, (1 − 2ν) times the strain along the bar.
+    /// Dilatation θ, the trace of the three-dimensional strain. In plane stress, it is (1 − 2ν)/(1 − ν) times
+    /// the trace of the strain in the plane; under uniaxial stress, (1 − 2ν) times the strain along the bar.
     Dilatation,
-    /// m = Σ ω|ξ|²Ṽ, m⁵.
+    /// Weighted volume m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
-    /// Kirchhoff stress Σ T⊗Y Ṽ of the three-dimensional body, Pa: xx, yy, zz, xy, yz, xz. In plane strain, zz is that of
-    /// the law for correspondence laws, otherwise ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 − ν) xx.
+    /// Kirchhoff stress Σ T⊗Y Ṽ of the three-dimensional body, Pa: xx, yy, zz, xy, yz, xz. In plane strain,
+    /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 −
+    /// ν) xx.
     Stress,
-    /// Cauchy stress: Σ T⊗Y Ṽ divided by the ratio of deformed to undeformed volume, Pa, in the same order.
+    /// Cauchy stress, Pa: Kirchhoff stress divided by the ratio of deformed to undeformed volume, in the same
+    /// order.
     CauchyStress,
-    /// von Mises' equivalent of Cauchy's stress, Pa.
+    /// Equivalent stress of von Mises from the Cauchy stress, Pa.
     VonMisesStress,
-    /// F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row; I where too few are left.
+    /// Deformation gradient F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row. F is I at points with too
+    /// few intact bonds.
     DeformationGradient,
-    /// Green–Lagrange strain ½(FᵀF − I): xx, yy, zz, xy, yz, xz, of the body in space: in plane stress it has the
-    /// stretch of the law across the plane, under uniaxial stress that by ν.
+    /// Green–Lagrange strain ½(FᵀF − I) of the three-dimensional body: xx, yy, zz, xy, yz, xz. In plane
+    /// stress, the law gives the out-of-plane stretch; under uniaxial stress, the lateral stretch follows
+    /// from ν.
     Strain,
-    /// Number of intact bonds with points that are in the family of the point, or have the point in their family.
+    /// Number of intact bonds of the point. A bond counts if one of its ends lies within the horizon of the
+    /// other.
     Neighbours,
     /// Number of the point's bonds that have broken since the start.
     BrokenBonds,
@@ -237,9 +242,10 @@ pub enum Field {
     PlasticStrainEquivalent,
     /// 1 if the point has too few intact bonds for its law and carries no force, otherwise 0.
     Singular,
-    /// Temperature; the reference temperature of the material where none is prescribed, K.
+    /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
+    /// material.
     Temperature,
-    /// The smallest id of the points that intact bonds connect to the point.
+    /// Fragment id: the smallest id of the points that intact bonds connect to the point.
     Fragment,
     /// The rank that owns the point.
     Rank,
@@ -272,7 +278,7 @@ impl Field {
         Self::Rank,
     ];
 
-    /// Its name in decks and results.
+    /// Name of the field in decks and results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Displacement => "displacement",
@@ -300,7 +306,7 @@ impl Field {
         }
     }
 
-    /// Its SI unit.
+    /// SI unit of the field.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement => "m",
@@ -325,7 +331,8 @@ impl Field {
         }
     }
 
-    /// 3 for vectors, 6 for symmetric tensors and 9 for others (padded in 1-D and 2-D), 1 for scalars.
+    /// Number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for other
+    /// tensors. Vectors and tensors are padded in 1-D and 2-D.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement
@@ -363,18 +370,18 @@ pub(crate) const DEFAULT_CHECKPOINT: f64 = 600.0;
 pub(crate) const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
 impl Problem {
-    /// The main output, then the further ones.
+    /// The main output, then the further outputs.
     pub fn outputs(&self) -> impl Iterator<Item = &Output> {
         [&self.output].into_iter().chain(&self.further_outputs)
     }
 
-    /// The further outputs with the number of bonds that have broken since their last output.
+    /// The further outputs that contain the number of bonds that have broken since their last output.
     pub fn further_counts(&self) -> impl Iterator<Item = &Output> {
         let further = self.further_outputs.iter();
         further.filter(|output| output.counts_newly_broken())
     }
 
-    /// When rows of the history are written.
+    /// Interval of rows of the history.
     pub fn row_interval(&self) -> Interval {
         let seconds = self.time.end / ROWS;
         let default = if self.is_quasi_static() {

@@ -1,4 +1,4 @@
-//! Finer grids in parts of the bodies.
+//! Settings of finer grids in parts of the bodies.
 
 use std::ops::Range;
 
@@ -6,71 +6,71 @@ use crate::expression::Expression;
 
 use super::{InterfaceRule, Problem};
 
-/// Refinement of the grid (Dipasquale et al. 2014, §2).
+/// Settings of refinement (Dipasquale et al. 2014, §2).
 #[derive(Debug, Clone)]
 pub struct Refinement {
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
-    /// The finest level; its spacing is the spacing of the grid divided by 2^levels.
+    /// The finest level. Its spacing is the spacing of the grid divided by 2^`levels`.
     pub levels: u32,
-    /// The horizons of the levels.
+    /// Rule for the horizons of the levels.
     pub rule: HorizonRule,
-    /// Factor on the horizon of points with a coarser level inside their horizon.
+    /// Factor on the horizon of points that have points of a coarser level inside their horizon.
     pub interface_factor: f64,
-    /// Horizon of bonds between points of one body with different horizons: each end uses its own, or both use the
-    /// mean.
+    /// Horizon of bonds between points of one body with different horizons: each end uses the horizon of its
+    /// point, or both use the mean.
     pub bonds: InterfaceRule,
     /// Regions that are refined from the start.
     pub regions: Vec<RefinedRegion>,
-    /// Criteria of refinement during the run, if there are any.
+    /// Criteria of refinement during the run; `None` without them.
     pub trigger: Option<Trigger>,
 }
 
-/// Criteria that make a point a trigger; one is enough. All points within the horizon of a trigger are refined, one
-/// level at a time.
+/// Criteria of refinement during the run. A point that fulfils one criterion triggers refinement: all points
+/// within its horizon are refined, one level at a time.
 #[derive(Debug, Clone)]
 pub struct Trigger {
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// Steps between evaluations of the criteria.
     pub every_steps: u64,
-    /// Smallest strain energy density of a trigger, as a fraction of the maximum over all points.
+    /// Smallest strain energy density of a triggering point, as a fraction of the maximum over all points.
     pub energy: Option<f64>,
-    /// Smallest damage of a trigger.
+    /// Smallest damage of a triggering point.
     pub damage: Option<f64>,
-    /// A condition on reference position and time.
+    /// A condition on reference position and time that makes a point trigger refinement.
     pub condition: Option<Expression>,
-    /// A condition on reference position and time that every trigger must fulfil.
+    /// A condition on reference position and time that every triggering point must fulfil.
     pub only: Option<Expression>,
-    /// Time (s) after which points become coarser again if no trigger and no point with broken bonds is in reach; never
-    /// if not given.
+    /// Time (s) after which a refined point is coarsened, if no triggering point and no point with broken
+    /// bonds has been near it. `None` for no coarsening.
     pub coarsen_after: Option<f64>,
 }
 
-/// How the horizon depends on the spacing of a level.
+/// Rule for the horizons of the levels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum HorizonRule {
-    /// δ convergence: m = δ/dx is the same on all levels.
+    /// δ convergence: the ratio m = δ/dx is the same on all levels.
     Delta,
-    /// δm convergence: m of each level from 1 on.
+    /// δm convergence: the ratio m of each level, from level 1 on.
     DeltaM(Vec<f64>),
 }
 
-/// Points that are refined from the start.
+/// A region whose points are refined from the start.
 #[derive(Debug, Clone)]
 pub struct RefinedRegion {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
-    /// Points of lower levels are refined until they have this level.
+    /// Level to which points of lower levels are refined.
     pub level: u32,
     /// Condition on the reference position that selects the points.
     pub condition: Expression,
 }
 
 impl Problem {
-    /// Criteria of refinement during the run, if there are any.
+    /// Criteria of refinement during the run; `None` without them.
     pub fn refinement_trigger(&self) -> Option<&Trigger> {
         let refinement = self.refinement.as_ref();
         refinement.and_then(|refinement| refinement.trigger.as_ref())

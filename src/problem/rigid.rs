@@ -8,69 +8,69 @@ use crate::expression::Expression;
 /// A rigid body.
 #[derive(Debug, Clone)]
 pub struct Rigid {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
-    /// Its shape.
+    /// Shape.
     pub shape: RigidShape,
-    /// Its initial centre, m; for a half space, a point on its surface.
+    /// Initial position of the centre, m; for a half space, a point on its surface.
     pub centre: [f64; 3],
-    /// How it moves.
+    /// Prescribed or free motion.
     pub motion: RigidMotion,
-    /// Contact with points; its model is [`Penalty`](super::ContactModel::Penalty).
+    /// Contact rule with points. Its model is [`Penalty`](super::ContactModel::Penalty).
     pub rule: ContactRule,
 }
 
-/// The shape of a rigid body about its centre, lengths in m.
+/// The shape of a rigid body about its centre; lengths are in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RigidShape {
-    /// A ball; a disc in the plane.
+    /// A ball, or a disc in 2-D.
     Ball {
-        /// Its radius.
+        /// Radius.
         radius: f64,
     },
     /// A cylinder.
     Cylinder {
-        /// Its direction, a unit vector.
+        /// Direction of the axis, a unit vector.
         axis: [f64; 3],
-        /// Half its length.
+        /// Half the length.
         half_length: f64,
-        /// Its radius.
+        /// Radius.
         radius: f64,
     },
-    /// A box along the axes.
+    /// A box with edges along the axes.
     Box {
-        /// Half its edges.
+        /// Half the edges.
         half: [f64; 3],
     },
-    /// The half space behind a plane.
+    /// The half space on one side of a plane.
     HalfSpace {
         /// Outward unit normal of the half space.
         normal: [f64; 3],
     },
 }
 
-/// How a rigid body moves.
+/// Motion of a rigid body.
 #[derive(Debug, Clone)]
 pub enum RigidMotion {
-    /// By a prescribed displacement (m), one expression of t for each component, without rotation.
+    /// Prescribed displacement (m) without rotation, as an expression of t for each component.
     Driven(Vec<Expression>),
-    /// Freely, by the forces on it.
+    /// Motion under the forces on the body.
     Free {
-        /// Its mass, kg.
+        /// Mass, kg.
         mass: f64,
-        /// Velocity of its centre at the start, m/s.
+        /// Initial velocity of the centre, m/s.
         velocity: [f64; 3],
-        /// Angular velocity at the start, 1/s.
+        /// Initial angular velocity, 1/s.
         angular_velocity: [f64; 3],
-        /// Force at its centre, N: an expression of t for each component; may be empty.
+        /// Force at the centre, N, as an expression of t for each component. It may be empty.
         force: Vec<Expression>,
     },
 }
 
 impl Problem {
-    /// Whether the problem has any contact, between points or with a rigid body.
+    /// Whether the problem has contact between points or with rigid bodies.
     pub fn has_contact(&self) -> bool {
         self.contact.is_some() || !self.rigid.is_empty()
     }

@@ -1,8 +1,9 @@
-//! Problems with a single body, as a block of its lattice without loads.
+//! Problems with a single body without conditions, for computations on a block of its lattice.
 
 use super::{PointSource, Problem, Shape, StepRule};
 
-/// A problem with one body only, and its cell edges (m); `None` for points from a file.
+/// Create a problem with this body only, and return the edges of its cells (m). The result is `None` for
+/// points that are not on a lattice.
 pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
     let mut body = problem.bodies[body].clone();
     let PointSource::Lattice { spacing, .. } = body.points else {
@@ -12,7 +13,7 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
         damage.no_failure.clear();
         damage.weibull = None;
     }
-    // No time steps are made.
+    // These problems make no time steps, so damping must not limit the step.
     body.material.damping = 0.0;
     let mut single = Problem {
         volume_correction: problem.volume_correction,
@@ -24,7 +25,8 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
     Some((single, spacing))
 }
 
-/// Replace the body's points by the cells between two corners of a lattice through `origin`; all in m.
+/// Replace the body's points by the cells between two corners (m) of a lattice. `origin` is a corner of a
+/// cell, m.
 pub fn fill(
     problem: &mut Problem,
     [lower, upper]: [[f64; 3]; 2],

@@ -1,16 +1,16 @@
-//! Sums and extremes of fields over sets, for the history.
+//! Settings of sums and extremes of fields over sets, for the history.
 
 use std::ops::Range;
 
 use super::Field;
 use crate::component::Component;
 
-/// Sums and extremes of a field over a set.
+/// Settings of sums and extremes of a field over a set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldStatistics {
-    /// Their name.
+    /// Name of the statistics in the deck.
     pub name: String,
-    /// Their span in the deck.
+    /// Span in the deck.
     pub span: Range<usize>,
     /// Index of the set.
     pub set: usize,
@@ -38,7 +38,7 @@ pub enum Statistic {
 }
 
 impl Statistic {
-    /// Its name in decks and columns.
+    /// Name in decks and columns.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sum => "sum",
@@ -49,7 +49,7 @@ impl Statistic {
         }
     }
 
-    /// Its SI unit, of a field.
+    /// SI unit, for values of a field.
     pub fn unit(self, field: Field) -> &'static str {
         match self {
             Self::Sum | Self::Mean | Self::Minimum | Self::Maximum => field.unit(),
@@ -62,7 +62,7 @@ impl Statistic {
                 "Pa" => "Pa m^3",
                 "J/m^3" => "J",
                 "K" => "K m^3",
-                // The field has no unit.
+                // The field is dimensionless.
                 _ => "m^3",
             },
         }

@@ -4,20 +4,21 @@ use super::{Action, Problem};
 use crate::dimension::{Constraint, Dimension};
 use crate::expression::Variable;
 
-/// Free expansion of a material: the stretch α (T − T₀) in all directions of space.
+/// Thermal expansion of a material: the free stretch α (T − T₀) in all directions of space.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ThermalExpansion {
-    /// α, 1/K.
+    /// Coefficient of thermal expansion α, 1/K.
     pub coefficient: f64,
-    /// T₀, at which the material is free of stress.
+    /// Reference temperature T₀, at which the undeformed material is free of stress.
     pub reference_temperature: f64,
 }
 
 impl ThermalExpansion {
-    /// Free stretch per kelvin in the directions of a setting, 1/K, for Poisson's ratio ν.
+    /// Free stretch per kelvin in the plane or along the bar, 1/K, for Poisson's ratio ν.
     ///
-    /// Where strain is 0 across these directions, the stress there adds to the free stretch: (1 + ν) α in plane strain,
-    /// (1 + ν)/(1 − ν) α under uniaxial strain. Otherwise it is α.
+    /// If the strain perpendicular to the plane or bar is 0, the stress in this direction adds to the
+    /// stretch. The stretch is then (1 + ν) α in plane strain, and (1 + ν)/(1 − ν) α under uniaxial strain.
+    /// Otherwise it is α.
     pub fn in_setting(self, dimension: Dimension, poisson_ratio: f64) -> f64 {
         let factor = match dimension {
             Dimension::PlaneStrain { .. } => 1.0 + poisson_ratio,
@@ -32,13 +33,13 @@ impl ThermalExpansion {
 }
 
 impl Problem {
-    /// Whether points have temperatures.
+    /// Whether any condition prescribes temperatures.
     pub fn has_temperature(&self) -> bool {
         let mut actions = self.conditions.iter().map(|condition| &condition.action);
         actions.any(|action| matches!(action, Action::Temperature(_)))
     }
 
-    /// Whether temperatures change during a run. Their work is missing from the energy balance.
+    /// Whether prescribed temperatures change during a run. The energy balance does not contain their work.
     pub fn temperature_changes(&self) -> bool {
         let stages = self.all_stages();
         let acts_always = |index: usize| stages.iter().all(|stage| stage.acting[index]);
@@ -54,7 +55,8 @@ impl Problem {
 mod tests {
     use super::*;
 
-    /// Hooke's law: σ = λ tr ε I + 2G ε − 3K α ΔT I, without stress in the directions of the setting and without strain across.
+    /// The free stretch must give zero stress in Hooke's law σ = λ tr ε I + 2G ε − 3K α ΔT I, in the plane or
+    /// along the bar. The strain perpendicular to the plane or bar is 0.
     #[test]
     fn the_stress_in_the_setting_is_zero() {
         let (lambda, shear) = (3.0, 2.0);

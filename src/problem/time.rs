@@ -1,34 +1,35 @@
-//! The time axis, stages, and solution methods.
+//! Time settings, stages, and solution methods.
 
 use super::Problem;
 
-/// The time axis.
+/// Time settings of a run or stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Time {
     /// End time, s.
     pub end: f64,
-    /// The step.
+    /// Rule for the time step.
     pub step: StepRule,
     /// The solution method.
     pub method: Method,
     /// Factor on the density in the equation of motion.
     pub density_scale: f64,
-    /// Settings of a step that adapts to the number of broken bonds, if this is requested.
+    /// Settings of a step that adapts to the number of breaking bonds; `None` for a constant step.
     pub adaptive: Option<Adaptive>,
 }
 
-/// A time step that adapts to the number of bonds that break in it.
+/// Settings of a time step that adapts to the number of bonds that break in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
-    /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a smaller dt.
+    /// Largest number of bonds of one point that may break in a step. If more break, the step is repeated
+    /// with a smaller dt.
     pub most_broken: u64,
-    /// Largest number of bonds of one point that may break in a calm step.
+    /// Largest number of bonds of one point that break in a calm step.
     pub stable_broken: u64,
     /// Number of consecutive calm steps before dt is raised.
     pub steps: u64,
-    /// Factor on dt when a step is repeated.
+    /// Factor on dt if a step is repeated.
     pub reduce: f64,
-    /// Factor on dt when it is raised.
+    /// Factor on dt after `steps` calm steps.
     pub raise: f64,
     /// The smallest step, s; `None` for 1/100 of the largest.
     pub smallest: Option<f64>,
@@ -40,7 +41,7 @@ pub struct Adaptive {
 const SMALLEST_SHARE: f64 = 0.01;
 
 impl Adaptive {
-    /// The smallest and the largest step (s) of a stage, from the step (s) chosen for it.
+    /// Return the smallest and the largest step of a stage (s). `step` is the step chosen for the stage, s.
     pub fn limits(&self, step: f64) -> [f64; 2] {
         let largest = self.largest.unwrap_or(step);
         let smallest = self.smallest.unwrap_or(SMALLEST_SHARE * largest);
@@ -51,9 +52,9 @@ impl Adaptive {
 /// A stage of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Its end, measured from the start of the run, and its time settings.
+    /// Time settings. The end is measured from the start of the run.
     pub time: Time,
-    /// Whether each condition acts.
+    /// Whether each condition of the problem acts in this stage.
     pub acting: Vec<bool>,
 }
 
@@ -62,9 +63,10 @@ pub struct Stage {
 pub enum Method {
     /// Integration of the equation of motion with velocity Verlet.
     Explicit,
-    /// One equilibrium per load step, by relaxation; t is the load parameter, and [`Time::step`] is not used.
+    /// One equilibrium per load step, by relaxation. The time t is the load parameter, and [`Time::step`] is
+    /// not used.
     Relaxation(Relaxation),
-    /// One equilibrium per load step, by Newton's method; otherwise as [`Method::Relaxation`].
+    /// Same as [`Method::Relaxation`], by Newton's method.
     Static(Static),
 }
 
@@ -75,14 +77,14 @@ pub struct Static {
     pub load_steps: u64,
     /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
     pub tolerance: f64,
-    /// Largest number of iterations of a load step in which no bond breaks.
+    /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub max_iterations: u64,
-    /// How many times a load step may be halved.
+    /// Largest number of times that a load step is halved.
     pub max_halvings: u64,
 }
 
 impl Method {
-    /// Its name in a deck.
+    /// Name in decks.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Explicit => "explicit",
@@ -91,7 +93,7 @@ impl Method {
         }
     }
 
-    /// Advice for error messages: what to change in the deck if the method finds no equilibrium.
+    /// Advice for error messages if the method finds no equilibrium: what to change in the deck.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {
@@ -101,7 +103,7 @@ impl Method {
         }
     }
 
-    /// The number of load steps, if the method computes equilibria.
+    /// Number of load steps; `None` for the explicit method.
     pub fn load_steps(&self) -> Option<u64> {
         match self {
             Self::Explicit => None,
@@ -111,23 +113,23 @@ impl Method {
     }
 }
 
-/// Settings of the relaxation.
+/// Settings of relaxation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relaxation {
     /// Number of load steps.
     pub load_steps: u64,
     /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
     pub tolerance: f64,
-    /// Largest number of iterations of a load step.
+    /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub iterations: u64,
 }
 
-/// How the time step is chosen.
+/// Rule for the time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepRule {
-    /// Automatic: this fraction of the stable step.
+    /// A fraction of the stable step.
     Automatic(f64),
-    /// Fixed, s.
+    /// A fixed step, s.
     Fixed(f64),
 }
 
@@ -147,7 +149,7 @@ impl Problem {
         stages
     }
 
-    /// Whether any stage of the run is a sequence of equilibria.
+    /// Whether any stage of the run computes equilibria.
     pub fn is_quasi_static(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.is_quasi_static())
@@ -159,7 +161,7 @@ impl Problem {
         stages.any(|stage| matches!(stage.time.method, Method::Relaxation(_)))
     }
 
-    /// Whether any stage uses Newton's method.
+    /// Whether any stage of the run uses Newton's method.
     pub fn has_newton(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| matches!(stage.time.method, Method::Static(_)))
@@ -184,7 +186,7 @@ impl Problem {
 }
 
 impl Time {
-    /// Whether the method computes a sequence of equilibria.
+    /// Whether the method computes equilibria.
     pub fn is_quasi_static(&self) -> bool {
         self.method.load_steps().is_some()
     }

@@ -1,16 +1,16 @@
-//! Detection of nodes that have coarser nodes within a given distance.
+//! Detection of nodes that have coarser nodes within a distance.
 
 use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
-/// Tests whether nodes of a level have coarser nodes within a given distance.
+/// Test whether nodes of a level have coarser nodes within a distance.
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// The nodes of the level that are not of level 0.
+    /// The nodes of the level that are not nodes of level 0.
     finer: GridIndexSet,
-    /// The bits of a word that are on the grid of level 0, for words that touch this grid.
+    /// The bits of a word that lie on the grid of level 0. They are the same for all words with such bits.
     coarsest: u64,
     /// For each bit of a word, the neighbouring words and their bits within the distance.
     reach: Vec<Vec<(GridIndex, u64)>>,
@@ -62,8 +62,8 @@ impl<'a> AtCoarser<'a> {
         }
     }
 
-    /// Test whether the level's grid has an index within the distance of `index` at which a node is
-    /// possible but does not exist.
+    /// Test whether a coarser node lies within the distance of `index`. This is the case if a node of the
+    /// level is possible at an index within the distance, but does not exist.
     ///
     /// `body` tests whether a cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {

@@ -1,11 +1,11 @@
-//! Fractions of refined points that belong to a set of level-0 points.
+//! Fractions of refined points that belong to a set.
 
 use rustc_hash::FxHashMap;
 
 use super::Grids;
 use super::grid_index::GridIndex;
 
-/// Computes the fraction of points that belongs to a set of level-0 points.
+/// Calculator of the fraction of a point that belongs to a set.
 ///
 /// The fraction of a level-0 point is 0 or 1. The fraction of a finer point is the mean over its parents. A
 /// point takes its volume in equal parts from its parents, so refinement does not change the volume of the
@@ -24,8 +24,8 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// The fraction of a point, given its body, id and reference position (m). `selected` tests a body and
-    /// a level-0 reference position.
+    /// Return the fraction of a point, given its body, id and reference position (m). `selected` tests
+    /// whether the set contains a body's level-0 point, given the body and the reference position.
     pub fn of(
         &mut self,
         (body, id, position): (usize, u64, [f64; 3]),
@@ -38,7 +38,7 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// The fraction at an index of the finest level.
+    /// The fraction of the point at a grid index in steps of the finest level.
     fn at(
         &mut self,
         body: usize,

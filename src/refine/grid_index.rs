@@ -1,6 +1,6 @@
 //! Grid indices of a level, their parents and their neighbours.
 
-/// A grid index: a position in steps of a level's spacing, from the centre of cell 0.
+/// A grid index: a position as a multiple of a level's spacing, from the centre of cell 0.
 pub type GridIndex = [i64; 3];
 
 /// The indices with components from `low` to `high`, both included.
@@ -31,8 +31,8 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
     between(low, high).filter(move |other| *other != middle)
 }
 
-/// The index with a given number in a cell of level 0, in steps of a level, x fastest. `origin`, the centre
-/// of the cell, has number 0.
+/// The index with this number in a cell of level 0, in steps of a level. Numbers count indices with x
+/// fastest; `origin`, the centre of the cell, has number 0.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)
@@ -43,7 +43,7 @@ pub(super) fn halves(index: GridIndex) -> u32 {
     index.iter().map(|x| (x & 1) as u32).sum()
 }
 
-/// The coarsest level whose grid contains the position, and the index in its steps.
+/// The coarsest level whose grid contains the position of an index, and the index in steps of this level.
 pub(super) fn canonical(mut level: u32, mut index: GridIndex) -> (u32, GridIndex) {
     while level > 0 && halves(index) == 0 {
         level -= 1;

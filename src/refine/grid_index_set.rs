@@ -16,14 +16,14 @@ pub struct GridIndexSet {
     words: FxHashMap<GridIndex, u64>,
 }
 
-/// The word of an index, and its bit.
+/// The word that contains an index, and the bit of the index.
 pub(super) fn split(index: GridIndex) -> (GridIndex, usize) {
     let [x, y, z] = index.map(|x| x.rem_euclid(EDGE) as usize);
     let edge = EDGE as usize;
     (index.map(|x| x.div_euclid(EDGE)), x + edge * (y + edge * z))
 }
 
-/// The index of a bit of a word.
+/// The index that belongs to a bit of a word.
 pub(super) fn join(word: GridIndex, bit: usize) -> GridIndex {
     let edge = EDGE as usize;
     let within = [bit % edge, bit / edge % edge, bit / edge / edge];
@@ -43,7 +43,7 @@ impl GridIndexSet {
         self.word(word) >> bit & 1 == 1
     }
 
-    /// The bits of the indices of a word.
+    /// The bits of the indices in a word.
     pub(super) fn word(&self, word: GridIndex) -> u64 {
         self.words.get(&word).copied().unwrap_or(0)
     }

@@ -25,14 +25,14 @@ pub struct Grids<'a> {
     bodies: Vec<Option<BodyGrid<'a>>>,
 }
 
-/// The grid of a body defined by a shape.
+/// The grid of a body on a lattice.
 #[derive(Clone)]
 struct BodyGrid<'a> {
     cells: Arc<LatticeBody<'a>>,
     pattern: Pattern,
 }
 
-/// A node as body, level and grid index.
+/// A node: body, level, and the three components of its grid index.
 pub type NodeKey = [i64; 5];
 
 /// Sort key of nodes, finer levels first.
@@ -70,13 +70,13 @@ impl<'a> Grids<'a> {
         })
     }
 
-    /// Number of level-0 points of all ranks; ids of finer points are not below it.
+    /// Number of level-0 points of all ranks. Ids of finer points are at least this number.
     pub fn coarsest(&self) -> u64 {
         self.coarsest
     }
 
-    /// Refine the regions of the problem permanently. Suppress nodes whose parents a pre-crack separates.
-    /// `coarse` are this rank's level-0 points. Collective.
+    /// Refine the regions of the problem permanently. Nodes are suppressed if a pre-crack separates their
+    /// parents. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
     /// If a region has no point; the error is the same on all ranks.
@@ -122,7 +122,7 @@ impl<'a> Grids<'a> {
         Ok(())
     }
 
-    /// Refine nodes and their ancestors. Return true if any was not refined before.
+    /// Refine nodes and their ancestors. Return whether any of these nodes was not refined before.
     pub fn refine(&mut self, keys: &[NodeKey]) -> bool {
         let mut changed = false;
         for [body, level, x, y, z] in keys {
@@ -160,14 +160,15 @@ impl<'a> Grids<'a> {
         removed
     }
 
-    /// The node to coarsen for the point of a body at a position (m), if it is refined and not permanent.
+    /// The node that is coarsened at the point of a body at a position (m); `None` if it is not refined or is
+    /// permanent.
     pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
         let index = self.index_at(body, position)?;
         let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(index)?;
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// Suppress the nodes created since `earlier` whose two parents are separated. `separated` gets the
+    /// Suppress nodes that are new since `earlier` and whose two parents are separated. `separated` tests the
     /// positions (m) of both parents.
     pub fn suppress_separated(
         &mut self,
@@ -193,8 +194,8 @@ impl<'a> Grids<'a> {
         }
     }
 
-    /// The faces at suppressed nodes, between adjacent nodes: centre (m), edges of the nodes' cells (m),
-    /// and axis of the normal.
+    /// The faces between adjacent nodes at which nodes are suppressed. Each face has its centre (m), the
+    /// edges of the cells of these nodes (m), and the axis of its normal.
     pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
@@ -212,7 +213,7 @@ impl<'a> Grids<'a> {
         faces
     }
 
-    /// All refined nodes, and all suppressed nodes by canonical level and index.
+    /// All refined nodes, and all suppressed nodes with canonical level and index.
     pub fn state(&self) -> [Vec<NodeKey>; 2] {
         let mut state = [Vec::new(), Vec::new()];
         for (body, grid) in (0..).zip(&self.bodies) {
@@ -229,7 +230,7 @@ impl<'a> Grids<'a> {
         state
     }
 
-    /// Refine to a state returned by [`Self::state`]. Return true if any node was not refined before.
+    /// Refine to a state that [`Self::state`] returned. Return whether any node was not refined before.
     pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
@@ -239,7 +240,7 @@ impl<'a> Grids<'a> {
         self.refine(refined)
     }
 
-    /// The node to refine for the point of a block at a position (m), unless it is of the finest level.
+    /// The node that is refined at the point of a block at a position (m); `None` if it has the finest level.
     pub fn refining(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
         let level = self.problem.block(block).level;
         if level == self.finest {
@@ -252,19 +253,20 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// The index of the finest level at a position (m) in a body.
+    /// The grid index in steps of the finest level at a position (m) in a body.
     pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
-    /// Reference position (m) at an index of the finest level, if it is on the grid of level 0.
+    /// Reference position (m) of a grid index in steps of the finest level; `None` if it is not on the grid
+    /// of level 0.
     pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))
     }
 
-    /// The parents of an index; all are indices of the finest level.
+    /// The parents of a node. All indices are in steps of the finest level.
     pub fn parents(&self, index: GridIndex) -> Vec<GridIndex> {
         let (level, index) = canonical(self.finest, index);
         let steps = 1 << (self.finest + 1 - level);
@@ -286,8 +288,8 @@ impl<'a> Grids<'a> {
         points.map(unrefined).collect()
     }
 
-    /// The points in the cells of `coarse`, which are unrefined level-0 points. First come these points
-    /// with updated volumes and blocks, then the finer points.
+    /// The points in the cells of `coarse`, which are level-0 points without refinement. The result begins
+    /// with these points, with updated volumes and blocks; finer points follow.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
         let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
             let grid = grid.as_ref()?;
@@ -332,12 +334,12 @@ impl<'a> Grids<'a> {
         coarse
     }
 
-    /// For each level from 1 on, the test for coarser nodes within the horizon. Empty if horizons are not
-    /// enlarged at interfaces.
+    /// For each level from 1 on, the test for coarser nodes within the horizon. The result is empty if
+    /// horizons are not enlarged at interfaces.
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
-            // In this case, nodes at interfaces can share a lattice with the other nodes.
+            // Without enlarged horizons, nodes at interfaces can share a lattice with other nodes.
             return Vec::new();
         }
         let of_level = |level| {
@@ -373,14 +375,14 @@ impl<'a> Grids<'a> {
         self.problem.block_number(body, node.level, kind)
     }
 
-    /// The cells of a body whose points can differ from the unrefined points; `None` for a body without a
-    /// shape.
+    /// The level-0 cells of a body whose points may differ from those without refinement; `None` for a body
+    /// that is not on a lattice.
     pub fn changed(&self, body: usize) -> Option<GridIndexSet> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.pattern.changed())
     }
 
-    /// The cell of level 0 that contains an index of the finest level.
+    /// The cell of level 0 that contains a grid index in steps of the finest level.
     pub fn cell_of(&self, index: GridIndex) -> GridIndex {
         index.map(|x| x >> self.finest)
     }
@@ -392,13 +394,13 @@ impl BodyGrid<'_> {
         self.pattern.node(&|cell| cells.has_cell(cell), index)
     }
 
-    /// Reference position (m) at an index of a level.
+    /// Reference position (m) of a grid index in steps of a level.
     fn position(&self, level: u32, index: GridIndex) -> [f64; 3] {
         let scale = 0.5_f64.powi(level as i32);
         self.cells.position(index.map(|x| x as f64 * scale))
     }
 
-    /// Call `visit(index, position)` for each node of a level in the cell with a given centre (m).
+    /// Call `visit(index, position)` for each node of a level in the level-0 cell with this centre (m).
     fn for_each_node(
         &self,
         centre: [f64; 3],

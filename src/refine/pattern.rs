@@ -10,15 +10,15 @@ use super::grid_index_set::GridIndexSet;
 /// A node of a refined grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// The level of its block, which determines the spacing of its neighbours.
+    /// The level of the node's block, which determines the spacing of its neighbours.
     pub level: u32,
-    /// Ratio of its volume to that of a level-0 cell.
+    /// Ratio of the node's volume to that of a level-0 cell.
     pub volume_fraction: f64,
     /// Whether the volume is exactly that of a cell of its level.
     pub whole: bool,
 }
 
-/// The refined nodes of a body, by level, as grid indices of their level.
+/// The refined nodes of a body, by level. A node is stored as a grid index in steps of its level.
 ///
 /// - The `body` arguments test whether a cell belongs to the body.
 /// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level.
@@ -91,8 +91,8 @@ impl Pattern {
         self.permanent = self.refined.as_slice().into();
     }
 
-    /// The finest level at which an index of the finest level is a refined node, and the index in its
-    /// steps. `None` if that node is permanent.
+    /// The finest level at which a grid index is a refined node, and the index in steps of this level. The
+    /// argument is in steps of the finest level. `None` if the node is permanent or not refined.
     pub fn refined_at(&self, index: GridIndex) -> Option<(u32, GridIndex)> {
         let finest = self.finest();
         let (coarsest, _) = canonical(finest, index);
@@ -104,7 +104,7 @@ impl Pattern {
         node.filter(|node| !is_in(&self.permanent, node))
     }
 
-    /// The nodes removed by the coarsening of a node, as indices of the finest level.
+    /// The nodes that coarsening a node has removed, as grid indices in steps of the finest level.
     pub fn removed(
         &self,
         body: &impl Fn(GridIndex) -> bool,
@@ -130,7 +130,7 @@ impl Pattern {
         self.is_taken(level, index) && self.is_possible(body, level, index)
     }
 
-    /// Test whether a node exists at an index of a level at which a node is possible.
+    /// Test whether a node exists at an index of a level, if a node is possible at this index.
     fn is_taken(&self, level: u32, index: GridIndex) -> bool {
         let (level, index) = canonical(level, index);
         level == 0 || {
@@ -139,7 +139,8 @@ impl Pattern {
         }
     }
 
-    /// Test whether a cell, numbered from its centre, can contain nodes other than number 0.
+    /// Test whether a level-0 cell, given by the index of its centre, can contain nodes other than its
+    /// centre.
     pub fn touches(&self, cell: GridIndex) -> bool {
         let Some(refined) = self.refined.first() else {
             return false;
@@ -148,7 +149,8 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The cells whose nodes can differ from the unrefined ones, or that can contain finer nodes.
+    /// The level-0 cells whose nodes may differ from those without refinement, or that can contain finer
+    /// nodes.
     pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
         let mut changed = GridIndexSet::default();
@@ -160,7 +162,7 @@ impl Pattern {
         changed
     }
 
-    /// The node at an index of the finest level, if it exists.
+    /// The node at a grid index in steps of the finest level; `None` if there is none.
     pub fn node(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> Option<Node> {
         let finest = self.finest();
         if !self.exists(body, finest, index) {
@@ -168,7 +170,8 @@ impl Pattern {
         }
         let (coarsest, canonical_index) = canonical(finest, index);
         let dimension = self.dimension as u32;
-        // Volumes in units of 1/2^dimension of the finest cell are integers, so the arithmetic is exact.
+        // Volumes are integers in units of the finest cell's volume divided by 2^dimension, so the arithmetic
+        // is exact.
         let cell = |level: u32| 1_u64 << (dimension * (finest + 1 - level));
         let (mut level, mut volume) = (coarsest, cell(coarsest));
         let mut complete = true;
@@ -203,8 +206,8 @@ impl Pattern {
         })
     }
 
-    /// Test whether a node is possible at an index of a level: all level-0 nodes around it belong to the
-    /// body, and neither it nor an ancestor is suppressed.
+    /// Test whether a node is possible at an index of a level. All level-0 nodes around the index must belong
+    /// to the body. Neither the node nor an ancestor may be suppressed.
     pub(super) fn is_possible(
         &self,
         body: &impl Fn(GridIndex) -> bool,
@@ -234,7 +237,7 @@ impl Pattern {
         self.suppressed.iter().copied()
     }
 
-    /// The nodes of one canonical level that exist now but did not in `earlier`, as indices of the level.
+    /// The nodes of one canonical level that exist now but not in `earlier`, as indices of this level.
     pub fn created_since(
         &self,
         earlier: &Self,
@@ -260,7 +263,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All nodes of the body by index, in steps of the finest level.
+    /// All nodes of a body, by grid index in steps of the finest level.
     fn nodes(
         pattern: &Pattern,
         body: &impl Fn(GridIndex) -> bool,
@@ -313,7 +316,8 @@ mod tests {
         assert!(!at_coarser(1, 0.5) && at_coarser(1, 0.75));
     }
 
-    /// Refine randomly up to level `finest`, with suppressed nodes, then coarsen; check volumes and levels.
+    /// Check volumes and levels after random refinement up to level `finest`, with suppressed nodes, and
+    /// after coarsening.
     fn check(
         (dimension, edge, finest): (usize, i64, u32),
         holes: &[GridIndex],
@@ -404,7 +408,8 @@ mod tests {
         assert_eq!(before.len() as f64, cells);
     }
 
-    /// The indices at half a step of a level around an index, all of the finest level.
+    /// The indices at half a spacing of a level around an index. All indices are in steps of the finest
+    /// level.
     fn around_by_half(
         level: u32,
         finest: u32,

@@ -11,15 +11,15 @@ use crate::solver::Simulation;
 use super::files::Files;
 use super::recorder::Recorder;
 
-/// Writes checkpoints, and counts them and their time.
+/// Writer of checkpoints, with their number and the time spent on them.
 pub struct CheckpointWriter {
     checkpoints: Checkpoints,
-    /// Description of the physics, to compare at a restart.
+    /// Description of the physics, which a restart compares with that of its deck.
     physics: String,
     fingerprint: u64,
     /// Number of checkpoints written.
     pub written: u64,
-    /// Time spent on writing them.
+    /// Time spent on writing checkpoints.
     pub spent: Duration,
 }
 
@@ -42,7 +42,7 @@ impl CheckpointWriter {
         Ok(Self::after(checkpoints, physics, fingerprint(simulation)))
     }
 
-    /// Create the writer for a restarted run, with the checkpoints of its folder.
+    /// Create the writer for a restarted run, which continues with the existing checkpoints of the folder.
     pub fn after(checkpoints: Checkpoints, physics: String, fingerprint: u64) -> Self {
         Self {
             checkpoints,

@@ -8,8 +8,9 @@ use crate::solver::Simulation;
 use crate::solver::motion::Clock;
 use crate::solver::observers::HistoryRow;
 
-/// Ratio of energy gain to energy input above which a warning is printed. Near the stable step, the energy
-/// of the shortest waves at full steps oscillates by several times its mean.
+/// Ratio of energy gain to energy input above which a warning is printed. Near the stable step, the energy of
+/// the shortest waves at full steps oscillates by several times its mean, so smaller gains do not prove
+/// instability.
 const WARNING_GAIN: f64 = 1.0;
 
 /// Ratio of energy gain to energy input that ends the run, if it is exceeded in two consecutive rows.
@@ -18,25 +19,25 @@ const FATAL_GAIN: f64 = 100.0;
 /// Ratio of energy gain to energy input that ends the run at once.
 const CERTAIN_GAIN: f64 = 1e9;
 
-/// Ratio of the energy that breaking bonds added to the energy input, above which a warning is printed.
+/// If breaking bonds have added more energy than this fraction of the energy input, a warning is printed.
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
-/// Strain whose energy may be round-off.
+/// Strain below which strain energy may be round-off.
 const ROUNDOFF_STRAIN: f64 = 1e-9;
 
-/// Compares the energy of a run with the energy input.
+/// Comparison of the energy of a run with the energy input.
 pub struct EnergyWatch {
-    /// Upper bound of round-off, J.
+    /// Upper bound of the round-off of the energy, J.
     floor: f64,
     /// Maximum energy input so far, J: initial energy, and work of loads and supports.
     input: f64,
-    /// Whether the growth has been reported.
+    /// Whether a warning about an energy gain has been printed.
     warned: bool,
-    /// Maximum energy freed by breaking bonds at any row, J.
+    /// Largest fracture energy of a row so far, J.
     max_freed: f64,
-    /// Whether the energy added by breaking bonds has been reported.
+    /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
-    /// Whether the gain was fatal in the last row.
+    /// Whether the gain in the last row was above [`FATAL_GAIN`].
     suspected: bool,
     steps: String,
 }
@@ -63,14 +64,16 @@ impl EnergyWatch {
         }
     }
 
-    /// Check a row of the history. Return a warning when the energy grows for the first time; the same on
-    /// all ranks.
+    /// Check a row of the history. Return a warning at the first row with an energy gain. The result is the
+    /// same on all ranks.
     ///
     /// # Errors
-    /// If the growth is fatal or the energy is not finite.
+    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last one, above
+    /// [`CERTAIN_GAIN`] in one row, or not finite.
     pub fn check(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
-        // If bonds added energy when they broke, this would hide part of the gain.
+        // Negative fracture energy means that breaking bonds have added energy, which would hide part of the
+        // gain.
         let gain = row.energies.error - row.energies.fracture.min(0.0);
         let input = start.abs() + work.abs() + row.step_energy;
         self.input = self.input.max(input);
@@ -98,8 +101,8 @@ impl EnergyWatch {
         Ok(Some(format!("{} ({})", text(), self.steps)))
     }
 
-    /// Check a row of the history. Return a warning when breaking bonds have added energy for the first
-    /// time. A correspondence law can store more energy with fewer bonds.
+    /// Check a row of the history. Return a warning at the first row in which breaking bonds have added
+    /// energy. A correspondence law can store more energy with fewer bonds.
     pub fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
         self.max_freed = self.max_freed.max(freed);

@@ -8,13 +8,13 @@ use crate::error::{Error, Result};
 use crate::output::checkpoint::{Checkpoints, is_taken};
 use crate::problem::Problem;
 
-/// Maximum wait for the lock of the folder.
+/// Longest wait for the lock of the folder.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Paths of the output files.
 #[derive(Debug, Clone)]
 pub struct Files {
-    /// The folder.
+    /// The folder of the run.
     pub folder: PathBuf,
     /// The main result.
     pub result: PathBuf,
@@ -44,10 +44,10 @@ impl Files {
         all.map(PathBuf::as_path)
     }
 
-    /// Check that a new run may write to the folder. For rank 0.
+    /// Check that a new run may write to the folder. Called on rank 0.
     ///
     /// # Errors
-    /// If there is a result or checkpoint that must not be replaced.
+    /// If the folder contains a result or checkpoint that must not be replaced.
     pub fn prepare(&self, overwrite: bool) -> Result<()> {
         let files = self.results().chain([self.history.as_path()]);
         let existing = files
@@ -68,7 +68,7 @@ impl Files {
         Ok(())
     }
 
-    /// Create the folder and lock it until the returned file is dropped. For rank 0.
+    /// Create the folder and lock it until the returned file is dropped. Called on rank 0.
     ///
     /// # Errors
     /// If the folder cannot be created, its path is not UTF-8, or another run has locked it.
@@ -102,7 +102,7 @@ impl Files {
         }
     }
 
-    /// Rename an existing result and history, so that new ones can be created. Return the new names. For
+    /// Rename existing files of a result, so that new ones can be created. Return the new paths. Called on
     /// rank 0.
     ///
     /// # Errors
@@ -133,7 +133,7 @@ impl Files {
     }
 }
 
-/// Path of the result of an output, the main one if it has no name.
+/// Path of the result of an output; of the main result if `name` is `None`.
 fn result_of(folder: &Path, name: Option<&str>) -> PathBuf {
     match name {
         None => folder.join("result.vtkhdf"),

@@ -1,14 +1,14 @@
-//! Fields and static data of a result.
+//! Static data and description of the fields of a result.
 
 use crate::comm::{self, IdOrder};
 use crate::output::{Contents, FieldData, FieldDescription, Piece};
 use crate::problem::{Field, Output};
 use crate::solver::Simulation;
 
-/// Names of the fields that change only with the points.
+/// Names of the static fields. Their values change only if refinement creates or removes points.
 pub const FIXED: [&str; 4] = ["id", "block", "volume", "level"];
 
-/// Fields and static data of a new or resumed result.
+/// Static data and fields of a new or resumed result.
 pub struct ResultLayout<'a> {
     positions: Vec<f64>,
     ids: Vec<u64>,
@@ -24,7 +24,8 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data by id. `rows` are the rows of the result. Collective.
+    /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range that the
+    /// result contains. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,
@@ -64,7 +65,7 @@ impl<'a> ResultLayout<'a> {
         }
     }
 
-    /// The fields that change only with the points.
+    /// The static fields, see [`FIXED`].
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,
@@ -83,7 +84,7 @@ impl<'a> ResultLayout<'a> {
         fixed
     }
 
-    /// The description of the result; `fixed` is [`Self::fixed`].
+    /// The description of the result. `fixed` are the fields of [`Self::fixed`].
     pub fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
         Contents {
             piece: self.piece,

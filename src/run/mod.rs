@@ -16,7 +16,7 @@
 //! # }
 //! ```
 //!
-//! `examples/` has complete programs: one runs a deck under MPI, one builds its problem in Rust.
+//! `examples/` contains complete programs: one runs a deck under MPI, another builds its problem in Rust.
 
 mod checkpoints;
 mod crack_files;
@@ -68,7 +68,7 @@ use watch::{Decision, Votes, Watch};
 /// The outcome of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Reason of a stop before the end, after which a checkpoint was written.
+    /// Reason of a stop before the end; `None` if the run is complete. A checkpoint was written at the stop.
     pub stopped: Option<Reason>,
     /// Number of the step reached.
     pub number: u64,
@@ -76,13 +76,13 @@ pub struct Outcome {
     pub last: u64,
     /// Time reached, s.
     pub time: f64,
-    /// The last row of the history, if this run has written any.
+    /// The last row of the history; `None` if this run has not written any.
     pub last_row: Option<HistoryRow>,
     /// The output files.
     pub files: Files,
-    /// Figures of the run.
+    /// Size and times of the run, for the summary.
     pub summary: Summary,
-    /// Causes of non-collective writes to the result, as bits defined by HDF5; 0 if all writes were
+    /// Causes of non-collective writes to the results, as bits defined by HDF5; 0 if all writes were
     /// collective.
     pub no_collective_cause: u32,
 }
@@ -106,7 +106,7 @@ pub fn start_mpi() -> Result<World> {
 ///
 /// - the problem cannot be run;
 /// - a signal stopped the run before the first step;
-/// - the folder has files that must not be replaced;
+/// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
 /// - the disk is full;
 /// - the motion of a point is not finite.
@@ -123,7 +123,7 @@ pub fn run(
     })
 }
 
-/// Same as [`run`], but errors contain positions in the deck as spans.
+/// Same as [`run`], but errors refer to the deck by spans instead of file and line.
 fn run_unlocated(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -134,7 +134,7 @@ fn run_unlocated(
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
     let files = Files::new(problem, options.folder.clone());
-    // Locked first, and until the end.
+    // The folder is locked before any file changes, and until the end of the run.
     let prepared = match comm.rank() {
         0 => files.lock().and_then(|lock| {
             if options.existing != Existing::Continue {
@@ -160,7 +160,7 @@ fn run_unlocated(
     }
 }
 
-/// How the time loop ended.
+/// Outcome of the time loop.
 enum LoopEnd {
     Complete,
     Stopped(Reason),
@@ -185,7 +185,7 @@ impl<'a> Job<'a> {
         let mut interrupt = || self.check_signals();
         let mut simulation = Simulation::<D>::set_up(self.problem, self.comm, &mut interrupt)?;
         simulation.check()?;
-        // Before any file is created or replaced.
+        // Check the sets of all outputs before any file is created or replaced.
         for output in self.problem.outputs() {
             output_members(self.problem, output, self.comm, &simulation.model)?;
         }
@@ -256,7 +256,7 @@ impl<'a> Job<'a> {
         )))
     }
 
-    /// The time loop.
+    /// Run the time loop.
     fn make_steps<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'a, D>,
@@ -274,7 +274,7 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // The energy input from changing temperatures is not counted, so such runs are not checked.
+        // The work of changing temperatures is not computed, so the energy of such runs is not checked.
         let is_closed = !self.problem.is_quasi_static() && !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {
@@ -314,12 +314,12 @@ impl<'a> Job<'a> {
             }
             let mut saves = complete || decision.checkpoint || decision.stop.is_some();
             if is_checked || saves {
-                // The check includes velocities at the full step.
+                // The check and the outputs use velocities at the full step.
                 stepper.at_full_step();
             }
             if is_agreed {
                 if let Err(error) = stepper.check() {
-                    // Output the failed state for analysis.
+                    // Write the failed state to the results, for analysis.
                     recorder.write_all(stepper.at_full_step())?;
                     return Ok(LoopEnd::Failed(error));
                 }
@@ -330,8 +330,8 @@ impl<'a> Job<'a> {
                         contact = None;
                     }
                     recorder.record(stepper, self.observer)?;
-                    // The observer has seen the row and may have made requests, which the checkpoint below must not save
-                    // if the ranks differ.
+                    // The observer may have made requests during the output of the row. If the requests of
+                    // the ranks differ, the checkpoint below must not be written.
                     let requests = Votes::of(stepper).agree(self.comm);
                     if requests.are_wrong {
                         return Ok(LoopEnd::Failed(self.wrong_request(stepper)));
@@ -378,7 +378,7 @@ impl<'a> Job<'a> {
         Ok(LoopEnd::Complete)
     }
 
-    /// The error of requests of the observer, which all ranks return. Collective.
+    /// Return the error of an observer's request. The error is the same on all ranks. Collective.
     fn wrong_request<const D: usize>(&self, stepper: &Stepper<'a, D>) -> Error {
         let own = stepper.wrong_request().cloned().map_or(Ok(()), Err);
         match agree(self.comm, own) {
@@ -442,8 +442,8 @@ impl<'a> Job<'a> {
                 Ok(recorder) => break recorder,
                 Err(error) => error,
             };
-            // The checkpoint is intact, so a damaged result is replaced by a new one. Other errors, such as a full disk,
-            // leave the results in place.
+            // If a result is damaged, a new one replaces it, because the checkpoint is intact. After another
+            // error, such as a full disk, the results are not replaced.
             let mut is_damaged = false;
             for (number, path) in self.files.results().enumerate() {
                 if matches!(continued[number], Continuation::Resume)
@@ -463,13 +463,15 @@ impl<'a> Job<'a> {
             .any(|continuation| *continuation != Continuation::Resume)
         {
             recorder.write_first(simulation)?;
-            // The previous checkpoint counts the outputs of the renamed files.
+            // The previous checkpoint contains the numbers of outputs of the renamed files, so it cannot be
+            // used any more.
             checkpoints.write(simulation, &mut recorder)?;
         }
         Ok((checkpoints, recorder))
     }
 
-    /// Rename the files that are not continued, and report why; then the way to new ones is free.
+    /// Rename the existing files that cannot be continued, and report the reason, so that new files can be
+    /// created.
     fn set_aside<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
@@ -508,14 +510,14 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// Broadcast the text of rank 0.
+    /// Return the text of rank 0 on all ranks.
     fn text_of_rank_0(&self, text: &str) -> String {
         let mut bytes = text.as_bytes().to_vec();
         self.comm.broadcast(0, &mut bytes);
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Attributes of the result: provenance.
+    /// Attributes of the result that describe its origin: deck, version and settings of the run.
     fn metadata<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -9,21 +9,21 @@ use crate::solver::refinement::Regridded;
 use crate::solver::repartition::Repartition;
 use crate::survey::Survey;
 
-/// Callbacks from a run. Each is called on all ranks at the same point; the defaults do nothing.
+/// Callbacks from a run. Each is called on all ranks at the same step; the defaults do nothing.
 pub trait Observer {
     /// A message of the run.
     fn message(&mut self, _message: &Message) {}
 
-    /// The time loop starts after the given state: step 0, or that of a checkpoint.
+    /// Called before the first step, with the state of step 0 or of the checkpoint.
     fn begin(&mut self, _now: &mut dyn RunState) {}
 
-    /// A step is complete, and its due output is written.
+    /// Called after each step, when its scheduled output has been written.
     fn step(&mut self, _now: &mut dyn RunState) {}
 
-    /// A new row of the history.
+    /// Called after a row of the history has been computed.
     fn row(&mut self, _now: &mut dyn RunState, _row: &Row) {}
 
-    /// The time loop has ended; `complete` at the end of the run.
+    /// Called after the time loop. `complete` is true at the end of the run, false after a stop.
     fn end(&mut self, _complete: bool) {}
 }
 
@@ -54,12 +54,12 @@ pub enum Message {
         number: u64,
         /// Time of the checkpoint, s.
         time: f64,
-        /// Whether that was the last step.
+        /// Whether the run was already complete at the checkpoint.
         complete: bool,
     },
-    /// The existing result cannot be continued, and a new one is created.
+    /// An existing result cannot be continued. It is renamed, and a new one is created.
     SetAside {
-        /// Reason why it cannot be continued.
+        /// Reason why the result cannot be continued.
         reason: String,
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
@@ -68,7 +68,7 @@ pub enum Message {
     Refined {
         /// Number of the last step before the refinement.
         number: u64,
-        /// Number of added and removed points.
+        /// Number of created and removed points.
         regridded: Regridded,
         /// New number of points.
         points: u64,
@@ -77,15 +77,15 @@ pub enum Message {
     Repartitioned {
         /// Number of the last step before the rebalance.
         number: u64,
-        /// Imbalance and migrated points.
+        /// Imbalance before the rebalance, number of migrated points, and time of the rebalance.
         repartition: Repartition,
     },
     /// A warning.
     Warning(String),
 }
 
-/// The state of a run between two steps. Points are those owned by this rank; their order may change from
-/// step to step, see [`RunState::ids`].
+/// The state of a run between two steps. All point data are those of the points that this rank owns. The
+/// order of the points may change from step to step, see [`RunState::ids`].
 ///
 /// An observer may [stop](RunState::stop) the run and [change a load](RunState::set_load_factor):
 ///
@@ -103,7 +103,7 @@ pub enum Message {
 ///         if row.broken_bonds() > 0 {
 ///             now.set_load_factor("pull", 0.5);
 ///         }
-///         // Of the points of this rank: a stop on one rank stops all.
+///         // Only the points of this rank are checked. A stop on one rank stops all ranks.
 ///         if now.field(Field::Damage).iter().any(|damage| *damage > 0.4) {
 ///             now.stop();
 ///         }
@@ -128,42 +128,45 @@ pub trait RunState {
     /// Length of a step, s.
     fn step(&self) -> f64;
 
-    /// Number of dimensions, which is the number of components.
+    /// Dimension of the problem, which is the number of components of vectors.
     fn dimension(&self) -> usize;
 
-    /// Global ids of the points. Ids of level 0 are below the number of level-0 points of all ranks.
+    /// Global ids of the points. The ids of level-0 points are smaller than the number of level-0 points over
+    /// all ranks.
     fn ids(&self) -> &[u64];
 
     /// A component of the reference positions, m.
     fn reference(&self, component: usize) -> &[f64];
 
-    /// A component of the displacements, m.
+    /// A component of the displacements at the reached time, m.
     fn displacement(&self, component: usize) -> &[f64];
 
-    /// A component of the velocities, m/s. Computed on request: one pass over the points for each step
-    /// in which they are read.
+    /// A component of the velocities, m/s. The first request in a step needs one loop over the points.
     fn velocity(&mut self, component: usize) -> &[f64];
 
-    /// Values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], row by row with
-    /// [`Field::components`] numbers a point, in the unit of [`Field::unit`]. Computed on request: one to three passes over
-    /// the bonds. Collective: all ranks ask for the same field.
+    /// Values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit of
+    /// [`Field::unit`]. They are ordered by point, with [`Field::components`] values per point. A request
+    /// needs one to three passes over the bonds. Collective: all ranks must request the same field.
     fn field(&mut self, field: Field) -> Vec<f64>;
 
-    /// Energies of all points, J. Computed on request: one pass over the bonds. Collective.
+    /// Energies of all points, J. A request needs one pass over the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
-    /// Stop the run before its end with a checkpoint; one rank is enough. Asked for at a row of the history, the stop
-    /// comes after this step; otherwise up to ten steps later.
+    /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. After a request
+    /// in [`Observer::row`], the run stops at this step; otherwise, it stops up to ten steps later.
     fn stop(&mut self);
 
-    /// The factor of a load in the next step, 1 unless an observer has set it; `None` if there is no load of this name.
+    /// The factor of a load in the next step; 1 unless an observer has set it. `None` if no load has this
+    /// name.
     fn load_factor(&self, name: &str) -> Option<f64>;
 
-    /// Multiply a load, a condition with `force`, `body_force`, `traction` or `pressure`, by a factor. It acts from the end of
-    /// the next step, or from the next load step, until another one is set; its work counts as external. Checkpoints hold it.
-    /// All ranks set the same factor at the same step.
+    /// Multiply a load by a factor. A load is a condition with `force`, `body_force`, `traction` or
+    /// `pressure`. The factor acts from the end of the next step, or from the next load step, until another
+    /// factor is set. The work of the load counts as external work. Checkpoints contain the factor. All ranks
+    /// must set the same factor at the same step.
     ///
-    /// The run ends with an error soon after if there is no load of this name, the factor is not finite, or the ranks differ.
+    /// The run soon ends with an error if no load has this name, if the factor is not finite, or if the ranks
+    /// set different factors.
     fn set_load_factor(&mut self, name: &str, factor: f64);
 }
 
@@ -263,7 +266,7 @@ impl Row<'_> {
         &self.row.values
     }
 
-    /// The value of a column such as `kinetic_energy`.
+    /// The value of the column with this name, such as `kinetic_energy`; `None` if there is no such column.
     pub fn value(&self, column: &str) -> Option<f64> {
         let found = self.columns.iter().position(|(name, _)| name == column);
         found.map(|position| self.row.values[position])

@@ -12,34 +12,35 @@ pub struct Options {
     pub folder: PathBuf,
     /// Handling of existing files in the folder.
     pub existing: Existing,
-    /// Write a checkpoint and stop before this wall-clock time since `started`. The default inside a Slurm
-    /// job is the job's limit.
+    /// Wall-clock limit, measured from `started`. Before the limit, the run writes a checkpoint and stops.
+    /// The default inside a Slurm job is the limit of the job.
     pub wall_time: Option<Duration>,
     /// Start of the run.
     pub started: Instant,
     /// Signals that stop the run or request a checkpoint.
     pub signals: Option<Signals>,
-    /// The deck; `None` for a problem built in Rust. Errors and warnings name places in it, the result contains its text,
-    /// and a restart compares it with that of the checkpoint.
+    /// The deck; `None` for a problem that was built in Rust. Errors and warnings refer to lines of the deck,
+    /// the result contains its text, and a restart compares it with the deck of the checkpoint.
     pub deck: Option<Deck>,
-    /// Additional attributes of the result: name and text, such as the command line. Those of rank 0 are used.
+    /// Additional attributes of the result: name and text, such as the command line. The attributes of rank 0
+    /// are used.
     pub attributes: Vec<(&'static str, String)>,
 }
 
 /// Handling of existing files in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
-    /// Fail.
+    /// Stop with an error.
     Refuse,
-    /// Replace them.
+    /// Replace the existing files.
     Replace,
-    /// Continue from the newest checkpoint, which may be from other numbers of ranks and threads; fail
-    /// without one.
+    /// Continue from the newest checkpoint. The number of ranks and threads may have changed. It is an error
+    /// if no checkpoint exists.
     Continue,
 }
 
 impl Options {
-    /// A new run that starts now, in a folder without one.
+    /// Create the options of a new run that starts now, in a folder without results.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self {
             folder: folder.into(),

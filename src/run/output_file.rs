@@ -12,25 +12,26 @@ use crate::solver::observers::{Schedule, Snapshot};
 
 use super::layout::{ResultLayout, select};
 
-/// Start of a result file.
+/// Beginning of a result file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
     /// Create a new file.
     New(Creation),
-    /// Resume the existing file after a number of outputs.
+    /// Resume the existing file after this number of outputs.
     After(u64),
 }
 
 /// The open result file of an output.
 pub struct OutputFile<'a> {
-    /// The file.
+    /// The result file.
     pub file: ResultFile<'a>,
-    /// When an output is due.
+    /// Schedule of the outputs.
     pub schedule: Schedule,
     output: &'a Output,
-    /// Index of this output among the further outputs that count newly broken bonds; `None` if it does not.
+    /// Index of this output among the further outputs that count newly broken bonds; `None` for other
+    /// outputs.
     counter: Option<usize>,
-    /// The rows of this rank's range of ids that are in the result; `None` for all.
+    /// The rows of this rank's range of ids that the result contains; `None` for all rows.
     rows: Option<Vec<usize>>,
     /// The side-car; on rank 0 only.
     side_car: Option<SideCar>,
@@ -40,11 +41,11 @@ pub struct OutputFile<'a> {
 pub type Past = Vec<Vec<f64>>;
 
 impl<'a> OutputFile<'a> {
-    /// Create or resume the file at a path; `history` is that of the main result, with its number of rows at the start. Return
-    /// the retained rows as well. Collective.
+    /// Create or resume the file at a path. `history` is the history of the main result and its number of
+    /// rows; `None` for further results. Also return the rows that a resumed file retains. Collective.
     ///
     /// # Errors
-    /// If it cannot be written, or the set of the output is empty.
+    /// If the file cannot be written, or the set of the output is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         (output, path): (&'a Output, &Path),
@@ -72,7 +73,7 @@ impl<'a> OutputFile<'a> {
                 });
                 let is_begun = |error: &crate::error::Error| error.kind == ErrorKind::Run;
                 if created.as_ref().err().is_some_and(is_begun) && comm.rank() == 0 {
-                    // Best effort: a result without outputs only takes space.
+                    // An error is ignored, because a result without outputs only takes space.
                     let _ = std::fs::remove_file(path);
                 }
                 (created?, Past::new())
@@ -93,7 +94,7 @@ impl<'a> OutputFile<'a> {
         Ok((opened, past))
     }
 
-    /// Update after a rebalancing or refinement. Collective.
+    /// Find the rows of the result again after a rebalance or refinement. Collective.
     ///
     /// # Errors
     /// If the set of the output is empty.
@@ -106,7 +107,7 @@ impl<'a> OutputFile<'a> {
         Ok(())
     }
 
-    /// Whether the fields include an energy of the bonds.
+    /// Whether the output contains a field that needs the energies of the bonds.
     pub fn has_energies(&self) -> bool {
         self.output.fields.contains(&Field::StrainEnergyDensity)
     }
@@ -154,7 +155,7 @@ impl<'a> OutputFile<'a> {
         Ok(())
     }
 
-    /// Close the file; `will_resume` keeps its unused space. Collective.
+    /// Close the file. With `will_resume`, unused space in the file is not freed. Collective.
     ///
     /// # Errors
     /// If the disk is full, or an earlier write failed.
@@ -165,7 +166,7 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// The rows of this rank's range of ids that are in the result; `None` for all. Collective.
+/// Find the rows of this rank's range of ids that the result contains; `None` for all rows. Collective.
 ///
 /// # Errors
 /// If the set of the output is empty.

@@ -20,22 +20,22 @@ use super::observer::{Observer, Row};
 use super::output_file::{OutputFile, Start, output_rows};
 use super::restart_compatibility::history_differences;
 
-/// Number of history rows buffered before a write.
+/// Number of history rows that are buffered before a write.
 const BUFFERED_ROWS: usize = 256;
 
 /// The open results and history of a run.
 pub struct Recorder<'a> {
-    /// Computes the rows of the history.
+    /// Observer that computes the rows of the history.
     pub observer: HistoryObserver,
-    /// Redistribution from owned points to ranges of ids, for checkpoints and results.
+    /// Exchange plan from owned points to ranges of ids, for checkpoints and results.
     pub order: IdOrder,
-    /// The last row of the history.
+    /// The last row of the history; `None` before the first row.
     pub last_row: Option<HistoryRow>,
     /// Time spent on results.
     pub spent: Duration,
     /// Time spent on the history.
     pub spent_on_rows: Duration,
-    /// The result files, the main one first, which has the history.
+    /// The result files. The first is the main result, which contains the history.
     files: Vec<OutputFile<'a>>,
     /// Folder of the crack files.
     folder: PathBuf,
@@ -44,10 +44,11 @@ pub struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Create or resume the files: the main result and the history after a number of rows, and the further results. Collective.
+    /// Create or resume all result files. `starts` has an entry per file. A resumed history continues after
+    /// `rows` rows. Collective.
     ///
     /// # Errors
-    /// If they cannot be written, or a set of the history or an output is empty.
+    /// If a file cannot be written, or a set of the history or an output is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         files: &Files,
@@ -99,7 +100,7 @@ impl<'a> Recorder<'a> {
         &self.files[0].file
     }
 
-    /// The further results, for a checkpoint.
+    /// Name and number of outputs of each further result, for a checkpoint.
     pub fn further<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<FurtherResult> {
         let problem = simulation.problem;
         let outputs = problem.further_outputs.iter().zip(&self.files[1..]);
@@ -110,7 +111,8 @@ impl<'a> Recorder<'a> {
         outputs.map(result).collect()
     }
 
-    /// Causes of non-collective writes to any result, as HDF5's bits; 0 if all were collective.
+    /// Causes of non-collective writes to any result, as bits defined by HDF5; 0 if all writes were
+    /// collective.
     pub fn no_collective_cause(&self) -> u32 {
         let causes = self
             .files
@@ -119,7 +121,7 @@ impl<'a> Recorder<'a> {
         causes.fold(0, |all, cause| all | cause)
     }
 
-    /// Update after a rebalancing or refinement. Collective.
+    /// Find the points of outputs and history again after a rebalance or refinement. Collective.
     ///
     /// # Errors
     /// Same as for [`HistoryObserver::new`].
@@ -169,7 +171,7 @@ impl<'a> Recorder<'a> {
         self.write(simulation, |_| true, true)
     }
 
-    /// Write the first outputs of new files, and a history row if the main one is new. Collective.
+    /// Write an output to each new file, and a history row if the main file is new. Collective.
     ///
     /// # Errors
     /// If the disk is full.
@@ -181,7 +183,7 @@ impl<'a> Recorder<'a> {
         self.write(simulation, |file| file.file.steps() == 0, row)
     }
 
-    /// Write outputs to the chosen files, a history row or both. Collective.
+    /// Write outputs to the files for which `is_chosen` is true, and with `row` a history row. Collective.
     ///
     /// # Errors
     /// If the disk is full.
@@ -204,7 +206,7 @@ impl<'a> Recorder<'a> {
         } else {
             Snapshot::without_energies(simulation)
         };
-        // If output and row share a snapshot, its time counts as output.
+        // If an output and a row share a snapshot, the time of the snapshot counts as output.
         let rows_start = if output { Instant::now() } else { start };
         if row {
             let row = self.observer.row(simulation, &snapshot);
@@ -227,13 +229,13 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The row of the history of the current step, if any.
+    /// The row of the history at the current step; `None` if no row was due.
     pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
         let is_now = |row: &&HistoryRow| row.number == clock.number();
         self.last_row.as_ref().filter(is_now)
     }
 
-    /// Output the state of a failed run to the files that do not have it. Collective.
+    /// Write the state of a failed run to the files that have no output at this step. Collective.
     ///
     /// # Errors
     /// If the disk is full.
@@ -246,7 +248,7 @@ impl<'a> Recorder<'a> {
         self.sync()
     }
 
-    /// Close the result. With `will_resume`, its unused space is retained. Collective.
+    /// Close all result files. With `will_resume`, unused space in the files is not freed. Collective.
     ///
     /// # Errors
     /// If the disk is full, or an earlier write failed.
@@ -274,20 +276,20 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Close the files that are open when another one fails, and remove new ones. Collective.
+/// Close the files that are already open when another file fails, and remove those that are new. Collective.
 fn abandon(comm: &dyn Communicator, opened: Vec<OutputFile>, files: &Files, starts: &[Start]) {
     for ((file, path), start) in opened.into_iter().zip(files.results()).zip(starts) {
-        // The error that is reported is that of the other file.
+        // The caller reports the error of the other file, so this error is ignored.
         let _ = file.close(true);
         if matches!(start, Start::New(_)) && comm.rank() == 0 {
-            // Best effort: a result without outputs only takes space.
+            // An error is ignored, because a result without outputs only takes space.
             let _ = std::fs::remove_file(path);
         }
     }
 }
 
-/// For each output, whether its result file is resumed at a restart, or why a new file starts. The reason is `None` if the
-/// checkpoint has no file of this output and none exists. Collective.
+/// For each output, find out whether a restart can resume its result file, or why a new file starts. The
+/// reason is `None` if neither the checkpoint nor the folder contains a result of this output. Collective.
 ///
 /// # Errors
 /// If a set of the history is empty, a deck cannot be parsed, or a result is locked or unreadable.
@@ -332,18 +334,19 @@ pub fn reasons_for_new_results<const D: usize>(
     Ok(found)
 }
 
-/// How the result of an output is continued.
+/// Continuation of a result file at a restart.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Continuation {
-    /// The file is resumed.
+    /// The existing file is resumed.
     Resume,
-    /// A new file starts; the reason, if an existing file is set aside.
+    /// A new file starts. If an existing file must be renamed, the reason is given.
     New(Option<String>),
 }
 
-/// The reason why the file of an output cannot be continued, if there is one: it is missing or damaged, or has other points,
-/// fields or columns. `outputs` is its number of outputs in the checkpoint. `history` is that of the main result, with its
-/// number of rows and the differences of its columns. Collective.
+/// Reason why the result file of an output cannot be continued; `None` if it can. The file may be missing or
+/// damaged, or have other points, fields or columns. `outputs` is the number of outputs that the checkpoint
+/// counts. For the main result, `history` has the observer, the number of rows, and the changes of the column
+/// definitions. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.
@@ -363,7 +366,7 @@ fn reason_for_new_result<const D: usize>(
         if !is_taken(path) {
             return Ok(Some("the result file is missing".to_owned()));
         }
-        // A link to an unmounted file system is an error, not damage.
+        // If the file is a link to a file system that is not mounted, this is an error, not damage.
         std::fs::metadata(path).map_err(|error| {
             let path = path.display();
             Error::run(format!("{path}: cannot read the result so far: {error}"))
@@ -414,7 +417,7 @@ fn reason_for_new_result<const D: usize>(
     found_by_root(comm, compare)
 }
 
-/// The damage of a result, if its first outputs cannot be read. Collective.
+/// Description of the damage of a result, if its first `outputs` outputs cannot be read. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.
@@ -425,8 +428,8 @@ pub fn damage(comm: &dyn Communicator, path: &Path, outputs: u64) -> Result<Opti
     })
 }
 
-/// Run `check` on rank 0 and broadcast the reason that it returns. Damage of the result is a reason; a
-/// failure to read it is an error. Collective.
+/// Run `check` on rank 0, and return its result on all ranks. A damaged result file gives a reason; a failure
+/// to read the file is an error. Collective.
 fn found_by_root(
     comm: &dyn Communicator,
     check: impl FnOnce() -> Result<Option<String>>,

@@ -10,9 +10,9 @@ use super::files::Files;
 use super::observer::{Message, Observer};
 use super::restart_compatibility;
 
-/// The state of a restart.
+/// Result of a restart, in addition to the restored simulation.
 pub struct Restart {
-    /// The writer of further checkpoints.
+    /// Writer of the next checkpoints.
     pub checkpoints: CheckpointWriter,
     /// The checkpoint's header.
     pub header: Header,

@@ -7,7 +7,7 @@ use crate::problem::{Interval, Output, Problem};
 /// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
 
-/// Separator between the physics and the history definitions of this description.
+/// Separator between the physics and the definitions of the history in this description.
 const HISTORY: &str = "# its history\n";
 
 /// Maximum length of a line in a message.
@@ -22,7 +22,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
         return deck.to_owned();
     }
     let mut problem = problem.clone();
-    // Clear everything that may change at a restart.
+    // Clear all settings that may change at a restart.
     problem.warnings.clear();
     problem.title.clear();
     if let Some(last) = problem.stages.last_mut() {
@@ -55,7 +55,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")
 }
 
-/// Differences in the definitions of the history's columns, in one line; `None` if equal.
+/// Differences in the definitions of the history's columns, in one line; `None` if they are equal.
 ///
 /// # Errors
 /// If a deck cannot be parsed.
@@ -75,7 +75,7 @@ fn source(name: &str, text: &str) -> Source {
     Source::new(name, text)
 }
 
-/// Differences in the physics, one per line.
+/// Differences in the physics, one per line; empty if there are none.
 ///
 /// # Errors
 /// If a deck cannot be parsed.
@@ -92,7 +92,7 @@ pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
     deck::differences(&source("the checkpoint", old), &source("the deck", new))
 }
 
-/// The first differing line of two listings.
+/// The first line that differs in two listings; empty if they are equal.
 fn listed_differences(old: &str, new: &str) -> Vec<String> {
     let short = |line: &str| line.trim().chars().take(MAX_LINE).collect::<String>();
     let mut lines = old.lines().zip(new.lines());

@@ -13,9 +13,9 @@ const IMMEDIATE_EXIT: i32 = 130;
 /// Signals within this interval count as one, because launcher and batch system may both send it.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
-/// The signals of this process.
+/// Receiver of the signals of this process.
 ///
-/// - SIGTERM, SIGINT, SIGUSR1: stop after the current step; the second one exits at once.
+/// - SIGTERM, SIGINT, SIGUSR1: stop after the current step. A second of these signals exits at once.
 /// - SIGUSR2: write a checkpoint.
 #[derive(Clone)]
 pub struct Signals {
@@ -27,7 +27,7 @@ impl Signals {
     /// Start a thread that receives the signals.
     ///
     /// # Errors
-    /// If the system refuses.
+    /// If the system does not allow it.
     pub fn listen() -> Result<Self> {
         let signals = Self {
             stop: Arc::default(),

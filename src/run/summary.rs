@@ -1,11 +1,11 @@
-//! Figures of a completed run.
+//! Size and times of a finished run, for the summary.
 
 use std::time::Duration;
 
 use crate::comm;
 use crate::solver::Simulation;
 
-/// The figures of a run; equal on all ranks.
+/// Size and times of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Summary {
     /// Number of points.
@@ -14,7 +14,7 @@ pub struct Summary {
     pub bonds: u64,
     /// Number of steps of this run.
     pub steps: u64,
-    /// Number of force evaluations: one per step, or one per iteration of a load step.
+    /// Number of force evaluations: one per explicit step, and one or more per iteration of a load step.
     pub evaluations: u64,
     /// Time step of the last stage, s.
     pub step: f64,
@@ -37,11 +37,11 @@ pub struct Phases {
     pub set_up: f64,
     /// Loops over bonds.
     pub bonds: f64,
-    /// Halo exchange that is not overlapped.
+    /// Halo exchange, without the part that overlaps with computation.
     pub halo: f64,
     /// Search and forces of contact.
     pub contact: f64,
-    /// Integration, conditions, and copies of positions to the bond loops.
+    /// Integration, conditions, and copies of displacements to the arrays of the bond loops.
     pub motion: f64,
     /// Refinement and rebalancing.
     pub regridding: f64,
@@ -56,8 +56,8 @@ pub struct Phases {
 }
 
 impl Summary {
-    /// Collect the figures of a run from all ranks. The durations are those of output, history, checkpoints
-    /// and the total. Collective.
+    /// Collect the summary from all ranks. The durations are those of results, history and checkpoints, and
+    /// the total time. Collective.
     pub(super) fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         steps: u64,

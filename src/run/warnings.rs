@@ -13,15 +13,15 @@ use crate::solver::{Simulation, Stepper};
 /// Ratio of kinetic to strain energy above which loading is not quasi-static.
 const MAX_INERTIA: f64 = 0.05;
 
-/// Ratio of overshoot to fracture energy above which a warning is printed. A branching crack at `safety =
-/// 0.8` has a ratio of 0.4. With a quarter of the step, its fracture energy changes by 1 %.
+/// Ratio of overshoot to fracture energy above which a warning is printed. For comparison: a branching crack
+/// at `safety = 0.8` has a ratio of 0.4, and a quarter of the step changes its fracture energy by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
-/// Initial fraction of a run that is not checked, because its strain energy is small.
+/// Initial fraction of a run without a check of inertia, because the strain energy is then small.
 const UNCHECKED_FRACTION: f64 = 0.1;
 
 impl<'a> Job<'a> {
-    /// Warn of interpenetrating bodies.
+    /// Warn of bodies whose points have moved into each other.
     pub(super) fn warn_of_contact(&mut self, contact: &Contact, time: f64) {
         let [a, b] = contact.bodies.map(|body| &self.problem.bodies[body].name);
         let position = &contact.place[..self.problem.dimension.count()];
@@ -39,7 +39,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Report that contact shortens the steps. The next steps have this size (s).
+    /// Report that contact shortens the time step to `step`, s.
     pub(super) fn warn_of_stiff_contact(&mut self, clock: &Clock, step: f64) {
         let text = format!(
             "after step {} (t = {:.4e} s) contact is too stiff for a time step of {:.4e} s; the step is now \
@@ -52,7 +52,7 @@ impl<'a> Job<'a> {
     }
 
     /// Warn of a fixed step that refinement has made unstable. `before` is the stable step before the
-    /// refinement (s). Returns the stable step, s.
+    /// refinement (s). Returns the present stable step, s.
     pub(super) fn warn_of_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
@@ -70,7 +70,7 @@ impl<'a> Job<'a> {
         stable
     }
 
-    /// Warn of a run with scaled density that is not quasi-static. Return true if a warning was sent.
+    /// Warn if the inertia of a run with scaled density is not negligible. Return true if a warning was sent.
     pub(super) fn warn_of_inertia<const D: usize>(
         &mut self,
         stepper: &Stepper<'a, D>,
@@ -95,7 +95,7 @@ impl<'a> Job<'a> {
         true
     }
 
-    /// Warn of explicit steps that are too long for breaking bonds.
+    /// Warn if explicit steps were too long for breaking bonds.
     pub(super) fn warn_of_overshoot(&mut self, recorder: &Recorder<'a>) {
         let Some(row) = recorder.last_row.as_ref() else {
             return;
@@ -120,7 +120,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn if a restarted run continues with a step that differs from that of a new run to the same end.
+    /// Warn if a restarted run continues with another step than a new run to the same end would use.
     pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -1,4 +1,4 @@
-//! Decisions on checkpoints and stops, from signals, wall clock and deck.
+//! Decisions on checkpoints and stops, from signals, wall-clock time, deck and observer.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -10,10 +10,10 @@ use crate::solver::observers::Schedule;
 
 use super::signals::Signals;
 
-/// Maximum number of iterations of the time loop between collective decisions. An iteration is a step, or
-/// an iteration of a load step.
+/// Maximum number of iterations of the time loop between two collective decisions. An iteration of the time
+/// loop is a step, or an iteration of a load step.
 const MAX_ITERATIONS: u64 = 10;
-/// Target interval between collective decisions, s.
+/// Target interval of wall-clock time between two collective decisions, s.
 const INTERVAL: f64 = 0.2;
 
 /// Fraction of the wall-clock limit reserved for the last checkpoint.
@@ -22,37 +22,38 @@ const RESERVED_FRACTION: f64 = 0.05;
 const MIN_RESERVE: f64 = 0.5;
 const MAX_RESERVE: f64 = 60.0;
 
-/// The ranks' common decision after an iteration.
+/// Common decision of all ranks after an iteration of the time loop.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Decision {
-    /// Write a checkpoint.
+    /// Whether a checkpoint is written.
     pub checkpoint: bool,
-    /// Stop, with the reason.
+    /// Reason to stop; `None` to continue.
     pub stop: Option<Reason>,
-    /// The observer of a rank has made a wrong request, or the observers have set different load factors.
+    /// Whether the observer of a rank has made an invalid request, or the observers have set different load
+    /// factors.
     pub has_wrong_request: bool,
 }
 
-/// What the observer of this rank has asked for.
+/// Requests of the observer of this rank.
 #[derive(Debug, Clone, Copy)]
 pub struct Votes {
     stop: bool,
     is_wrong: bool,
-    /// Fingerprint of all load factors that were set.
+    /// Fingerprint of all requests of load factors.
     factors: f64,
 }
 
-/// What the observers of all ranks have asked for.
+/// Combined requests of the observers of all ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Requests {
-    /// One of them wants to stop the run.
+    /// Whether an observer has requested a stop.
     pub stop: bool,
-    /// One of them was wrong, or the load factors differ by rank.
+    /// Whether a request is invalid, or the load factors differ between ranks.
     pub are_wrong: bool,
 }
 
 impl Votes {
-    /// The requests of this rank's observer so far.
+    /// Collect the requests that this rank's observer has made so far.
     pub fn of<const D: usize>(stepper: &Stepper<'_, D>) -> Self {
         Self {
             stop: stepper.is_stop_requested(),
@@ -61,7 +62,8 @@ impl Votes {
         }
     }
 
-    /// Entries whose maxima over all ranks are those of [`Requests::of_maxima`].
+    /// Encode the requests, so that [`Requests::of_maxima`] can decode the element-wise maximum over all
+    /// ranks.
     fn entries(self) -> [f64; 4] {
         let flag = |set: bool| f64::from(u8::from(set));
         [
@@ -72,7 +74,7 @@ impl Votes {
         ]
     }
 
-    /// The requests of all ranks. Collective.
+    /// Combine the requests of all ranks. Collective.
     pub fn agree(self, comm: &dyn Communicator) -> Requests {
         let mut entries = self.entries();
         comm.max(&mut entries);
@@ -96,11 +98,11 @@ pub enum Reason {
     Signal,
     /// The wall-clock limit is near.
     WallTime,
-    /// The observer of a rank asked for it.
+    /// The observer of a rank has requested it.
     Observer,
 }
 
-/// The signals and clocks of a rank.
+/// Signals, wall clock and schedule on a rank, from which decisions are made.
 pub struct Watch<'a> {
     signals: Option<&'a Signals>,
     rule: CheckpointRule,
@@ -108,7 +110,7 @@ pub struct Watch<'a> {
     limit: Option<(Instant, f64)>,
     last_checkpoint: Instant,
     cost: Duration,
-    /// Number of iterations.
+    /// Number of iterations of the time loop.
     iterations: u64,
     /// Time and iteration of the last decision.
     last_decision: (Instant, u64),
@@ -117,8 +119,8 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Create the watch. `limit` is a wall-clock limit and its start. The default inside a Slurm job is the
-    /// job's limit.
+    /// Create the watch. `limit` is the start and the duration of a wall-clock limit. The default inside a
+    /// Slurm job is the limit of the job.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
@@ -144,8 +146,8 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration. Returns true if a decision is due. `step` is the clock if the iteration ended a
-    /// step.
+    /// Count an iteration. Returns whether a decision is due. `step` is the clock if the iteration has
+    /// completed a step.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;
         self.iterations >= self.next_decision || self.is_scheduled(step)
@@ -160,8 +162,8 @@ impl<'a> Watch<'a> {
         step.is_some_and(due)
     }
 
-    /// Decide on a checkpoint or stop after this iteration, with the votes of this rank's observer; equal on all ranks.
-    /// Collective.
+    /// Decide on a checkpoint or stop after this iteration. `observer` contains the requests of this rank's
+    /// observer. The decision is the same on all ranks. Collective.
     pub fn decide(
         &mut self,
         comm: &dyn Communicator,
@@ -217,7 +219,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Time left in the Slurm job of this process, if any.
+/// Time left in the Slurm job of this process; `None` outside a job.
 fn slurm_time_left() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;

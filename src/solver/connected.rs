@@ -5,8 +5,8 @@ use crate::comm::total;
 use super::Simulation;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Set each column over the local points to its minimum over the points that intact bonds connect.
-    /// Collective.
+    /// Replace each entry of columns over the local points by the minimum over all points that intact bonds
+    /// connect to its point. Collective.
     pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
         let mut roots: Vec<usize> = (0..local).collect();
@@ -15,8 +15,8 @@ impl<const D: usize> Simulation<'_, D> {
             roots[i.max(j)] = i.min(j);
         });
         loop {
-            // First find the minimum over the points of a piece on this rank, then include those of the
-            // other ranks.
+            // First find the minimum over connected points on this rank, then include the points of other
+            // ranks.
             self.forces.bring_all(self.comm, columns);
             let mut changed = 0;
             for column in columns.iter_mut() {
@@ -36,8 +36,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// For each owned point, the smallest id of the points that intact bonds connect to it, including its
-    /// own. Collective.
+    /// Return the fragment id of each owned point: the smallest id among this point and all points that
+    /// intact bonds connect to it. Collective.
     pub fn fragment_ids(&mut self) -> Vec<f64> {
         let mut ids: Vec<f64> = self.model.ids.iter().map(|id| *id as f64).collect();
         self.spread_least(&mut [&mut ids]);
@@ -46,7 +46,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Find the root of a point's tree, and shorten the path to it.
+/// Find the root of a point's tree, and shorten the path to the root.
 fn root(parents: &mut [usize], mut point: usize) -> usize {
     while parents[point] != point {
         parents[point] = parents[parents[point]];

@@ -11,17 +11,17 @@ use crate::points::Point;
 use crate::points::bins::Bins;
 use crate::problem::{FamilyRule, Kind, PointSource, Problem, Quadrature};
 
-/// Largest offset of a point from its cell's centre, and of two grids from each other, as a fraction of the
-/// cell's edge.
+/// Tolerance as a fraction of a cell's edge: for points that must lie at cell centres, and for grids that
+/// must coincide.
 const ON_GRID: f64 = 1e-6;
 
-/// Largest cell index. Cells are numbered with integers that a float represents exactly.
+/// Largest cell index; integers up to this size are exact in floating point.
 const FARTHEST: f64 = 1e15;
 
-/// Largest relative difference between the volume of a file's point and that of a cell.
+/// Largest relative difference between the volume of a point and that of a cell.
 const VOLUME: f64 = 1e-2;
 
-/// A cell's centre and the edges of the cells, m.
+/// A grid: the centre of one cell, and the edges of all cells, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Cells {
     centre: [f64; 3],
@@ -69,7 +69,7 @@ pub fn grids(
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };
-        // The grids of the refinement levels have a point at a cell centre.
+        // The grids of all refinement levels have a point at the centre of a level-0 cell.
         let is_shape = matches!(body.points, PointSource::Lattice { .. });
         let refinement = problem.refinement.as_ref().filter(|_| is_shape);
         for level in 0..=refinement.map_or(0, |refinement| refinement.levels) {
@@ -81,7 +81,7 @@ pub fn grids(
     Ok(grids)
 }
 
-/// Record that the points of a block lie on a grid.
+/// Record that the points of a block lie on a grid, either a known one or a new one.
 fn add(
     grids: &mut Vec<GridFrame>,
     Cells { centre, edges }: Cells,
@@ -107,7 +107,7 @@ fn add(
     }
 }
 
-/// The lattice of a deck, from a corner of a cell (m) and the edges (m).
+/// The grid of a lattice in the deck, from a corner of a cell (m) and the edges (m).
 fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
     let mut centre = [0.0; 3];
     for k in 0..dimension {
@@ -116,8 +116,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
     Cells { centre, edges }
 }
 
-/// Detect the grid of a body's points, if all of them lie on it and each has the volume of a cell.
-/// Collective.
+/// Detect the grid of a body's points. The result is `None` unless all points lie on the grid and have the
+/// volume of a cell. Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -130,7 +130,7 @@ fn detected(
         let owned = &domain.points[..domain.owned];
         owned.iter().filter(|point| point.block as usize == body)
     };
-    // Minima of: coordinates, negative coordinates, gaps, volume, negative volume.
+    // Minimum over the ranks of: coordinates, negative coordinates, gaps, volume, negative volume.
     let mut smallest = [f64::MAX; 11];
     let [gap_x, gap_y, gap_z] = smallest_gaps(domain, body, longest);
     (smallest[6], smallest[7], smallest[8]) = (gap_x, gap_y, gap_z);
@@ -147,7 +147,7 @@ fn detected(
     for k in 0..dimension {
         let (low, high, gap) = (smallest[k], -smallest[3 + k], smallest[6 + k]);
         centre[k] = low;
-        // A single layer of points fits any edge.
+        // If the points form a single layer, any edge fits.
         edges[k] = if gap < f64::MAX {
             (high - low) / ((high - low) / gap).round()
         } else {
@@ -170,8 +170,8 @@ fn detected(
     (good[0] == 1.0).then_some(Cells { centre, edges })
 }
 
-/// Smallest nonzero coordinate difference in each direction between points of a body that are at most as
-/// far apart as the longest bond (m). The minimum over all ranks does not depend on their number.
+/// Smallest nonzero difference of each coordinate between two points of a body. Only pairs up to the length
+/// of the longest bond (m) count, so the minimum over all ranks does not depend on their number.
 fn smallest_gaps(domain: &Domain, body: usize, longest: f64) -> [f64; 3] {
     let of_body = |point: &&Point| point.block as usize == body;
     let places: Vec<[f64; 3]> = domain

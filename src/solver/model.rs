@@ -30,17 +30,17 @@ pub struct Model<const D: usize> {
     pub coarsest: u64,
 }
 
-/// Thermal expansion in the directions of the setting.
+/// Thermal expansion along the bar, in the plane, or in space.
 #[derive(Debug, Clone, Copy)]
 pub struct Expansion {
-    /// Free stretch per kelvin, 1/K.
+    /// Free thermal stretch per kelvin, 1/K.
     pub stretch_per_kelvin: f64,
     /// Temperature with zero thermal stretch.
     pub reference_temperature: f64,
 }
 
 impl Expansion {
-    /// Free stretch at a temperature.
+    /// Free thermal stretch at a temperature.
     pub fn stretch_at(self, temperature: f64) -> f64 {
         self.stretch_per_kelvin * (temperature - self.reference_temperature)
     }
@@ -127,8 +127,8 @@ impl<const D: usize> Model<D> {
         self.damping[usize::from(self.block[point])]
     }
 
-    /// A component of the force density (N/m³) on an owned point, minus the viscous damping at a velocity
-    /// (m/s).
+    /// A component of the force density (N/m³) on an owned point after subtraction of the viscous damping at
+    /// a velocity (m/s).
     #[inline]
     pub fn less_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
         let damping = self.damping_of(point);

@@ -1,7 +1,7 @@
-//! Rebalance during a run, when rank loads have drifted apart.
+//! Rebalance during a run, when the loads of the ranks have drifted apart.
 //!
-//! Points migrate in the same way as in a restart on other ranks: the state is redistributed by id, bonds
-//! are found again, and their stored data are restored. So the result does not depend on it.
+//! Points migrate as in a restart on other ranks. The state is redistributed by id, bonds are found again,
+//! and their stored data are restored. The result of the run is therefore bitwise independent of rebalances.
 
 use std::time::{Duration, Instant};
 
@@ -17,15 +17,15 @@ use super::{Simulation, Stepper};
 /// Result of a rebalance; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repartition {
-    /// Bond time of the slowest rank before the rebalance, relative to the mean.
+    /// Time that the slowest rank spent on bonds before the rebalance, divided by the mean over the ranks.
     pub imbalance: f64,
     /// Number of points that changed their owner.
     pub moved: u64,
-    /// Wall-clock time on the slowest rank, s.
+    /// Wall-clock time of the rebalance on the slowest rank, s.
     pub seconds: f64,
 }
 
-/// Schedule of the checks of rank loads, and this rank's bond time at the last check.
+/// Schedule of the checks of rank loads, with the time that this rank had spent on bonds at the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,
@@ -45,7 +45,7 @@ impl BalanceWatch {
         }
     }
 
-    /// Rebalance, if a check is due and the rank loads have drifted too far apart. Collective.
+    /// If a check is due and the loads of the ranks differ too much, rebalance. Collective.
     ///
     /// # Errors
     /// If METIS fails; the error is the same on all ranks.
@@ -57,7 +57,7 @@ impl BalanceWatch {
             return Ok(None);
         };
         let is_due = stepper.clock().number().is_multiple_of(rule.every_steps);
-        // All iterations of a load step have the same step number.
+        // All iterations of a load step have the same step number, so only the last one is checked.
         if !is_due || !stepper.load_step().is_settled {
             return Ok(None);
         }
@@ -86,7 +86,7 @@ impl BalanceWatch {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// The owned points in the form in which they migrate.
+    /// Create the owned points in the form in which they migrate.
     pub(super) fn pieces(&self) -> Vec<Point> {
         let model = &self.model;
         let point = |k: usize| {
@@ -105,17 +105,18 @@ impl<const D: usize> Simulation<'_, D> {
         columns.for_each(|column| *column = Vec::new());
     }
 
-    /// The exchange plan between owned points and the order of ids. Collective.
+    /// Create the exchange plan between owned points and ranges of ids. Collective.
     pub fn id_order(&self) -> IdOrder {
         let model = &self.model;
         IdOrder::new(self.comm, &model.ids[..model.owned()], model.coarsest)
     }
 
-    /// Partition the points again. `time` (ns) is this rank's recent time. Returns the number of points
-    /// that changed their owner over all ranks. Collective.
+    /// Partition the points again. `time` (ns) is the time that this rank has spent on bonds since the last
+    /// check. Returns the number of points over all ranks that changed their owner. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The points are lost then.
+    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
+    /// freed.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

@@ -30,7 +30,7 @@ use super::refinement::{self, Refined};
 use super::size;
 use super::steps::choose_steps;
 
-/// Extra distance of ghosts, relative to the longest bond, because points may be off their grid by a
+/// Extra reach of ghosts as a fraction of the longest bond, because points may deviate from their grid by a
 /// millionth of a cell.
 const SLACK: f64 = 1e-5;
 
@@ -46,35 +46,35 @@ pub struct Simulation<'a, const D: usize> {
     pub fields: Fields<D>,
     /// The bonds and their forces.
     pub forces: Forces<D>,
-    /// Contact between points that no bond joins, if there is any.
+    /// Contact between points that no bond joins; `None` in runs without contact.
     pub contact: Option<Contact<D>>,
-    /// Loads and supports of the present stage.
+    /// Conditions of the present stage.
     pub conditions: Conditions<D>,
-    /// Factors on the loads.
+    /// Factors on the loads, which an observer may change.
     pub load_factors: LoadFactors,
-    /// Loads and supports of the other stages, by stage.
+    /// Conditions of the other stages; `None` for the present stage.
     pub(super) waiting: Vec<Option<Conditions<D>>>,
     /// The stages of the run.
     pub stages: Vec<Stage>,
     /// Index of the present stage.
     pub stage: usize,
-    /// First step (s) of each stage, and number of its steps if no bond breaks.
+    /// First step (s) of each stage, and the number of steps of the stage if no bond breaks.
     pub(super) steps: Vec<(f64, f64)>,
     /// Volume of each owned point's whole family, including broken bonds, m³.
     pub family_volume: PaletteColumn,
-    /// Number of bonds of the owned points that each pre-crack cuts. A bond counts once per end on this
-    /// rank.
+    /// Number of bonds of the owned points that each pre-crack cuts. A bond between two owned points counts
+    /// twice.
     pub cut: Vec<u64>,
-    /// Number of bonds of the owned points that were intact before any could break. A bond counts once per
-    /// end on this rank. `None` if no bond breaks at the start.
+    /// Number of bonds of the owned points that were intact before any bond could break. A bond between two
+    /// owned points counts twice. `None` if no bond breaks at the start.
     pub intact_at_start: Option<u64>,
-    /// Stable step for the density of the materials, s.
+    /// Stable step with the density of the materials, s.
     pub stable_step: f64,
     /// Time and step of the present stage.
     pub clock: Clock,
-    /// Integrator of the present stage; taken out while it advances.
+    /// Integrator of the present stage; `None` while it advances the simulation.
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
-    /// Progress of the load step; settled if there are no load steps.
+    /// Progress of the load step; `is_settled` is true in explicit stages.
     pub load_step: LoadStep,
     /// State of Newton's method.
     pub newton: NewtonState,
@@ -102,7 +102,7 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration, conditions, and writing of bond inputs.
+    /// Integration and conditions, including writing the bond inputs.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -110,7 +110,7 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// The first point of a rank with a motion, force or reaction that is not finite.
+/// The first point of a rank whose motion, force or reaction is not finite.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
@@ -129,8 +129,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
 
-    /// Same as [`Self::new`], with a call of `between` after each stage of the set-up. An error of
-    /// `between` ends the set-up; it must be the same on all ranks.
+    /// Same as [`Self::new`], with a call of `between` after each phase of the set-up. An error of `between`
+    /// ends the set-up; the error must be the same on all ranks.
     ///
     /// # Errors
     /// Those of [`Self::new`] and of `between`.
@@ -156,8 +156,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Distribute the points of grids and create their bonds; forces are not evaluated yet. `cost` is the
-    /// cost of this rank's points, if it is known; see [`Self::set_up`].
+    /// Distribute the points of grids and create their bonds, without an evaluation of the forces. `cost` is
+    /// the computing cost of this rank's points; `None` if it is not known. `between` is the same as for
+    /// [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -168,7 +169,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let cutoffs = cutoffs(problem);
         let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-        // With this slack, bonds at the limit find their ghosts however their length is rounded.
+        // With this slack, both ends of a bond at the limit exist on the rank, for any rounding of the bond
+        // length.
         let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
@@ -273,17 +275,18 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.stages[self.stage].time
     }
 
-    /// Make one step, or one iteration of a load step. A [`Stepper`](super::Stepper) makes many steps
-    /// faster. Collective.
+    /// Make one step, or one iteration of a load step. A sequence of steps is faster with a
+    /// [`Stepper`](super::Stepper). Collective.
     pub fn advance(&mut self) {
         if self.leap(false) {
             self.kick();
         }
     }
 
-    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending`:
-    /// the second half kick of the previous step is still to be applied; false at the beginning of a stage.
-    /// Returns whether that of this step is pending. Collective.
+    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending` says
+    /// whether the second half kick of the previous step must still be applied; it must be false at the
+    /// beginning of a stage. Returns whether the second half kick of this step must still be applied.
+    /// Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
@@ -312,8 +315,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.motion += start.elapsed();
     }
 
-    /// Make one explicit step without its second half kick. A pending half kick of the previous step is
-    /// applied first. Collective.
+    /// Make one explicit step without its second half kick. If the second half kick of the previous step is
+    /// pending, apply it first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
         let before = self.clock;
@@ -349,7 +352,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(BondUpdate::Step(step));
     }
 
-    /// Prepare the conditions for the second half kick at the present time of a clock.
+    /// Prepare the conditions for the second half kick at the time of a clock.
     fn set_second_half(&mut self, clock: &Clock) {
         let (time, step) = (clock.time(), clock.step());
         self.conditions
@@ -357,8 +360,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.conditions.set_guidance(time, step);
     }
 
-    /// Call `work` with each part of the owned points and the loads and supports on it, from several
-    /// threads. Returns whether all calls returned true.
+    /// Call `work` on several threads, with each part of the owned points and the conditions that act on this
+    /// part. Returns whether all calls returned true.
     pub(super) fn walk(
         &mut self,
         work: impl Fn(&mut Part<'_, D>, Here<'_, D>) -> bool + Sync,
@@ -391,7 +394,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(bond_update);
     }
 
-    /// Same as [`Self::evaluate`]; [`Part::write_bond_inputs`] must have been called for all parts of the
+    /// Same as [`Self::evaluate`], if [`Part::write_bond_inputs`] has been called for all parts of the
     /// points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let is_quasi_static = self.is_quasi_static();
@@ -433,7 +436,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Set the displacements of supported points at `time` (s). `step` is the last step (s), or 0.
+    /// Set the displacements of supported points at `time` (s). `step` is the length of the last step (s), 0
+    /// at the start.
     pub(super) fn apply_displacements(&mut self, time: f64, step: f64) {
         self.conditions.set_places(time, step);
         self.walk(|part, here| {
@@ -442,7 +446,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Update the external forces at `time` (s). Constant forces are updated only if `all`.
+    /// Update the external forces at `time` (s). Without `all`, only loads that have changed are computed.
     pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
         self.conditions
             .set_loads(time, self.load_factors.present(), all);
@@ -463,7 +467,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.walk(|part, here| here.apply_velocities(part))
     }
 
-    /// Compute the power of damping at the present velocities.
+    /// Compute the power of viscous damping at the present velocities.
     pub(super) fn update_damping_power(&mut self) {
         self.walk(|part, _| {
             part.add_damped_energy(0.0);
@@ -471,22 +475,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Recompute the fields that are not part of the state, after the state was restored. Collective.
+    /// Recompute the fields that are not part of the state. Called after the state was restored. Collective.
     pub(super) fn recompute_derived(&mut self) {
         self.apply_loads(self.clock.time(), true);
         self.update_damping_power();
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Record a motion that is not finite at the time of a clock.
+    /// Record the first point whose motion is not finite, at the time of a clock.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
             self.bad = self.first_bad(clock);
         }
     }
 
-    /// Find the point with the smallest id that has a motion, force or reaction that is not finite at the
-    /// time of a clock.
+    /// Find the point with the smallest id whose motion, force or reaction is not finite. The clock gives
+    /// step and time of the record.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -513,8 +517,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Check on all ranks that all values are finite and that the load step has not failed.
     ///
     /// # Errors
-    /// The message names the first point (earliest step, then smallest id) with a value that is not finite.
-    /// If no equilibrium has been found, it names a piece that no support holds, if there is one.
+    /// The message names the first point with a value that is not finite: that of the earliest step, then the
+    /// smallest id. If no equilibrium has been found, it names a loaded piece that no support holds, if there
+    /// is one.
     pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -568,8 +573,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// Second half of a step (s), after the forces at the new positions are known. Returns whether all values
-/// are finite.
+/// Complete a step (s) with the forces at the new positions: loads, second half kick, supports and work.
+/// Returns whether all values are finite.
 fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, step: f64) -> bool {
     here.apply_loads(part);
     let finite = verlet::second_half_kick(part, step);
@@ -590,8 +595,8 @@ fn starts_deformed(problem: &Problem) -> bool {
             || problem.conditions.iter().any(placed))
 }
 
-/// Break the bonds that cross a pre-crack, and count them by crack. Both ends test the bond with the lower
-/// id first.
+/// Break the bonds that cross a pre-crack, and count them by crack. On both ranks, the test starts from the
+/// end with the lower id, so the results agree.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -628,8 +633,8 @@ fn pre_crack<const D: usize>(
     counts.into_iter().map(Cell::into_inner).collect()
 }
 
-/// Make the bonds of no-failure sets unbreakable, both for bodies and for pairs of bodies with their own
-/// damage.
+/// Make the bonds of no-failure sets unbreakable. These sets belong to the damage of bodies, or to a separate
+/// damage of two bodies.
 fn protect<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -665,7 +670,8 @@ fn protect<const D: usize>(
     }
 }
 
-/// Set the entries of the no-failure points of a damage law to 1 in blocks for which `is_own` is true.
+/// Set `protected` to 1 at the points of the no-failure sets of a damage, in blocks for which `is_own` is
+/// true.
 fn mark_no_failure<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

@@ -1,19 +1,20 @@
-//! Check that a run is small enough, from the problem before its points are created.
+//! Check that a run is small enough, before its points are created.
 
 use crate::error::Result;
 use crate::families::{Fault, MOST_NEIGHBOURS, most_neighbours};
 use crate::points::{lattice, shape};
 use crate::problem::{PointSource, Problem};
 
-/// Return an error if a point would have too many neighbours or a rank too many points, as estimated from
-/// the shapes of the problem. `cutoffs` is the longest bond (m) of each pair of blocks, row-major.
+/// Return an error if a point would have too many neighbours, or a rank too many points. The numbers are
+/// estimated from the shapes of the problem. `cutoffs` is the longest bond (m) of each pair of blocks,
+/// row-major.
 ///
 /// # Errors
 /// The message names the horizon or the body; the error is the same on all ranks.
 pub fn is_feasible(problem: &Problem, cutoffs: &[f64], ranks: usize) -> Result<()> {
     let blocks = problem.block_count();
     (0..problem.bodies.len()).try_for_each(|body| lattice::is_feasible(problem, body, ranks))?;
-    // Check each block alone first, so that the message names its body.
+    // Check bonds within each block first, so that the message names the body of this block.
     let alone = (0..blocks).map(|block| [block, block]);
     let pairs = (0..blocks * blocks).map(|pair| [pair / blocks, pair % blocks]);
     for [here, there] in alone.chain(pairs) {

@@ -1,4 +1,4 @@
-//! Stages of a run, each with its method, its end, and its loads and supports.
+//! Stages of a run; each has a method, an end and conditions.
 
 use crate::comm::sum::{ExactSum, reduce};
 
@@ -19,7 +19,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.is_stage_over() && self.stage + 1 == self.stages.len()
     }
 
-    /// Index of the stage that begins with the next step, if there is one.
+    /// Index of the stage that begins with the next step; `None` if the present stage continues.
     pub(super) fn next_stage(&self) -> Option<usize> {
         let next = self.stage + 1;
         (self.is_stage_over() && next < self.stages.len()).then_some(next)
@@ -31,7 +31,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
     }
 
-    /// A clock with the number of steps of the run if no bond breaks.
+    /// A clock with the expected number of steps of the whole run, if no bond breaks.
     pub fn expected_clock(&self) -> Clock {
         match &self.stages[..] {
             [stage] if stage.time.adaptive.is_none() => self.clock,
@@ -39,13 +39,13 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Stable step with the density of the present stage, s.
+    /// Stable step with the scaled density of the present stage, s.
     pub fn scaled_stable_step(&self) -> f64 {
         self.stable_step * self.time_rule().density_scale.sqrt()
     }
 
-    /// Continue with another stage at the present positions. Points are at rest during load steps and at
-    /// the beginning of the stage after them.
+    /// Begin another stage at the present positions. Velocities are set to 0 at the beginning of a stage with
+    /// load steps and of the stage after it.
     pub(super) fn begin_stage(&mut self, stage: usize) {
         let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);
@@ -77,12 +77,12 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Conserve the momentum of all points after their densities were multiplied by a factor, except
-    /// components with prescribed motion. Book the change of kinetic energy. Returns whether all values are
-    /// finite. Collective.
+    /// Conserve the momentum of the points after their densities were multiplied by a factor. Components with
+    /// prescribed motion keep their velocity. Record the change of kinetic energy. Returns whether all values
+    /// are finite. Collective.
     ///
-    /// With conserved momentum, no force acts at the change. Conserving velocities would need an impulse.
-    /// Conserving kinetic energy would need an impulse that depends on the frame of reference.
+    /// With conserved momentum, the change of density exerts no force. Conserved velocities would need an
+    /// impulse. Conserved kinetic energy would need an impulse that depends on the frame of reference.
     fn keep_momentum(&mut self, factor: f64) -> bool {
         let before = self.kinetic_energy() / factor;
         let components = self.fields.velocity.iter_mut();
@@ -122,14 +122,14 @@ impl<const D: usize> Simulation<'_, D> {
         self.scale_density();
     }
 
-    /// Start an adaptive stage with the step that was chosen for it.
+    /// If the stage is adaptive, start its rule with the present step.
     pub(super) fn begin_adapting(&mut self) {
         if let Some(rule) = self.time_rule().adaptive {
             self.step_control.begin(&rule, self.clock.step());
         }
     }
 
-    /// Set the density of the blocks for the present stage.
+    /// Scale the densities of the blocks for the present stage.
     pub(super) fn scale_density(&mut self) {
         let scale = self.time_rule().density_scale;
         for (density, block) in self.model.density.iter_mut().zip(self.problem.blocks()) {

@@ -12,27 +12,28 @@ use super::motion::Clock;
 use super::motion::load_step::LoadStep;
 use super::simulation::Times;
 
-/// Makes the steps of a simulation.
+/// Driver that makes the steps of a simulation.
 ///
 /// Velocities are defined at half steps, as in the leapfrog form of Verlet. A step ends with the forces at
-/// the new positions. The next step fuses the second half kick with its own first half kick, in one pass
-/// over the points. Meanwhile, velocities, reactions, external forces, damping and their energies are not
-/// those of the full step. Therefore the simulation is accessible only through [`Self::at_full_step`],
-/// which applies the pending half kick first. Results are bitwise independent of how often it is called.
+/// the new positions. The next step applies this step's second half kick together with its first half kick,
+/// in one loop over the points. Until then, velocities, reactions, external forces, damping and their
+/// energies are not those of the full step. Therefore the simulation is accessible only through
+/// [`Self::at_full_step`], which applies the pending half kick first. The number of these calls does not
+/// change the results.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
-    /// Whether the second half kick of the last step is still to be applied.
+    /// Whether the second half kick of the last step must still be applied.
     half_kick_pending: bool,
-    /// What an observer has asked for.
+    /// Requests of an observer on this rank.
     requests: Requests,
 }
 
-/// What an observer has asked for on this rank.
+/// Requests of an observer on this rank.
 #[derive(Default)]
 struct Requests {
-    /// Stop the run.
+    /// Whether the run shall stop.
     stop: bool,
-    /// What is wrong in a request.
+    /// Error of an invalid request; `None` if all requests are valid.
     error: Option<Error>,
 }
 
@@ -55,7 +56,8 @@ impl<'a, const D: usize> Stepper<'a, D> {
         self.half_kick_pending = self.simulation.leap(self.half_kick_pending);
     }
 
-    /// The simulation at the full step. Applies the second half kick if it is pending. Not collective.
+    /// Apply the second half kick if it is pending, and return the simulation at the full step. Not
+    /// collective.
     pub fn at_full_step(&mut self) -> &mut Simulation<'a, D> {
         if std::mem::take(&mut self.half_kick_pending) {
             self.simulation.kick();
@@ -108,30 +110,30 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &self.simulation.times
     }
 
-    /// Ask for a stop of the run.
+    /// Request that the run stops.
     pub fn request_stop(&mut self) {
         self.requests.stop = true;
     }
 
-    /// Whether a stop was asked for on this rank.
+    /// Whether an observer has requested a stop on this rank.
     pub fn is_stop_requested(&self) -> bool {
         self.requests.stop
     }
 
-    /// The error of a request on this rank, if any.
+    /// The error of an invalid request on this rank, if there is one.
     pub fn wrong_request(&self) -> Option<&Error> {
         self.requests.error.as_ref()
     }
 
-    /// Factors on the loads.
+    /// The factors on the loads.
     pub fn load_factors(&self) -> &LoadFactors {
         &self.simulation.load_factors
     }
 
-    /// Index of the load with a name.
+    /// Index of the load condition with this name.
     ///
     /// # Errors
-    /// If there is no condition of this name, or it is no load.
+    /// If no condition has this name, or if the condition is not a load.
     pub fn load(&self, name: &str) -> Result<usize> {
         let conditions = &self.simulation.problem.conditions;
         let is_load = |condition: &Condition| condition.action.is_load();
@@ -149,8 +151,8 @@ impl<'a, const D: usize> Stepper<'a, D> {
         )))
     }
 
-    /// Multiply a load by a factor from the next step, or load step, on. All ranks must pass the same factor.
-    /// An unknown load or a factor that is not finite is reported by [`Self::wrong_request`].
+    /// Multiply a load by a factor from the next step or load step on. All ranks must pass the same factor.
+    /// If the load is unknown or the factor is not finite, [`Self::wrong_request`] returns an error.
     pub fn set_load_factor(&mut self, name: &str, factor: f64) {
         let checked = self.load(name).and_then(|load| {
             if factor.is_finite() {
@@ -165,17 +167,18 @@ impl<'a, const D: usize> Stepper<'a, D> {
         }
     }
 
-    /// The points.
+    /// The points and their constants.
     pub fn model(&self) -> &Model<D> {
         &self.simulation.model
     }
 
-    /// u, m; owned points, then ghosts.
+    /// Displacement u by component, m; owned points, then ghosts.
     pub fn displacement(&self) -> &[Vec<f64>; D] {
         &self.simulation.fields.displacement
     }
 
-    /// Same as [`Simulation::check`], without the values that a pending half kick changes. Collective.
+    /// Same as [`Simulation::check`], without the check of values that a pending half kick changes.
+    /// Collective.
     ///
     /// # Errors
     /// Same as for [`Simulation::check`].

@@ -9,11 +9,13 @@ use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time
 use super::motion::Clock;
 use super::motion::clock::steps_to;
 
-/// Maximum number of steps of a stage. Up to it, steps can be counted, and each step advances the time.
+/// Maximum number of steps of a stage. Larger numbers are not exact in floating point, and steps may be too
+/// small to change the time.
 const MOST_STEPS: f64 = 1e15;
 
-/// First step (s) of each stage of a run, and number of its steps if no bond breaks, for a stable step (s).
-/// An automatic step divides the stage evenly, unless `[time.adaptive] largest` limits it.
+/// Return the first step (s) of each stage, and the number of steps of the stage if no bond breaks. `stable`
+/// is the stable step, s. An automatic step divides the stage evenly, unless `[time.adaptive] largest` limits
+/// the step.
 ///
 /// # Errors
 /// If there is no stable step, or if there are more steps than can be counted.
@@ -27,14 +29,15 @@ pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     problem.all_stages().into_iter().map(choose).collect()
 }
 
-/// A clock with equal steps and as many steps as all stages together. `steps` contains the first step (s)
+/// Return a clock with equal steps, as many as all stages have together. `steps` contains the first step (s)
 /// and the number of steps of each stage.
 pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
     let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
     Clock::new(problem.time.end / all, problem.time.end)
 }
 
-/// First step (s) of a stage with a length (s), and number of its steps if no bond breaks.
+/// Return the first step (s) of a stage, and the number of its steps if no bond breaks. `length` is the
+/// duration of the stage, s.
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
         if stable.is_infinite() {
@@ -66,7 +69,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
     countable(problem, length, (step, steps))
 }
 
-/// The error of a body whose points have no bonds; `missing` names the step that cannot be computed.
+/// Create the error for a body whose points have no bonds. `missing` is the quantity that cannot be computed.
 fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     let from_mesh = |body: &Body| matches!(body.points, PointSource::Mesh { .. });
     let scale = if problem.bodies.iter().any(from_mesh) {
@@ -81,7 +84,8 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     Error::input(message).at(&problem.places.horizon)
 }
 
-/// Return a step (s) and the number of steps in a stage of this length (s), or an error if there are too many to count.
+/// Return a step (s) and the number of steps in a stage of duration `length` (s). It is an error if the steps
+/// are too many to count.
 fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(
@@ -93,11 +97,11 @@ fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Resul
     Ok((step, steps))
 }
 
-/// Maximum number of repeats of a step by rollback; each repeat costs as much as a step.
+/// Maximum number of times that a step may be rolled back and repeated; each repeat costs as much as a step.
 const MOST_REPEATS: f64 = 100.0;
 
-/// Check the adaptive rule for a stage with a length (s) and the chosen `step` (s). An error says that a
-/// step may be repeated without end, or that steps may become too small for the stage to end.
+/// Return an error if the adaptive rule may repeat a step too often, or if its smallest step gives too many
+/// steps. `length` is the duration of the stage (s), and `step` is the chosen step (s).
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
     let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));
@@ -108,7 +112,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
             length / smallest,
         ));
     }
-    // The last repeat may be cut to the smallest step.
+    // The last repeat uses the smallest step, even if `reduce` would give a smaller one.
     let repeats = (libm::log(smallest / largest) / libm::log(rule.reduce)).ceil();
     if repeats > MOST_REPEATS {
         return error(format!(
@@ -129,22 +133,24 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
 /// at most (r Δt)²/4 of the damped kinetic energy.
 const DAMPED: f64 = 0.5;
 
-/// Largest allowed r Δt; beyond it, a damped velocity changes its sign in each step.
+/// Largest allowed r Δt; with a larger one, viscous damping reverses the velocity in each step.
 const SIGN_CHANGES: f64 = 2.0;
 
-/// The largest rate of viscous damping of a body, 1/s.
+/// The largest rate r of viscous damping of the bodies, 1/s.
 fn damping(problem: &Problem) -> f64 {
     let rates = problem.bodies.iter().map(|body| body.material.damping);
     rates.fold(0.0, f64::max)
 }
 
-/// Largest step (s) that `safety` allows, for a stable step (s) with the density of the materials.
+/// Return the largest automatic step of a stage, s. `stable` is the stable step with the density of the
+/// materials, s.
 pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) -> f64 {
     let damped = DAMPED / damping(problem);
     safety * (stable * time.density_scale.sqrt()).min(damped)
 }
 
-/// Return an error if steps of a key of [time] (s) are too long for viscous damping.
+/// Return an error if a step (s) is too long for viscous damping. `key` is the key of `[time]` that gives the
+/// step.
 fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64) -> Result<()> {
     let rate = damping(problem);
     if rate * step <= SIGN_CHANGES {
@@ -160,8 +166,9 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
     Err(Error::input(message).at(place))
 }
 
-/// First step (s) of a stage with a length (s) under an adaptive rule, and number of its steps if no bond
-/// breaks. The first step is at most the largest step, and steps grow up to the largest step.
+/// Return the first step (s) of a stage with an adaptive rule, and the number of its steps if no bond breaks.
+/// `step` and `steps` are those without the rule, and `length` is the duration of the stage, s. The first
+/// step is at most `largest` and grows up to `largest`.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
     match rule.largest {
         Some(largest) if largest < step => (largest, steps_to(length, largest)),
@@ -170,14 +177,14 @@ fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64
     }
 }
 
-/// Number of steps in a time (s), if the first step (s) grows to the largest (s) in rounds of `rule.steps`
-/// steps.
+/// Number of steps in a duration `length` (s). The step grows from the first to the largest step (s) after
+/// each round of `rule.steps` steps.
 fn raised(rule: &Adaptive, [first, largest]: [f64; 2], length: f64) -> f64 {
     let round = rule.steps as f64;
     let growth = rule.raise - 1.0;
     let rounds_to = |ratio: f64| libm::log(ratio) / libm::log1p(growth);
-    // Rounds before the largest step, limited to those that fit: the time of k rounds is a geometric
-    // series.
+    // Number of rounds before the largest step is reached, but no more than fit in the duration. The duration
+    // of k rounds is a geometric series.
     let before_largest = rounds_to(largest / first).ceil();
     let fitting = rounds_to(1.0 + length * growth / (round * first)).floor();
     let rounds = before_largest.min(fitting);
@@ -203,7 +210,7 @@ mod tests {
         }
     }
 
-    /// Count the steps one by one.
+    /// Count the steps one by one, to check [`raised`].
     fn counted(rule: &Adaptive, mut step: f64, length: f64) -> u64 {
         let (mut time, mut calm, mut steps) = (0.0, 0, 0);
         while time < length * (1.0 - 1e-9) {
@@ -245,7 +252,7 @@ mod tests {
                 );
             }
         }
-        // A step that hardly grows is not counted one by one.
+        // Steps that hardly grow are too many to be counted one by one.
         let slow = rule(1.0 + f64::EPSILON, 1, 2.0);
         let steps = adapted(&slow, (1e-12, 1e12), 1.0).1;
         assert!((steps / 1e12 - 1.0).abs() < 1e-3, "{steps}");

@@ -13,7 +13,7 @@ const VOLUME_SLACK: f64 = 5e-3;
 /// Ratio between the mean volume of a file's points and their spacing³ above which a warning is printed.
 const VOLUME_FACTOR: f64 = 10.0;
 
-/// Figures of a body's points.
+/// Number, volume and position of a body's points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyFigures {
     /// Number of points.
@@ -33,7 +33,7 @@ pub struct BodyFigures {
     pub neighbours: Option<[u64; 3]>,
 }
 
-/// The figures of all bodies, with warnings of inconsistent volumes. Collective.
+/// Collect the figures of all bodies, with warnings about inconsistent volumes. Collective.
 pub fn figures<const D: usize>(
     simulation: &Simulation<'_, D>,
     warnings: &mut Vec<Warning>,
@@ -80,7 +80,8 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
     Some(lattice.shape_volume())
 }
 
-/// Distance (m) of each owned point to its nearest bonded neighbour; empty if no body comes from a file.
+/// Distance (m) of each owned point to its nearest bonded neighbour; empty if the points of no body come from
+/// a file.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
     if !problem.bodies.iter().any(is_from_file) {
@@ -117,7 +118,7 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     let mut largest = [counts.iter().copied().max().unwrap_or(0) as f64];
     simulation.comm.max(&mut largest);
     let width = largest[0] as usize + 1;
-    // Number of points by body and number of neighbours.
+    // Number of points, by body and by number of neighbours.
     let mut histogram = vec![0; scattered.len() * width];
     for (point, count) in counts.iter().enumerate() {
         let body = problem.body_of(usize::from(model.block[point]));
@@ -128,7 +129,8 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     simulation.comm.sum(&mut histogram);
     for (body, row) in scattered.iter().zip(histogram.chunks_exact(width)) {
         let last = row.iter().sum::<u64>().saturating_sub(1);
-        // Number of neighbours of the point at a position in the order of this number.
+        // Number of neighbours of the point at this position, if the points are sorted by number of
+        // neighbours.
         let sorted = |position: u64| {
             let mut below = 0;
             let count = row.iter().position(|points| {

@@ -15,39 +15,39 @@ const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 /// Bytes of a result or checkpoint in addition to its points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list: an eighth of a compact group, and one bit.
+/// Bytes of a bond in a list: an eighth of a compact group of neighbour indices, and one bit.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
 /// Bytes of a bond in a lattice: one bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
-/// Memory of a rank without points, bytes: without and with a launcher (which needs MPI buffers).
+/// Memory of a rank without points, bytes: without a launcher, and with one (which needs MPI buffers).
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
-/// Bytes per point and per list bond at the peak of the set-up, if not measured. The set-up of lattices
-/// needs less memory than the time loop.
+/// Estimated bytes per point and per list bond at the peak of the set-up. The set-up of lattices needs less
+/// memory than the time loop.
 const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 
-/// Bytes per point of contact, if not measured. The value was measured on a block of 512 000 points without
-/// contacts.
+/// Estimated bytes per point for contact, from a measurement with a block of 512 000 points without contacts.
 const CONTACT: f64 = 280.0;
 
-/// Vectors of Newton's method, which are allocated in the first iteration.
+/// Number of work vectors of Newton's method, which are allocated in the first iteration.
 const NEWTON_VECTORS: usize = 8;
 
-/// Copies of a field during output: by point, by id, and in the file layer.
+/// Number of copies of a field during its output: by point, by id, and in the file layer.
 const FIELD_COPIES: f64 = 3.0;
 
-/// Copies of a column during a checkpoint on one rank and on several: by point, by id, and in messages.
+/// Number of copies of a column during a checkpoint, on one rank and on several: by point, by id, and in
+/// messages.
 const CHECKPOINT_COPIES: [f64; 2] = [2.0, 3.0];
 
-/// Measured memory of the points of a process, bytes.
+/// Measured memory of a process for its points, bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// Peak during the set-up.
     pub peak: f64,
-    /// After the set-up.
+    /// Memory after the set-up.
     pub resident: f64,
 }
 
@@ -56,10 +56,10 @@ pub struct Measured {
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Peak memory of all ranks in the time loop, during output, without ghosts, bytes: for one rank, and
+    /// Peak memory of all ranks in the time loop (during an output), without ghosts, bytes: for one rank, and
     /// for several ranks.
     pub time_loop: [f64; 2],
-    /// The main result, with the history, and the further ones.
+    /// The main result with the history, then the further results.
     pub results: Vec<ResultCost>,
     /// Size of one checkpoint, bytes; there are two.
     pub checkpoint: f64,
@@ -68,7 +68,7 @@ pub struct Cost {
 /// Disk space of a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResultCost {
-    /// Name of a further output.
+    /// Name of a further result; `None` for the main result.
     pub name: Option<String>,
     /// Number of outputs.
     pub outputs: u64,
@@ -76,7 +76,7 @@ pub struct ResultCost {
     pub bytes: f64,
 }
 
-/// Inputs of the cost.
+/// Numbers from which the cost is computed.
 #[derive(Debug, Clone)]
 struct Counts {
     points: f64,
@@ -85,15 +85,15 @@ struct Counts {
     memory: Measured,
     /// Bytes of the bonds in a checkpoint.
     bonds: f64,
-    /// Columns of the history.
+    /// Number of columns of the history.
     columns: f64,
     /// Number of saved values per point in a checkpoint.
     saved: usize,
 }
 
 impl Cost {
-    /// The cost of a run that is set up on one rank, with `columns` history columns and `output_points`
-    /// points in its result. Memory is estimated if not measured.
+    /// Compute the cost of a run that is set up on one rank, with `columns` history columns and
+    /// `output_points` points in each result. Memory is estimated if it was not measured.
     pub fn of<const D: usize>(
         simulation: &Simulation<'_, D>,
         columns: usize,
@@ -117,7 +117,7 @@ impl Cost {
         cost(problem, counts, &simulation.expected_clock())
     }
 
-    /// Estimate the cost of a run from its size and the steps of its clock.
+    /// Estimate the cost of a run from its size, without its points. `clock` gives the number of steps.
     pub fn estimate(problem: &Problem, size: &Size, clock: &Clock) -> Self {
         let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
         let mut bodies = problem.bodies.iter();
@@ -148,7 +148,7 @@ impl Cost {
         self.results.iter().map(|result| result.bytes).sum()
     }
 
-    /// Peak memory of one of `ranks` ranks, bytes; `ghosts` is relative to owned points.
+    /// Peak memory of one of `ranks` ranks, bytes. `ghosts` is the number of ghosts per owned point.
     pub fn memory_of_a_rank(&self, ranks: u32, ghosts: f64) -> f64 {
         let several = usize::from(ranks > 1);
         let points = self.set_up.max(self.time_loop[several]) / f64::from(ranks);
@@ -156,7 +156,7 @@ impl Cost {
     }
 }
 
-/// Bytes of history per bond of a body; each bond stores the history of both ends.
+/// Bytes of history per bond of a body; each bond stores the history for both ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {
@@ -171,7 +171,7 @@ fn history_bytes(problem: &Problem, body: &Body) -> f64 {
 fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measured {
     let dimension = problem.dimension.count();
     // Position, displacement, velocity and force; energy of broken bonds; palette indices of the volumes of
-    // point and family; id and block.
+    // the point and of its family; id and block.
     let state = 4 * 8 * dimension + 8 + 2 + 8 + 2;
     let contact = if problem.has_contact() { CONTACT } else { 0.0 };
     let resident = bonds + (state as f64 + contact) * points;
@@ -183,8 +183,8 @@ fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measure
     Measured { peak, resident }
 }
 
-/// Number of ghosts per owned point of a rank, for a box with these edges (m) that is divided along its
-/// longest edges.
+/// Number of ghosts per owned point of a rank, for a box with these edges (m). Cuts between ranks are
+/// perpendicular to the longest edges.
 pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     let mut parts = vec![1_u32; edges.len()];
     let (mut remaining, mut factor) = (ranks, 2);
@@ -241,7 +241,7 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     let results = problem.outputs().zip(&counts.output_points).map(result);
     let results = results.collect();
     let saved = 8.0 * counts.saved as f64 + 4.0;
-    // During output of a field: sums over bonds, and copies of the field.
+    // The output of a field needs sums over bonds, and copies of the field.
     let fields = problem.outputs().flat_map(|output| &output.fields);
     let widest = fields.map(|field| field.components()).max();
     let widest = widest.unwrap_or(0).max(3) as f64;
@@ -250,8 +250,8 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     let offsets = counts.points * 24.0;
     let checkpoint =
         CHECKPOINT_COPIES.map(|copies| copies * bonds.max(counts.points * 8.0) + offsets);
-    // At a restart, all columns are in memory. Then bonds are redistributed, with two more numbers for
-    // lengths and offsets.
+    // At a restart, all columns are in memory. Bonds are then redistributed, with two more numbers per point
+    // for lengths and offsets.
     let restart = counts.points * 8.0 * (counts.saved as f64 + 2.0) + 2.0 * bonds;
     let vectors = if problem.has_newton() {
         let numbers = NEWTON_VECTORS * problem.dimension.count();
@@ -278,7 +278,7 @@ mod tests {
         let share = |ranks| ghost_share(&[4.0, 1.0], 0.1, ranks);
         assert_eq!(share(1), 0.0);
         assert!((share(2) - 0.05).abs() < 1e-12);
-        // With three cuts of the long edge, the inner ranks have ghosts on both sides.
+        // With three cuts of the long edge, two of the four ranks have ghosts on both sides.
         assert!((share(4) - 0.2).abs() < 1e-12);
         assert!((ghost_share(&[3.0], 0.1, 3) - 0.2).abs() < 1e-12);
     }

@@ -27,9 +27,9 @@ pub struct DryRun {
     pub points: u64,
     /// Number of bonds.
     pub bonds: u64,
-    /// Number of bonds stored as a lattice.
+    /// Number of bonds in lattice families.
     pub lattice_bonds: u64,
-    /// Ghosts per owned point on the given number of ranks.
+    /// Ghosts per owned point on the requested number of ranks.
     pub ghosts: f64,
     /// Memory and disk space.
     pub cost: Cost,
@@ -37,11 +37,12 @@ pub struct DryRun {
     pub stable_step: f64,
     /// For each stage: first step (s) and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,
-    /// Wall-clock time per step on one rank, s, if measured.
+    /// Wall-clock time per step on one rank, s; `None` if it was not measured.
     pub seconds: Option<f64>,
 }
 
-/// Dry-run a problem for a number of ranks. With `measure`, the time per step is measured.
+/// Set up a problem on one rank, and compute its figures for `ranks` ranks. With `measure`, also measure the
+/// time per step.
 ///
 /// # Errors
 /// Same as for a run before its first step.

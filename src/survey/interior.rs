@@ -1,4 +1,4 @@
-//! Discrete properties of a body away from its surface, computed on a small block of its lattice.
+//! Properties of a lattice body away from its surface, computed on a small block of the lattice.
 
 use crate::comm::threads;
 use crate::dimension::{Constraint, Dimension};
@@ -23,16 +23,17 @@ pub struct Interior {
     pub neighbours: u32,
     /// Guaranteed stable step, s.
     pub stable_step: f64,
-    /// Modulus of isotropic expansion in the dimensions of the problem, from the strain energy, Pa; in 3-D,
-    /// the bulk modulus.
+    /// Modulus of isotropic expansion in 1-D, 2-D or 3-D, from the strain energy, Pa. In 3-D, it is the bulk
+    /// modulus.
     pub bulk: f64,
-    /// Shear moduli along the axes and along the diagonals of the grid, Pa; `None` in 1-D.
+    /// Shear moduli for shear along the axes and along the diagonals of the grid, Pa; `None` in 1-D.
     pub shear: Option<[f64; 2]>,
-    /// Exact values of both moduli, Pa.
+    /// Moduli of the classical solid, Pa: modulus of isotropic expansion, and shear modulus.
     pub exact: [f64; 2],
 }
 
-/// The interior of a lattice body; `None` for scattered points and for families too large for a block.
+/// Compute the properties of a lattice body. The result is `None` for points that are not on a lattice, and
+/// for families that are too large for a block.
 pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     if !problem.bodies[body].is_on_lattice(problem.jitter) {
         return None;
@@ -45,7 +46,7 @@ pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     }
 }
 
-/// The problem of a block with at least one complete family.
+/// Create the problem of a block with at least one complete family.
 fn block(problem: &Problem, body: usize) -> Option<Problem> {
     let (mut block, spacing) = single_body(problem, body)?;
     block.bodies[0].damage = None;
@@ -73,7 +74,7 @@ fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
     let middle = nearest(&simulation, upper.map(|x| 0.5 * x)).own?;
     let stable_step = simulation.stable_step;
     let neighbours = energy_and_bonds(&mut simulation, middle, [[0.0; D]; D]).1;
-    // Average over both signs, so odd terms in the strain cancel.
+    // The mean over both signs of the strain cancels odd terms.
     let mut energy = |gradient: [[f64; D]; D]| {
         let negative = gradient.map(|row| row.map(|entry| -entry));
         let [a, b] = [gradient, negative]

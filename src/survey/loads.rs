@@ -1,4 +1,4 @@
-//! Warnings of loads and supports without the intended effect.
+//! Warnings about loads and supports without the intended effect.
 
 use std::collections::HashSet;
 
@@ -18,7 +18,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// curved layer of one cell is up to π/2 cells thick.
 const MAX_THICKNESS_RATIO: f64 = 1.8;
 
-/// Maximum number of points of a layer that is checked.
+/// Maximum number of points of a layer for which the thickness is checked.
 const LARGE_LAYER: u64 = 4_000_000;
 
 /// Check all conditions and append warnings. Collective.
@@ -58,7 +58,7 @@ fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     }
 }
 
-/// Warn of prescribed motions that a later one with different values overrides.
+/// Warn of prescribed motions that a later condition with other values overrides.
 fn twice_prescribed<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
@@ -204,8 +204,9 @@ fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     }
 }
 
-/// Thickness of a layer, m: the mean length of rows of adjacent cells in the direction with the shortest
-/// rows. For several bodies, it is the thickness farthest from `depth` (m). `None` if there are no cells.
+/// Thickness of a layer, m: the mean length of rows of adjacent cells, in the direction with the shortest
+/// rows. If the layer has points of several bodies, it is the thickness that differs most from `depth` (m).
+/// `None` if there are no cells.
 fn thickness<const D: usize>(
     problem: &Problem,
     cells: &HashSet<[i64; 4]>,
@@ -257,7 +258,7 @@ fn inward_normals<const D: usize>(
         if !is_pressure(condition) {
             continue;
         }
-        // The factors are −normal/depth.
+        // The factors of a pressure are −normal/depth.
         let mut sum = [ExactSum::ZERO];
         for point in points {
             let inward = inward[*point as usize];

@@ -31,8 +31,8 @@ use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
-/// Number of intact bonds, by dimension, below which a point is weakly bonded. The numbers are half of a
-/// family at a horizon of two spacings.
+/// A point is weakly bonded if it has fewer intact bonds than this number, by dimension. The numbers are half
+/// a family at a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Common horizons, in spacings.
@@ -41,7 +41,7 @@ const USUAL_HORIZONS: std::ops::RangeInclusive<f64> = 1.999..=8.001;
 /// Number of steps above which even small runs take days.
 const MANY_STEPS: u64 = 100_000_000;
 
-/// Number of steps below which nothing can happen in an explicit run.
+/// Number of steps below which an explicit run cannot show any motion.
 const FEW_STEPS: u64 = 2;
 
 /// Critical stretch above which a warning is printed.
@@ -50,7 +50,7 @@ const LARGEST_STRETCH: f64 = 1.0;
 /// Critical stretch below which a warning is printed. Rock at a horizon of 1 km has 1.5e-6.
 const SMALLEST_STRETCH: f64 = 1e-6;
 
-/// Distance from a pre-crack, in spacings, within which a point lies on it.
+/// A point at most this distance from a pre-crack, in spacings, lies on the pre-crack.
 const ON_CRACK: f64 = 1e-6;
 
 /// The figures and warnings of a run; equal on all ranks.
@@ -58,11 +58,11 @@ const ON_CRACK: f64 = 1e-6;
 pub struct Survey {
     /// Figures of each body.
     pub bodies: Vec<BodyFigures>,
-    /// Number of bonds of each bonded pair of bodies, lower index first.
+    /// Number of bonds between each pair of bonded bodies; the lower body index comes first.
     pub joints: Vec<([usize; 2], u64)>,
     /// Number of bonds cut by each pre-crack.
     pub cuts: Vec<u64>,
-    /// The point of each probe.
+    /// The point nearest to each probe.
     pub probes: Vec<Nearest>,
     /// Number of points of each set.
     pub sets: Vec<u64>,
@@ -126,7 +126,7 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
         .collect()
 }
 
-/// Warn of pairs of bodies that are bonded by the rule of all pairs, and have contact too.
+/// Warn of pairs of bodies that are bonded by default and also have contact.
 fn touching_joints(problem: &Problem, joints: &[([usize; 2], u64)], warnings: &mut Vec<Warning>) {
     let Some(contact) = &problem.contact else {
         return;
@@ -169,7 +169,7 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    // Softening bonds carry no force near their critical stretch.
+    // A bond that softens carries almost no force near its critical stretch.
     let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
     let of_bodies = of_damage.filter_map(|body| {
         let law = block_laws(problem, &Block::unrefined(body)).damage?;
@@ -231,13 +231,14 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     moving.filter_map(safety).collect()
 }
 
-/// Ratio of the stiffness of a family with bonds stretched by s to the stiffness that the stable step
-/// assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
+/// Stiffness of a family with bonds stretched by s, divided by the stiffness that the stable step assumes. A
+/// stretched bond resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
 
-/// Warn of pre-cracks without width that pass through points, which then count to one side.
+/// Warn of pre-cracks without width that pass through points. Such points count as on one side of the
+/// pre-crack.
 fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let is_on = |crack: &Crack, point: &usize| {

@@ -1,4 +1,4 @@
-//! Size of a run, estimated without its points, which may be too many to generate.
+//! Estimated size of a run. Its points are not generated, because they may be too many.
 
 use crate::dimension::Dimension;
 use crate::error::Result;
@@ -6,7 +6,7 @@ use crate::points::{LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
-/// Maximum number of cells that are read to count neighbours, over all samples.
+/// Maximum number of lattice cells that are read to count neighbours, over all samples.
 const MAX_CELLS_READ: f64 = 4e6;
 
 /// Maximum number of sampled points per body.
@@ -15,7 +15,7 @@ const SAMPLES: u64 = 400;
 /// The estimated size of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
-    /// Number of candidate lattice cells.
+    /// Number of lattice cells that are tested against the shapes.
     pub cells: f64,
     /// Number of points of each body.
     pub points: Vec<f64>,
@@ -85,7 +85,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
     Ok(size)
 }
 
-/// Mean number of neighbours on all lattices, from sampled points of a body.
+/// Mean number of neighbours of a body's points on all lattices, from sampled points.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
@@ -109,7 +109,7 @@ fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64])
     (found as f64 / centres.len() as f64 - 1.0).max(0.0)
 }
 
-/// Figures of a body's points from a file or a mesh.
+/// Figures of a body whose points come from a file or a mesh.
 #[derive(Clone, Default)]
 struct Rows {
     points: f64,
@@ -119,7 +119,7 @@ struct Rows {
     output_points: Vec<f64>,
 }
 
-/// The figures of the points from files, by body.
+/// Figures of the bodies whose points come from files or meshes, by body.
 fn from_files(problem: &Problem) -> Vec<Rows> {
     let none = Rows {
         output_points: vec![0.0; 1 + problem.further_outputs.len()],
@@ -168,8 +168,8 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
     }
 }
 
-/// Test whether a point is in the set of an output, which is not a set of ids. Points of a set of a mesh are not known yet;
-/// all of them count.
+/// Test whether a point is in the set of an output, which is not a set of ids. If the set is a group of a
+/// mesh, all points count, because its ids are not known yet.
 fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f64; 3]) -> bool {
     set.map(|set| &problem.sets[set]).is_none_or(|set| {
         matches!(set.selector, Selector::Mesh(_))
@@ -177,7 +177,8 @@ fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f
     })
 }
 
-/// Number of points in the result of an output, its number and set, from sampled points of each body.
+/// Number of points in the result of an output, from sampled points of each body. The argument is the index
+/// and the set of the output.
 fn output_points(
     problem: &Problem,
     (number, set): (usize, Option<usize>),

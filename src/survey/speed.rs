@@ -14,17 +14,17 @@ use crate::solver::{Simulation, Stepper};
 /// Figures of the measured steps on this rank.
 #[derive(Debug, Clone)]
 pub struct Speed {
-    /// Points of all ranks.
+    /// Number of points over all ranks.
     pub points: u64,
-    /// Ghosts of this rank.
+    /// Number of ghosts of this rank.
     pub ghosts: u64,
-    /// Bonds of owned points, counted at each owned end.
+    /// Number of bonds of owned points, counted at each owned end.
     pub directed_bonds: u64,
-    /// Bonds stored as a lattice.
+    /// Number of bonds in lattice families.
     pub lattice_bonds: u64,
     /// Memory of the bonds, bytes.
     pub bond_bytes: u64,
-    /// The vector instructions of the loops.
+    /// Instruction set of the bond loops.
     pub instructions: Instructions,
     /// Time of the set-up.
     pub set_up: Duration,
@@ -34,13 +34,14 @@ pub struct Speed {
     pub times: Times,
     /// Messages of the steps.
     pub sent: Traffic,
-    /// Messages of the same number of halo exchanges without overlap.
+    /// Messages of as many halo exchanges without overlap.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
 }
 
-/// Measure `steps` steps after `warm_up` steps, during which caches, page tables and clock rates settle.
+/// Measure `steps` steps after `warm_up` steps. During the warm-up, caches, page tables and clock rates
+/// settle.
 /// Collective.
 ///
 /// # Errors

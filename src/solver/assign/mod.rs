@@ -27,7 +27,7 @@ struct Constants {
     horizon: f64,
 }
 
-/// Constants at point i of the bonds from one block to another.
+/// Constants at point i of the bonds from block `here` to block `there`, by the rule for these blocks.
 fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
     let [own, other] = [here, there].map(|block| (block.body.material.elastic, block.horizon));
     let combine = |of: fn(f64, f64) -> f64| Constants {
@@ -67,14 +67,14 @@ fn breaks_by_work(body: &Body, damage: &problem::Damage) -> bool {
     damage.rule != DamageRule::CriticalStretch && !bond_based
 }
 
-/// Input of the law of a body, for bonds that break by this damage.
+/// Input from which the law of a body is created, if its bonds break by this damage.
 fn given<'a>(
     problem: &Problem,
     body: &'a Body,
     damage: Option<&problem::Damage>,
     constants: Constants,
 ) -> Given<'a> {
-    // A critical stretch of the deck applies to all bonds.
+    // A critical stretch in the deck is used as given, for any horizon.
     let itself =
         |damage: &problem::Damage| matches!(damage.toughness, Toughness::CriticalStretch(_));
     Given {
@@ -86,13 +86,14 @@ fn given<'a>(
     }
 }
 
-/// Stretch at which the law itself breaks bonds of a body with these constants, if it does.
+/// Stretch at which the law itself breaks bonds of a body with these constants; `None` for laws without such
+/// a stretch.
 fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) -> Option<f64> {
     let own = body.material.law.declaration.own_critical_stretch?;
     Some(own(&given(problem, body, None, constants)))
 }
 
-/// Create the law of a body with these constants, for bonds that break by this damage.
+/// Create the law of a body with these constants, if its bonds break by this damage.
 fn build(
     problem: &Problem,
     body: &Body,
@@ -102,7 +103,7 @@ fn build(
     (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
-/// Volume fractions of a block's cells in families with this horizon.
+/// Volume fractions of the cells of `neighbours` inside the families of points with this horizon.
 fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
     // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
@@ -155,7 +156,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Data that the criteria of a body's pairs with their own damage law read.
+/// Data that failure criteria read of the points of this body, for its bonds to bodies with which it has a
+/// separate damage law.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -168,8 +170,8 @@ fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     reads
 }
 
-/// The damage laws of a pair of bodies, for both bodies in their order in the problem. `None` if the damage
-/// of the bodies applies.
+/// The damage laws at the two ends of the bonds between two bodies, in the order of the bodies in the
+/// problem. `None` if the damage of the bodies applies.
 pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[DamageLaw; 2]> {
     let damage = pair.own_damage()?;
     let mut bodies = problem.bodies.iter().filter(|body| pair.has(body));
@@ -221,8 +223,8 @@ fn damage_law(
     }
 }
 
-/// Failure criterion of the bonds of a pair with its own damage. Each end has the damage law for its own
-/// constants; `stiffness` is that of both ends.
+/// Failure criterion of the bonds between two bodies that have a separate damage law for these bonds. Each
+/// end has the damage law for its constants; `stiffness` is the bond stiffness of each end.
 fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     use DamageLaw::{BondEnergy, CriticalStretch};
     match laws {
@@ -230,7 +232,7 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
             Criterion::Stretch(i.critical)
         }
         [CriticalStretch(i), CriticalStretch(j)] => {
-            // Each end uses only its own threshold, never that of the other point.
+            // Each end compares the stretch with its threshold only, not with that of the other end.
             let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
             let conversion = StretchConversion { ratios, stiffness };
             Criterion::StretchBetween([i.critical, j.critical], conversion)
@@ -242,8 +244,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     }
 }
 
-/// Failure criterion of the bonds between two blocks: the smaller of both thresholds. A block without
-/// damage has no threshold.
+/// Failure criterion of the bonds between two blocks: a bond breaks at the smaller threshold of its ends. A
+/// block without damage has no threshold.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
@@ -270,7 +272,7 @@ fn criterion(
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
-    // A critical stretch of the deck applies to bonds of any horizon.
+    // A critical stretch in the deck is used as given, for any horizon.
     let is_given = ends.map(|block| match &problem.block(block).body.damage {
         Some(damage) => matches!(damage.toughness, Toughness::CriticalStretch(_)),
         None => problem.block(block).body.can_break(),
@@ -365,16 +367,16 @@ struct End {
     own_critical_stretch: Option<f64>,
     /// See [`bond_stiffness`].
     stiffness: f64,
-    /// Damage law of a pair with its own damage.
+    /// Damage law at this end, if the two bodies have a separate damage law.
     pair_damage: Option<DamageLaw>,
     /// Horizon, m.
     horizon: f64,
-    /// Volume fractions of the other body's cells in its families.
+    /// Volume fractions of the other block's cells inside the families of this end.
     share: CellShare,
 }
 
 impl End {
-    /// Weight of the volume of the neighbour at ξ (m).
+    /// Weight of the volume of a neighbour at ξ (m) from the point.
     fn weight(&self, offset: [f64; 3]) -> f64 {
         let share = self.share.at(offset);
         match &self.built.influence {
@@ -397,7 +399,7 @@ fn weigh<const D: usize>(
     if plain {
         return Ok(());
     }
-    // Within a block, both ends have the same weights.
+    // Within a block, both ends have the same weights, so these are set once.
     let [here, there] = bonds.blocks();
     let count = if here == there { 1 } else { 2 };
     match bonds {

@@ -52,7 +52,7 @@ fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
     Err(Error::input(message).at(&pair.span))
 }
 
-/// Return an error if the bonds between two bodies cannot have their own damage.
+/// Return an error if the bonds between two bodies cannot have a separate damage law.
 fn pair_damage_is_possible(
     problem: &Problem,
     pair: &InterfacePair,
@@ -121,9 +121,13 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
     Ok(())
 }
 
-/// Return an error if three conditions are met: the material has thermal expansion, its law has no
-/// potential (as with plasticity or softening), and the strain perpendicular to the setting is 0. The
-/// inelastic strain then depends on the stress in that direction, which the law does not know.
+/// Return an error if three conditions are met:
+///
+/// - the material has thermal expansion;
+/// - its law has no potential (as with plasticity or softening);
+/// - the strain perpendicular to the plane or bar is 0.
+///
+/// The inelastic strain then depends on the stress in this direction, which the law does not compute.
 fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let (material, dimension) = (&body.material, problem.dimension);
     let law = &material.law;

@@ -7,7 +7,7 @@ use super::Forces;
 use super::grid_points::{GridValues, OwnedPlaces};
 use super::list_points::{self, Node};
 
-/// Bond inputs of a range of owned points. The ranges of different threads are disjoint.
+/// Bond inputs of a range of owned points. Different threads hold disjoint ranges.
 pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
     /// List nodes of these points; empty if there is no list.
@@ -32,7 +32,8 @@ impl<const D: usize> BondInputs<'_, D> {
         }
     }
 
-    /// Write the displacements (m) of all these points, and their thermal stretches if there are any.
+    /// Write the displacements (m) of all these points, and their thermal stretches if the run has
+    /// temperatures.
     ///
     /// # Panics
     /// If the number of values differs from the number of points.
@@ -46,7 +47,7 @@ impl<const D: usize> BondInputs<'_, D> {
         assert!(columns.all(|column| column.len() == count));
         list_points::update(self.nodes, displacement, thermal_stretch);
         for places in self.places {
-            // SAFETY: no other value has access to these points.
+            // SAFETY: the ranges of different values are disjoint, so no other thread writes these points.
             unsafe { places.take(self.points.start, displacement, thermal_stretch) };
         }
     }

@@ -1,8 +1,8 @@
 //! Consequences of broken bonds.
 //!
-//! A bond breaks in the pass that sums the forces, by the force states of both ends. These sums exclude it.
-//! Afterwards, point numbers that follow from sums over bonds, and the forces that depend on them, are
-//! recomputed. This is done only at the points that a broken bond affects.
+//! A bond breaks in the pass that sums the forces, by the force states of both ends. The force sums exclude
+//! the bonds that break. Point numbers that follow from sums over bonds, and the forces that depend on them,
+//! are then recomputed. This is done only at the points that a broken bond affects.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -17,7 +17,7 @@ use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
 use super::{Forces, Pass};
 
-/// Ranges of points with gaps up to this number of points are merged.
+/// Ranges of points are merged if at most this number of points lies between them.
 const GAP: usize = 64;
 
 /// Changes at a point that broken bonds cause in a force evaluation.
@@ -27,17 +27,17 @@ pub struct Broken<const D: usize> {
     pub point: usize,
     /// Number of its bonds that broke.
     pub count: u64,
-    /// Energy that the point loses, J: its part of the energy of these bonds, and the change of its other
-    /// energy without them.
+    /// Energy that the point loses, J: its part of the energy of these bonds, and the change of its remaining
+    /// energy.
     pub energy: f64,
-    /// Its part of the energy of these bonds above their criterion when they broke, J.
+    /// The point's part of the energy of these bonds above their criterion when they broke, J.
     pub overshoot: f64,
     /// Force density that these bonds no longer exert on the point, N/m³.
     pub force: [f64; D],
 }
 
 impl<const D: usize> Broken<D> {
-    /// Convert the sums over the breaking bonds of a point.
+    /// Create the entry of a point from its sums over the breaking bonds.
     pub(super) fn new(broken_sums: &BrokenSums) -> Self {
         let [count, energy, overshoot, force @ ..] = broken_sums.sums;
         Self {
@@ -67,8 +67,8 @@ impl<const D: usize> Forces<D> {
         &self.broken
     }
 
-    /// After the force sums: merge the changes by broken bonds per point, and recompute what depends on
-    /// these bonds. Collective.
+    /// Merge the changes by broken bonds per point, and recompute the point numbers and forces that depend on
+    /// these bonds. Called after the force sums. Collective.
     pub(super) fn settle(
         &mut self,
         comm: &dyn Communicator,
@@ -111,8 +111,8 @@ impl<const D: usize> Forces<D> {
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Recompute the point numbers of some points. Book the energy that the points lose by this change, except
-    /// the part that plastic flow dissipates.
+    /// Recompute the point numbers of some points. Record the energy that the points lose by this change,
+    /// except the part that plastic flow dissipates.
     fn find_numbers(
         &mut self,
         points: Range<usize>,
@@ -141,7 +141,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Energy density that some points store, plus the density that plastic flow has dissipated, J/m³.
+    /// Sum of the stored energy density and the density that plastic flow has dissipated, J/m³, at some
+    /// points.
     fn held(
         &mut self,
         model: &Model<D>,
@@ -195,7 +196,7 @@ impl<const D: usize> Forces<D> {
         changed
     }
 
-    /// Recompute the forces on some points, and record the force densities that they lose.
+    /// Recompute the forces on some points, and record the changes of their force densities as lost forces.
     fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
         let before = force
             .each_ref()

@@ -21,11 +21,11 @@ use super::point_sums::{PassSum, SmallestStretch};
 use super::sweep::{PointData, sweep};
 use super::{Forces, Pass};
 
-/// Points handled by one task.
+/// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Interior points per thread between two calls that advance the messages; a few tenths of a millisecond of
-/// work in 3-D.
+/// Number of interior points per thread between two calls that advance the messages. In 3-D, these points
+/// take a few tenths of a millisecond.
 const PIECE: usize = 4096;
 
 /// Maximum number of columns of [`Forces::changing_columns`].
@@ -37,7 +37,7 @@ type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
 /// Point data that a pass receives from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HaloContent {
-    /// Displacements, and thermal stretches if there are any.
+    /// Displacements, and thermal stretches if the run has temperatures.
     Motion,
     Thresholds,
     PointNumbers,
@@ -66,7 +66,8 @@ impl ForceTimes {
 pub struct Acting<'a, const D: usize> {
     /// Displacements of the local points, m; the evaluation updates those of ghosts.
     pub displacement: &'a mut [Vec<f64>; D],
-    /// Thermal stretches of the local points, if there are any; the evaluation updates those of ghosts.
+    /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates
+    /// those of ghosts.
     pub thermal_stretch: Option<&'a mut [f64]>,
     /// Internal force density of the owned points, N/m³. It must be 0 on entry, because bond forces are
     /// added to it.
@@ -77,8 +78,8 @@ pub struct Acting<'a, const D: usize> {
 
 impl<const D: usize> Forces<D> {
     /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
-    /// written the owned points. `bond_update` selects what else changes. [`Self::broken`] gives the
-    /// changes by bonds that break. Collective.
+    /// written the data of the owned points. `bond_update` selects which bond states change. Afterwards,
+    /// [`Self::broken`] returns the changes by bonds that broke. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -181,8 +182,8 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// Return the columns over the local points that a halo content consists of, and their number. These
-    /// columns are sent and received.
+    /// Return the columns over the local points that a halo exchange sends and receives for this content, and
+    /// the number of these columns.
     fn halo_columns<'a>(
         &'a mut self,
         content: HaloContent,
@@ -207,8 +208,8 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// What ghosts receive in each force evaluation, in order, and in how many columns. If bonds break, the
-    /// point numbers are sent a second time.
+    /// Return the content of each message to ghosts in a force evaluation, with its number of columns. If bonds
+    /// break, the point numbers are sent a second time.
     pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
         let mut thermal_stretch = Vec::new();
         let mut sizes = Vec::new();
@@ -229,7 +230,7 @@ impl<const D: usize> Forces<D> {
         sizes
     }
 
-    /// Point data that a pass receives from other ranks.
+    /// Return the point data that pass `turn` receives from other ranks.
     fn content(&self, turn: usize) -> HaloContent {
         match (
             turn.checked_sub(1).map(|before| self.passes[before]),
@@ -259,8 +260,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Copy received displacements and thermal stretches of ghosts to the arrays that bonds read. Those of
-    /// owned points are already there.
+    /// Copy received displacements and thermal stretches of ghosts to the arrays that bonds read.
+    /// `BondInputs` has already written those of owned points.
     fn update_moved_ghosts(
         &mut self,
         model: &Model<D>,
@@ -348,7 +349,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Compute point values of some points from the sums of a pass.
+    /// Compute the thresholds or point numbers of some points from the sums of a pass.
     pub(super) fn finish(
         &mut self,
         pass: Pass,
@@ -392,7 +393,7 @@ impl<const D: usize> Forces<D> {
     }
 }
 
-/// Run the kernel of a pass, if the law has that many passes.
+/// Run the kernel of a point sum over the bonds, if the law has a point sum with this index.
 fn sum_pass<L: Law<D>, const D: usize>(
     number: usize,
     bonds: &mut BlockBonds,
@@ -406,7 +407,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
         return;
     }
     let results = L::Sum::columns_mut(sums);
-    // No law has more passes. Loops are compiled only for the passes that a law has.
+    // No law has more point sums. Loops are compiled only for the point sums that a law has.
     match number {
         0 if const { L::PASSES > 0 } => {
             let kernel = PassSum::<L, 0> { law, bond_update };

@@ -50,14 +50,14 @@ pub struct Force<L> {
     pub laws: [L; 2],
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Bond weights are values of the influence function, not volume fractions.
+    /// Whether bond weights are values of the influence function instead of volume fractions.
     pub influence: bool,
     /// Changes of the bond state.
     pub bond_update: BondUpdate,
 }
 
 impl<L> Force<L> {
-    /// Return the weighted sum of the force states of both ends.
+    /// Return the weighted sum of the force states of both ends of each bond.
     #[inline(always)]
     fn weighted<S: Simd, const D: usize>(
         &self,

@@ -1,5 +1,4 @@
-//! Data that kernels read of the local points of a grid, ordered by slot: eight adjacent points are loaded
-//! at once.
+//! Point data of a grid that kernels read, ordered by slot so that eight adjacent points are loaded at once.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -27,8 +26,8 @@ pub struct GridValues<const D: usize> {
 }
 
 impl<const D: usize> GridValues<D> {
-    /// Create the values of a grid at rest. Bonds read `numbers` point numbers, the limits in `limits`,
-    /// and thermal stretches if `is_thermal`.
+    /// Create the values of a grid without displacements. Bonds read `numbers` point numbers, the limits in
+    /// `limits`, and thermal stretches if `is_thermal`.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();
         let of_temperature = if is_thermal { count } else { 0 };
@@ -48,7 +47,7 @@ impl<const D: usize> GridValues<D> {
         Arc::ptr_eq(&self.grid, grid)
     }
 
-    /// Copy the displacements of the ghosts, and their thermal stretches if there are any.
+    /// Copy the displacements of the ghosts, and their thermal stretches if the run has temperatures.
     pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D], thermal_stretch: Option<&[f64]>) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
             self.grid.update(Which::Ghosts, values, places);
@@ -70,7 +69,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the point numbers of some of the local points, starting with column `first`.
+    /// Copy the point numbers of some of the local points, from column `first` on.
     pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);
@@ -116,12 +115,12 @@ pub struct OwnedPlaces<'a, const D: usize> {
 
 // SAFETY: threads write to its columns only under the conditions of `take`.
 unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
-// SAFETY: as above.
+// SAFETY: threads write to its columns only under the conditions of `take`.
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {
-    /// Copy the displacements of owned points from a local index on, and their thermal stretches if there
-    /// are any.
+    /// Copy the displacements of consecutive owned points, of which `first` is the first local index. Copy
+    /// their thermal stretches if the run has temperatures.
     ///
     /// # Safety
     /// No other thread may write any of these points at the same time.
@@ -156,7 +155,7 @@ impl<const D: usize> OwnedPlaces<'_, D> {
 /// The points of a grid in the form that a kernel reads.
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
-    /// Thermal stretches of the points, if they must be removed from the bonds.
+    /// Thermal stretches of the points; `None` if the kernel does not remove them from the bonds.
     thermal_stretch: Option<&'a [f64]>,
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
@@ -220,7 +219,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         K::Point::load(&self.numbers, |column| unsafe { eight(column, place) })
     }
 
-    /// Whether thermal stretches must be removed from the bonds.
+    /// Whether the kernel removes thermal stretches from the bonds.
     #[inline(always)]
     pub fn is_thermal(&self) -> bool {
         self.thermal_stretch.is_some()
@@ -242,7 +241,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     #[inline(always)]
     unsafe fn far_numbers(&self, place: usize) -> K::Point {
         if K::READS_FAR {
-            // SAFETY: passed on to the caller.
+            // SAFETY: the caller guarantees the condition of `numbers`.
             unsafe { self.numbers(place) }
         } else {
             K::Point::splat(0.0)
@@ -320,7 +319,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         let xi = LaneTuple::each(|d| Lanes::splat(offset.reference[d]));
         let mut force_volume = self.volumes[1];
         if !FAST_PATH && self.is_thermal() {
-            // SAFETY: as above.
+            // SAFETY: `far` and the seven following slots are in the grid, see above.
             let stretch_j = unsafe { self.thermal_stretch(vector.far(offset)) };
             let stretches = [here.thermal_stretch, stretch_j];
             let elastic: Elastic<D> = simd.aside(SeparateThermal { xi, eta, stretches });

@@ -13,7 +13,7 @@ pub struct Interaction {
     pub laws: PairLaw,
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Bond weights are values of the influence function, not volume fractions.
+    /// Whether bond weights are values of the influence function instead of volume fractions.
     pub influence: bool,
 }
 
@@ -26,11 +26,11 @@ pub struct BlockLaws {
     pub damage: Option<DamageLaw>,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// Data that bonds to other bodies read, for pairs of bodies with their own damage law.
+    /// Data that criteria read of these points, for bonds between bodies that have a separate damage law.
     pub pairs: PairReads,
 }
 
-/// Data that the failure criteria of bonds between two bodies with their own damage law read.
+/// Data that the failure criteria read for bonds between two bodies that have a separate damage law.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.
@@ -42,7 +42,7 @@ pub struct PairReads {
 }
 
 impl PairReads {
-    /// Add the data that a damage law reads.
+    /// Add the data that a damage law reads to the requested data.
     pub fn add(&mut self, law: &DamageLaw) {
         self.breaks = true;
         self.truncation_factors |= law.family_correction() > 0.0;
@@ -56,7 +56,7 @@ impl BlockLaws {
         self.damage.is_some() || self.pairs.breaks
     }
 
-    /// Whether each point has its own threshold.
+    /// Whether thresholds differ between points and are stored per point.
     pub fn has_thresholds(&self) -> bool {
         self.weibull.is_some() || self.follows_smallest_stretch()
     }

@@ -50,7 +50,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         [self.own, &self.far]
     }
 
-    /// A bit for each intact bond within the horizon of point i.
+    /// Bits of the intact bonds within the horizon of point i.
     #[inline(always)]
     pub fn family(&self) -> u8 {
         match self.weights {
@@ -59,7 +59,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         }
     }
 
-    /// Multiply by V_j and the weight of point i.
+    /// Multiply a quantity of each bond by V_j and the weight of point i.
     #[inline(always)]
     pub fn weighted_by_volume(&self, share: Lanes) -> Lanes {
         let share = share * self.volume;
@@ -84,42 +84,41 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Sums, eight lanes per quantity. Each quantity is added to one column of the points.
     type Sums: LaneTuple;
 
-    /// Sums over the bonds that break in this sweep, eight lanes per quantity. They are returned per point, only for points
-    /// with such bonds.
+    /// Sums over the bonds that break in this sweep, eight lanes per quantity. They are returned only for
+    /// points with such bonds.
     type Broken: LaneTuple;
 
-    /// Point numbers of points i and j that it reads.
+    /// Point numbers of points i and j that the kernel reads.
     type Point: LaneTuple;
 
-    /// Bond history that it reads.
+    /// Bond history that the kernel reads.
     type BondHistory: LaneTuple;
 
-    /// Rotations of points i and j, if its criterion can read them.
+    /// Rotations of points i and j, if the kernel's criterion can read them.
     type Rotation: LaneTuple;
 
-    /// Implemented in `D` dimensions; otherwise no loops are compiled.
+    /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
 
-    /// Reduction of the lanes of its sums.
+    /// Reduction of the lanes of the kernel's sums.
     const COMBINE: Combine = Combine::Add;
 
-    /// Instruction sets for which its loops are compiled. One is enough for output kernels.
+    /// Instruction sets for which the kernel's loops are compiled. One is enough for output kernels.
     const ISA_SET: IsaSet = IsaSet::One;
 
-    /// Compile a second loop for vectors whose bonds all stay within the series limit.
+    /// Whether to compile a second loop for vectors whose bonds all stay within the series limit.
     const HAS_FAST_PATH: bool = false;
 
-    /// Load the bits of all bonds, broken ones included.
+    /// Whether to load the bits of all bonds, broken ones included.
     const READS_BROKEN: bool = false;
 
-    /// Load the point numbers of points j; otherwise they are 0.
+    /// Whether to load the point numbers of points j; otherwise they are 0.
     const READS_FAR: bool = true;
 
     /// Quantities of the deformed bonds to compute.
     const WANTED: Wanted;
 
-    /// The law is known only at run time, so the kernel does not know at compile time whether bonds are
-    /// linear.
+    /// Whether the law is known only at run time. The compiler then does not know whether bonds are linear.
     const ANY_LAW: bool = false;
 
     /// Whether the bonds have a linear law, see [`Bond`].
@@ -175,8 +174,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::Sums::splat(0.0)
     }
 
-    /// Add eight bonds, except those that break, and clear the intact bits of the breaking bonds. May
-    /// change the bond history.
+    /// Add eight bonds to the sums, except the bonds that break. Clear the intact bits of the breaking bonds.
+    /// May change the bond history.
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
 
     /// Whether bonds within the series limit can neither break nor change their history. [`Self::add_fast`]
@@ -186,15 +185,16 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         true
     }
 
-    /// Add eight bonds that are all within the series limit. Called only if [`Self::may_skip_criterion`].
+    /// Add eight bonds that are all within the series limit. Called only if [`Self::may_skip_criterion`] is
+    /// true.
     #[inline(always)]
     fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
         self.add(simd, group, sums);
     }
 
-    /// Clear the intact bits of breaking bonds and add these bonds to `broken`. A second loop over the
-    /// bonds of a point or vector calls it if [`Self::add`] broke a bond. It is out of line to save
-    /// registers. [`Self::add`] works on a copy of the intact bits.
+    /// Clear the intact bits of breaking bonds and add these bonds to `broken`. If [`Self::add`], which works
+    /// on a copy of the intact bits, broke a bond, a second loop over the bonds calls this function. The
+    /// second loop is out of line to save registers.
     fn add_broken<S: Simd>(
         &self,
         _simd: S,

@@ -6,7 +6,7 @@ use crate::material::rotation::IDENTITY;
 
 use super::interaction::BlockLaws;
 
-/// Which of the [`Limits`] the criteria of a run read; the same on all ranks.
+/// Selection of the [`Limits`] that the criteria of a run read; the same on all ranks.
 #[derive(Debug, Clone, Copy)]
 pub struct LimitsRead {
     /// Whether thresholds are read.
@@ -39,15 +39,15 @@ impl LimitsRead {
 pub struct LimitColumns {
     /// Failure thresholds, indexed by local point (lists) or grid slot (lattices).
     pub thresholds: Column,
-    /// Truncation factors, with the same index.
+    /// Truncation factors, indexed like the thresholds.
     pub truncation_factors: Column,
     /// Rotations by component; in 2-D only q_z and q₀ are stored.
     pub rotations: [Column; 4],
 }
 
 impl LimitColumns {
-    /// Allocate the columns in `read` for `count` points. `number` is the index of the first of them among
-    /// all columns that a loop reads, see [`Column`].
+    /// Allocate the columns in `read` for `count` points. `number` is the index of the first of these columns
+    /// among all columns that a loop reads, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
@@ -74,12 +74,12 @@ impl LimitColumns {
     }
 }
 
-/// Thresholds and truncation factors in the form that a kernel with a criterion reads.
+/// Thresholds and truncation factors, prepared for a kernel with a certain criterion.
 #[derive(Clone, Copy)]
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    /// Whether any of them is read. Loops of criteria that read none then have a single branch.
+    /// Whether the criterion reads thresholds or truncation factors. Otherwise, one branch skips both.
     any: bool,
 }
 
@@ -108,7 +108,7 @@ impl<'a> ReadLimits<'a> {
         }
     }
 
-    /// Limits of eight points. `take` is called only for columns whose length was checked.
+    /// Load the limits of eight points. `take` is called only for columns whose length was checked.
     #[inline(always)]
     pub fn eight(&self, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();
@@ -124,8 +124,8 @@ impl<'a> ReadLimits<'a> {
     }
 }
 
-/// Rotations in the form that a kernel with a criterion reads. `R` has four components, or none for laws
-/// whose forces act along the bonds.
+/// Rotations, prepared for a kernel with a certain criterion. `R` has four components, or none for laws whose
+/// forces act along the bonds.
 #[derive(Clone, Copy)]
 pub struct ReadRotations<'a, R: LaneTuple> {
     columns: R::Columns<'a>,
@@ -142,8 +142,8 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         columns: &'a LimitColumns,
         reach: usize,
     ) -> Self {
-        // Without rotations (all laws act along the bonds), bonds between two different such laws still
-        // request them.
+        // Rotations are not stored if the forces of all laws act along the bonds. A criterion between two
+        // different such laws still requests rotations.
         let is_stored = !columns.rotations[3].is_empty();
         let is_read = R::COUNT > 0 && criterion.reads_rotations() && is_stored;
         let columns = R::columns(&columns.rotations);
@@ -158,7 +158,7 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         Self { columns, is_read }
     }
 
-    /// Rotations of eight points. `take` is called only for columns whose length was checked.
+    /// Load the rotations of eight points. `take` is called only for columns whose length was checked.
     #[inline(always)]
     pub fn eight<const D: usize>(&self, take: impl Fn(&[f64]) -> Lanes) -> R {
         if !self.is_read {

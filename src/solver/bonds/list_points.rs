@@ -1,5 +1,4 @@
-//! Data that kernels read of the local points of list families: all geometry of a point is in one cache
-//! line.
+//! Point data of list families that kernels read: the geometry of a point fills one cache line.
 
 use crate::damage::Limits;
 use crate::families::{Groups, Row};
@@ -35,7 +34,7 @@ pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
     (0..model.volume.len()).map(node).collect()
 }
 
-/// Copy displacements into the nodes, and thermal stretches if there are any.
+/// Copy displacements into the nodes, and thermal stretches if the run has temperatures.
 pub fn update<const D: usize>(
     nodes: &mut [Node],
     displacement: [&[f64]; D],
@@ -61,7 +60,7 @@ pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     rotations: ReadRotations<'a, K::Rotation>,
     limit: f64,
     is_linear: bool,
-    /// Whether bonds have thermal stretches that must be removed.
+    /// Whether the kernel removes thermal stretches from the bonds.
     is_thermal: bool,
 }
 
@@ -115,7 +114,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// The indices must be below the reach.
+    /// The indices must be below the `reach` of [`Self::new`].
     #[inline(always)]
     unsafe fn numbers(&self, indices: &[u32; 8]) -> K::Point {
         // SAFETY: `new` has checked the length.
@@ -123,11 +122,11 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// The indices must be below the reach.
+    /// The indices must be below the `reach` of [`Self::new`].
     #[inline(always)]
     unsafe fn far_numbers(&self, indices: &[u32; 8]) -> K::Point {
         if K::READS_FAR {
-            // SAFETY: passed on to the caller.
+            // SAFETY: the caller guarantees the condition of `numbers`.
             unsafe { self.numbers(indices) }
         } else {
             K::Point::splat(0.0)
@@ -135,7 +134,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// The indices must be below the reach.
+    /// The indices must be below the `reach` of [`Self::new`].
     #[inline(always)]
     unsafe fn limits(&self, indices: &[u32; 8]) -> Limits {
         // SAFETY: `ReadLimits::new` has checked the lengths.
@@ -143,7 +142,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// The indices must be below the reach.
+    /// The indices must be below the `reach` of [`Self::new`].
     #[inline(always)]
     unsafe fn rotations(&self, indices: &[u32; 8]) -> K::Rotation {
         // SAFETY: `ReadRotations::new` has checked the lengths.
@@ -153,7 +152,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// Load point i.
     ///
     /// # Safety
-    /// The point must be below the reach.
+    /// The local index of the point must be below the `reach` of [`Self::new`].
     #[inline(always)]
     pub unsafe fn load_point_i(&self, point: usize) -> PointI<K::Point, K::Rotation, D> {
         debug_assert!(point < self.nodes.len());
@@ -204,7 +203,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         for component in &xi[1..] {
             square = simd.multiply_add(*component, *component, square);
         }
-        // Compute 1/|ξ|² first: x needs only the quotient, so the root is not on its dependency chain.
+        // Compute 1/|ξ|² first: x needs only this quotient, so x does not wait for the square root.
         let inverse_square = Lanes::splat(1.0) / square;
         let inverse = inverse_square.sqrt();
         let reference = Reference {

@@ -22,8 +22,8 @@ pub struct Stored {
     pub energy: Vec<f64>,
     /// Volume of the intact neighbours within the horizon of the point, m³.
     pub volume: Vec<f64>,
-    /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³; empty if no law softens or
-    /// if it was not requested.
+    /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³. Empty if no law softens, or
+    /// if this sum was not requested.
     pub softened: Vec<f64>,
     /// Number of intact bonds, including those beyond the point's own horizon.
     pub neighbours: Vec<f64>,
@@ -82,7 +82,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Same as [`Self::stored`] without the energies, which need most of the time.
+    /// Same as [`Self::stored`] without the energies, whose computation takes most of the time.
     pub fn intact_families(&mut self, model: &Model<D>) -> Stored {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
             sweep_all(
@@ -211,8 +211,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// Flag singular owned points with 1, others with 0. A point is singular if its intact bonds are too
-    /// few for its law, or too stiff.
+    /// Flag singular owned points with 1, others with 0. A point is singular if too few of its bonds are
+    /// intact for its law; the law then gives no force.
     pub fn singular(&self, model: &Model<D>) -> Vec<f64> {
         let flag = |point| f64::from(u8::from(self.is_singular(model, point)));
         (0..model.owned()).map(flag).collect()

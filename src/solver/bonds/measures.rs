@@ -91,8 +91,8 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
-/// Kernel that sums over the intact neighbours within the horizon of point i: V_j times the fraction of its
-/// stiffness that bond ij has lost, m³.
+/// Kernel that sums V_j times the fraction of its stiffness that bond ij has lost, m³. The sum contains the
+/// intact neighbours within the horizon of point i.
 #[derive(Clone, Copy)]
 pub struct Softened {
     /// The law of point i.
@@ -115,7 +115,7 @@ impl<const D: usize> Kernel<D> for Softened {
     }
 }
 
-/// Entries of a symmetric tensor in the order xx, yy, zz, xy, yz, xz.
+/// Index pairs of the entries of a symmetric tensor: xx, yy, zz, xy, yz, xz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 /// Add the tensor entries of the intact bonds to a symmetric tensor.

@@ -55,7 +55,7 @@ pub use measure::Stored;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
 
-/// Number of points whose sums over the undeformed family are in memory at once.
+/// Maximum number of points for which sums over undeformed families are computed at once, to limit memory.
 const FAMILY_SUMS: usize = 1 << 16;
 
 /// A sum over the bonds.
@@ -69,7 +69,7 @@ enum Pass {
     Force,
 }
 
-/// Number of history values per bond and end for the laws of an interaction.
+/// Number of history values that the laws of an interaction store per bond and end.
 fn history_width<const D: usize>(interaction: &Interaction) -> usize {
     let [i, j] = interaction.laws.laws();
     2 * i
@@ -271,11 +271,11 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Call `work` for the bonds of each pair of blocks in turn.
+    /// Call `work` for each pair of blocks with bonds, one after the other.
     fn for_each_interaction(&mut self, mut work: impl FnMut(&mut Interaction, PointData<'_, D>)) {
         let source = PointData {
             nodes: &self.nodes,
-            // Only owned points have the columns after these.
+            // The remaining columns exist only for owned points.
             numbers: &self.numbers.columns[..self.numbers.read],
             limits: &self.limits,
             grids: &self.grids,
@@ -287,12 +287,13 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Number of bonds of the owned points, including broken ones. A bond counts once per end on this rank.
+    /// Number of bonds of the owned points, including broken ones. A bond between two owned points counts
+    /// twice.
     pub fn directed_bonds(&self) -> u64 {
         self.interactions.iter().map(|i| i.bonds.bonds()).sum()
     }
 
-    /// Number of [`Self::directed_bonds`] in lattice families.
+    /// Number of the [`Self::directed_bonds`] that are in lattice families.
     pub fn lattice_bonds(&self) -> u64 {
         let all = self.interactions.iter().map(|i| &i.bonds);
         all.filter(|bonds| matches!(bonds, BlockBonds::Lattice(_)))
@@ -301,7 +302,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Number of bonds of the owned points from each block to each block, including broken ones. A bond
-    /// counts once per end on this rank.
+    /// between two owned points counts twice.
     pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
         let all = self.interactions.iter().map(|i| &i.bonds);
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))
@@ -348,8 +349,8 @@ impl<const D: usize> Forces<D> {
         &self.halo
     }
 
-    /// Break the bonds for which `crosses` (of both local indices) is true. Only bonds of the given points
-    /// (by local index) are checked.
+    /// Break the bonds for which `crosses(i, j)` is true; i and j are local indices. Only bonds of points for
+    /// which `concerned` is true are checked.
     pub fn cut(
         &mut self,
         concerned: impl Fn(usize) -> bool,
@@ -402,8 +403,9 @@ impl<const D: usize> Forces<D> {
         self.halo.update_ghosts(comm, &mut components);
     }
 
-    /// Make bonds unbreakable if they join blocks for which `between` is true and an end has the entry 1.
-    /// The ghosts' entries are exchanged first. `block` gives the blocks of the owned points. Collective.
+    /// Make a bond unbreakable if `between` is true for its two blocks and `protected` is 1 at one of its
+    /// ends. The ghosts' entries of `protected` are exchanged first. `block` gives the blocks of the owned
+    /// points. Collective.
     pub fn protect(
         &mut self,
         comm: &dyn Communicator,

@@ -11,7 +11,7 @@ use crate::solver::model::Model;
 
 use super::interaction::BlockLaws;
 
-/// Points handled by one task.
+/// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
 /// Maximum number of point numbers.
@@ -26,10 +26,10 @@ const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 /// Plastic states of the owned points by column; empty if no law has a plastic state.
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
-/// Point numbers by column: first those that bonds read (of owned points and ghosts), then those that only a
-/// law reads (of owned points).
+/// Point numbers by column. The first columns are those that bonds read, of owned points and ghosts. The
+/// remaining columns, which only laws read, contain owned points.
 pub struct PointNumbers {
-    /// The point numbers by column; columns that a law does not have are 0.
+    /// The point numbers by column; 0 for points whose law does not have that number.
     pub columns: Vec<Column>,
     /// Number of columns that bonds read.
     pub read: usize,
@@ -44,7 +44,8 @@ pub struct PointNumbers {
 }
 
 impl PointNumbers {
-    /// Allocate the point numbers for the laws of the blocks, which are the same on all ranks. All of them are 0.
+    /// Allocate the point numbers for the laws of the blocks, which are the same on all ranks, and set them
+    /// to 0.
     pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);
@@ -66,7 +67,7 @@ impl PointNumbers {
         }
     }
 
-    /// Compute the constants of some owned points from sums over their whole families, by column. Also
+    /// Compute the constants of some owned points from the columns of sums over their whole families. Also
     /// compute their [truncation factors](Law::truncation_factor), unless that column is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
@@ -84,7 +85,8 @@ impl PointNumbers {
             Law::<D>::constants(&law, sums, &mut numbers);
             (numbers, Law::<D>::truncation_factor(&law, sums))
         };
-        // Neighbours on a lattice usually have equal families.
+        // Neighbours on a lattice usually have equal families, so each thread reuses the constants of the
+        // last point.
         let found = points.clone().into_par_iter().with_min_len(CHUNK);
         let found = found.map_init(
             || None,
@@ -121,8 +123,8 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Compute the rotations of some owned points from the sums of the first pass, by component. Components
-    /// with empty columns are skipped.
+    /// Compute the columns of rotations of some owned points from the sums of the first pass. Components with
+    /// empty columns are skipped.
     pub fn find_rotations<const D: usize>(
         &self,
         points: Range<usize>,
@@ -154,8 +156,8 @@ impl PointNumbers {
         });
     }
 
-    /// Compute the point numbers of some owned points from the sums of a pass. `keeps` says whether
-    /// plastic flow is stored.
+    /// Compute the point numbers of some owned points from the sums of a pass. If `keeps`, store plastic flow
+    /// in `plastic`.
     pub fn finish<const D: usize>(
         &mut self,
         pass: usize,
@@ -208,8 +210,8 @@ impl PointNumbers {
     }
 }
 
-/// Split the columns into parts, and call `work` with each part and its points on all threads. Columns may
-/// be empty.
+/// Split the points and their columns recursively, and call `work` with each piece on all threads. Columns
+/// may be empty.
 fn over_points<const N: usize>(
     points: Range<usize>,
     mut columns: [&mut [f64]; N],

@@ -1,4 +1,4 @@
-//! The sums over bonds from which point numbers are computed.
+//! Kernels of the sums over bonds from which point numbers are computed.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
@@ -7,7 +7,7 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Request neither stretches nor forces.
+/// Request the extensions of the bonds, but no other quantities of the deformed bonds.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -21,7 +21,8 @@ const fn extension_only(linear: bool) -> Wanted {
 pub struct PassSum<L, const N: usize> {
     /// The law of point i.
     pub law: L,
-    /// Whether the bond history advances, as in the force sum that follows.
+    /// Bond update of the force sum that follows. If it advances the bond history, this sum reads the
+    /// advanced history.
     pub bond_update: BondUpdate,
 }
 
@@ -68,9 +69,9 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Kernel that sums the data for a point's constants over the undeformed family. The sum contains intact
-/// bonds only, without those that pre-cracks cut. A law with a shape tensor compares the intact family with
-/// the whole family, so for such laws the cut bonds count, too.
+/// Kernel that sums the data for a point's constants over the undeformed family. In general, the sum contains
+/// the intact bonds only, without the bonds that pre-cracks cut. For laws with a shape tensor, the sum
+/// contains the cut bonds, too, because such laws compare the intact family with the whole family.
 #[derive(Clone, Copy)]
 pub struct FamilySum<const D: usize> {
     /// The law of point i.
@@ -117,8 +118,8 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     }
 }
 
-/// Kernel of the smallest stretch s_min of the intact bonds within the horizon of each point, as x of
-/// [`crate::material::bond`]; +∞ if there is none.
+/// Kernel of the smallest stretch s_min of the intact bonds within the horizon of each point. The stretch is
+/// stored as x of [`crate::material::bond`]; +∞ if no such bond exists.
 #[derive(Clone, Copy)]
 pub struct SmallestStretch;
 

@@ -9,7 +9,7 @@ use super::Forces;
 pub struct KeptBonds(Vec<(Vec<u8>, Vec<Lanes>)>);
 
 impl<const D: usize> Forces<D> {
-    /// Bytes of a checkpoint that the bonds of each owned point need.
+    /// Number of bytes in a checkpoint for the bonds of each owned point.
     pub fn saved_lengths(&self, owned: usize) -> Vec<u32> {
         let mut lengths = vec![0; owned];
         for interaction in &self.interactions {
@@ -19,7 +19,7 @@ impl<const D: usize> Forces<D> {
         lengths
     }
 
-    /// Serialize the bonds of all owned points in order.
+    /// Serialize the bonds of all owned points, in the order of the points.
     pub fn saved(&self, lengths: &[u32]) -> Vec<u8> {
         let (mut next, total) = starts(lengths);
         let mut bytes = vec![0; total];

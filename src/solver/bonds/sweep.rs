@@ -18,13 +18,14 @@ use super::kernel::{Combine, Kernel};
 use super::limit_columns::LimitColumns;
 use super::list_points::{ListPoints, Node, store_history};
 
-/// Tasks with fewer groups of eight bonds are not split further.
+/// Tasks with at most this number of groups of eight bonds are not split further.
 const LEAF: usize = 2048;
 
-/// Same as [`LEAF`], for kernels that reuse the sums of one vector for others of the task.
+/// Same as [`LEAF`], for kernels that reuse the sums of a vector for other vectors of the task.
 const UNDEFORMED_LEAF: usize = 128 * LEAF;
 
-/// Cached bit patterns per task. Curved surfaces have many that never recur, so a full cache is cleared.
+/// Maximum number of cached bit patterns per task. Many patterns at curved surfaces never recur, so a full
+/// cache is cleared.
 const CACHE_CAPACITY: usize = 256;
 
 /// Point data that kernels read.
@@ -44,7 +45,7 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// The columns over the points to which a kernel adds its sums.
+/// The columns over the points that a kernel adds its sums to.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// Sums over the bonds of a point that break in a sweep.
@@ -52,7 +53,7 @@ type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::Col
 pub struct BrokenSums {
     /// Local index of the point.
     pub point: usize,
-    /// The sums; missing quantities are 0.
+    /// The sums; 0 for quantities that the kernel does not have.
     pub sums: [f64; MAX_BROKEN_SUMS],
 }
 
@@ -227,7 +228,7 @@ fn split<'a, P: Part, N: LaneTuple + 'a>(
 /// A closure that runs half of a task.
 type Half<'a> = &'a mut (dyn FnMut(&mut Vec<BrokenSums>) + Send);
 
-/// Run both halves, in parallel if a thread is free. It is compiled once for all loops.
+/// Run both halves, in parallel if a thread is free. This function is compiled once for all kernels.
 fn both([first, second]: [Half<'_>; 2]) -> [Vec<BrokenSums>; 2] {
     let mut broken_sums = [Vec::new(), Vec::new()];
     let [of_first, of_second] = &mut broken_sums;
@@ -252,11 +253,11 @@ fn run<P: Part, R: Runner<P>>(
                 // SAFETY: `simd` proves that the CPU has these instructions.
                 unsafe { run_avx512(simd, part, base, results, runner) }
             } else {
-                // SAFETY: as above; AVX-512 has all of AVX2.
+                // SAFETY: `simd` proves that the CPU has these instructions; AVX-512 includes AVX2.
                 unsafe { run_avx2(simd.avx2(), part, base, results, runner) }
             }
         }
-        // SAFETY: as above.
+        // SAFETY: `simd` proves that the CPU has these instructions.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2(simd) => unsafe { run_avx2(simd, part, base, results, runner) },
         #[cfg(not(target_arch = "x86_64"))]
@@ -357,7 +358,7 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
     }
 }
 
-/// Number of vectors that skip the fast path after a failed attempt, because large strains cluster.
+/// Number of vectors that skip the fast path after a failed attempt, because large strains occur in clusters.
 const FAST_PATH_BACKOFF: usize = 7;
 
 /// Choice of the loop for the next vector. Lists have no fast path, because loading points j dominates
@@ -401,7 +402,8 @@ impl FastPathGate {
     }
 }
 
-/// Cache of the sums over the bonds of a vector by their intact bits, for [undeformed](Kernel::is_undeformed) kernels.
+/// Cache of the sums over the bonds of a vector, for [undeformed](Kernel::is_undeformed) kernels. The key is
+/// the intact bits of the vector.
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
 impl<N: LaneTuple> Known<N> {
@@ -414,8 +416,8 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sum over the bonds of a vector; `None` if a bond is beyond the series limit. The arguments are copies,
-/// which stay in registers.
+/// Sum over the bonds of a vector; `None` if a bond is beyond the series limit. The arguments are copied so
+/// that they stay in registers.
 ///
 /// # Safety
 /// The vector must belong to the grid of `points`.
@@ -427,7 +429,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     vector: &mut VectorBonds<'_>,
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
-    // SAFETY: passed on to the caller.
+    // SAFETY: the caller guarantees that the vector belongs to the grid.
     let own = unsafe { points.load_point_i(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
@@ -440,7 +442,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Sums over all bonds of a vector, with the bits of the breaking bonds.
+/// Task that sums over all bonds of a vector and returns the bits of the breaking bonds.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the vector.
@@ -477,7 +479,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
     }
 }
 
-/// Sums over the breaking bonds of a vector; it clears their intact bits.
+/// Task that sums over the breaking bonds of a vector and clears their intact bits.
 struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the vector.
@@ -504,7 +506,7 @@ impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
     }
 }
 
-/// Sums over the breaking bonds of a row; it clears their intact bits.
+/// Task that sums over the breaking bonds of a row and clears their intact bits.
 struct BrokenOfRow<'t, 'r, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the list of the row.

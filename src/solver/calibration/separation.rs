@@ -9,33 +9,34 @@ use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::BondUpdate;
 
-/// Maximum number of bonds of a block; such a block needs some seconds.
+/// Maximum number of bonds of the block that is pulled apart; the computation takes some seconds for this
+/// number.
 const MAX_BONDS: f64 = 1e6;
 
-/// Relative growth of the separation per step. It limits how late bonds break. The overshoot energy is
-/// subtracted.
+/// Relative growth of the separation per step. It limits how far bonds exceed their criterion when they
+/// break. The overshoot energy is subtracted.
 const GROWTH: f64 = 0.01;
 
 /// Ratio of the first separation to the one at which the first bond is expected to break.
 const START: f64 = 0.02;
 
-/// Maximum number of steps; blocks separate in far fewer.
+/// Maximum number of steps; blocks need far fewer steps to separate.
 const MAX_STEPS: u32 = 1500;
 
-/// Relative tolerance of a cutoff that is a multiple of the spacing.
+/// Relative tolerance for a cutoff that is a multiple of the spacing.
 const SLACK: f64 = 1e-9;
 
 /// Steps between checks of the bonds across the plane.
 const CHECK_INTERVAL: u32 = 20;
 
-/// Compute the separation energy per area over the fracture energy. The upper half moves at an angle (rad)
-/// to the normal of the plane.
+/// Compute the separation energy per area, divided by the fracture energy. The upper half moves at an angle
+/// (rad) to the normal of the plane.
 ///
 /// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
 ///
-/// The result is `None` for a body without a fracture energy, for points from a file, for families that are
-/// too large, and for a body that does not separate.
+/// The result is `None` if the body has no fracture energy, has points from a file, or does not separate, and
+/// if its families are too large.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;
@@ -160,7 +161,8 @@ fn is_separated<const D: usize>(
     crossing == 0
 }
 
-/// Energy per area dissipated in the middle column of a given height (m), J/m².
+/// Energy (J/m²) that the points of the middle column have dissipated, per area of the plane. `height` is
+/// that of the column, m.
 fn spent<const D: usize>(simulation: &mut Simulation<'_, D>, middle: &[bool], height: f64) -> f64 {
     let dissipated = simulation.forces.stored(&simulation.model).dissipated;
     let (model, fields) = (&simulation.model, &simulation.fields);

@@ -76,7 +76,7 @@ pub fn are_finite<const D: usize>(
     Ok(())
 }
 
-/// Checks the entries of the deck one after the other.
+/// A check of the conditions and initial values, one entry of the deck after the other.
 struct FiniteCheck<'a, const D: usize> {
     problem: &'a Problem,
     comm: &'a dyn Communicator,
@@ -85,8 +85,8 @@ struct FiniteCheck<'a, const D: usize> {
 }
 
 impl<const D: usize> FiniteCheck<'_, D> {
-    /// Return an error if the thermal stretch of a point of a set is -1 or less: its bonds would have no
-    /// length.
+    /// Return an error if the thermal stretch of a point of a set is -1 or less. The bonds of this point
+    /// would have no length.
     fn look_at_stretches(
         &self,
         key: &str,

@@ -1,23 +1,24 @@
 //! Factors on loads, which an observer may change during a run.
 
-/// An odd number with random bits, 2⁶⁴ over the golden ratio.
+/// An odd number with random bits: 2⁶⁴ divided by the golden ratio.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only the factors of loads are used.
+/// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only factors of
+/// conditions that are loads have an effect.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadFactors {
-    /// Factors from the next step or load step on.
+    /// Factors that an observer has requested; they apply from the next step or load step on.
     requested: Vec<f64>,
-    /// Factors of the present loads.
+    /// Factors of the loads in the current step.
     present: Vec<f64>,
-    /// Factors at the last equilibrium; in explicit stages, the present ones.
+    /// Factors at the last equilibrium; in explicit stages, the factors of the current step.
     at_equilibrium: Vec<f64>,
     /// A hash of all requests since the start or restart of the run.
     requests: u64,
 }
 
 impl LoadFactors {
-    /// Factors of 1.
+    /// Create factors of 1 for this number of conditions.
     pub fn new(conditions: usize) -> Self {
         let ones = vec![1.0; conditions];
         Self {
@@ -43,7 +44,7 @@ impl LoadFactors {
         }
     }
 
-    /// The factors of the present loads.
+    /// The factors of the loads in the current step.
     pub fn present(&self) -> &[f64] {
         &self.present
     }
@@ -53,23 +54,23 @@ impl LoadFactors {
         &self.at_equilibrium
     }
 
-    /// Apply the requested factors in the load step that begins.
+    /// Apply the requested factors at the start of a load step.
     pub fn begin_load_step(&mut self) {
         self.present.copy_from_slice(&self.requested);
     }
 
-    /// Store the present factors as those of an equilibrium, at the end of a load step.
+    /// Record the factors of the current step as those of an equilibrium, at the end of a load step.
     pub fn settle(&mut self) {
         self.at_equilibrium.copy_from_slice(&self.present);
     }
 
-    /// Apply the requested factors at the end of the present explicit step.
+    /// Apply the requested factors at the end of an explicit step.
     pub fn end_step(&mut self) {
         self.begin_load_step();
         self.settle();
     }
 
-    /// Restore the factors of the present loads before a step that is rolled back.
+    /// Restore the factors that applied before a step that is rolled back.
     pub fn undo(&mut self, present: &[f64]) {
         self.present.copy_from_slice(present);
         self.settle();
@@ -80,7 +81,7 @@ impl LoadFactors {
         (self.requests >> 12) as f64
     }
 
-    /// Encode all factors for a checkpoint; empty if all are 1.
+    /// Encode all factors for a checkpoint. The result is empty if all factors are 1.
     pub fn words(&self) -> Vec<u64> {
         let all = [&self.requested, &self.present, &self.at_equilibrium];
         if all.iter().copied().flatten().all(|factor| *factor == 1.0) {
@@ -90,12 +91,12 @@ impl LoadFactors {
         all.map(|factor| factor.to_bits()).collect()
     }
 
-    /// Number of words unless all factors are 1.
+    /// Number of [`Self::words`] if not all factors are 1.
     pub fn word_count(&self) -> usize {
         3 * self.requested.len()
     }
 
-    /// Decode the words of [`Self::words`] for the present number of conditions.
+    /// Decode the factors of this number of conditions from [`Self::words`].
     pub fn of_words(words: &[u64], conditions: usize) -> Self {
         if words.is_empty() {
             return Self::new(conditions);

@@ -10,33 +10,34 @@ use super::values::{At, Values};
 pub struct Load<const D: usize> {
     values: [Values; D],
     factors: [f64; D],
-    /// Index of its condition.
+    /// Index of the load's condition.
     condition: usize,
     /// Factor that an observer has set.
     scale: f64,
     now: [At; D],
-    /// Whether it must be computed: it changes with time, or all loads are requested.
+    /// Whether the force density must be computed: it has changed, or the caller has requested all loads.
     pub is_due: bool,
 }
 
-/// The points of a part on which a load acts.
+/// The points of a [`Part`] on which a load acts.
 pub struct Loaded<const D: usize> {
     /// Index of the load.
     load: usize,
     /// Indices of the points in the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
-    /// Fraction of each point on which the load acts; 1 for all points if there are none.
+    /// Fraction of each point on which the load acts; `None` if the fraction is 1 for all points.
     shares: Option<Vec<f64>>,
-    /// Present force density, N/m³.
+    /// Force density in the current step, N/m³.
     force: Vec<[f64; D]>,
-    /// Force density (N/m³) and position (m) before the step.
+    /// Force density (N/m³) and displacement (m) before the step.
     before: Vec<[f64; D]>,
     moved_from: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Load<D> {
-    /// Create the load of the condition with this index. Each component is its expression times its factor, N/m³.
+    /// Create the load of the condition with this index. Each component of the force density (N/m³) is its
+    /// expression times its factor.
     pub fn new(condition: usize, values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
@@ -49,7 +50,8 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Prepare the load for a time (s), with factors by condition. With `all`, it is due even if it has not changed.
+    /// Prepare the load for a time (s). `factors` has a factor per condition. With `all`, the force density
+    /// is computed even if it has not changed.
     pub fn set_time(&mut self, time: f64, factors: &[f64], all: bool) {
         let scale = factors[self.condition];
         let is_rescaled = scale != self.scale;
@@ -60,7 +62,7 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Force density (N/m³) on a whole point at a position (m).
+    /// Force density (N/m³) on a point at a position (m), if the load acts on the whole point.
     fn on(&self, position: [f64; 3]) -> [f64; D] {
         std::array::from_fn(|d| {
             self.scale * (self.factors[d] * self.values[d].of(&self.now[d], position))
@@ -69,7 +71,7 @@ impl<const D: usize> Load<D> {
 }
 
 impl<const D: usize> Loaded<D> {
-    /// Create the entry for the load with this index and the points with these indices in the part.
+    /// Create the entry for the load with index `load` and the points with these indices in the part.
     pub fn new(
         load: usize,
         points: Vec<u16>,
@@ -88,7 +90,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Compute the force densities, if they are due.
+    /// Compute the force densities if the load is due.
     pub fn find(&mut self, loads: &[Load<D>]) {
         let load = &loads[self.load];
         if !load.is_due {
@@ -101,7 +103,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Set the external forces of these points to 0.
+    /// Set the external forces of the loaded points to 0.
     pub fn clear(&self, part: &mut Part<'_, D>) {
         for component in part.external_force.iter_mut().flatten() {
             for point in &self.points {
@@ -110,7 +112,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the load to the external forces.
+    /// Add the load to the external forces of the loaded points.
     pub fn add(&self, part: &mut Part<'_, D>) {
         let components = part.external_force.iter_mut().flatten();
         for (d, component) in components.enumerate() {
@@ -120,7 +122,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Store force density and position for the work of the next step. `displacement` (m) is that of the
+    /// Store force density and displacement for the work of the next step. `displacement` (m) is that of all
     /// points of the part.
     pub fn remember(&mut self, displacement: [&[f64]; D]) {
         self.before.copy_from_slice(&self.force);
@@ -129,7 +131,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the work (J) of the load.
+    /// Add the work of the load in this step (J) to that of each point.
     pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {
             return;

@@ -1,4 +1,4 @@
-//! Loads, supports, temperatures and initial values on this rank's points.
+//! Loads, supports and temperatures on this rank's points.
 
 mod finite;
 mod initial;
@@ -26,17 +26,17 @@ use loads::{Load, Loaded};
 use supports::{Motion, Support, Supported};
 use temperatures::{Heated, Temperatures};
 
-/// Loads and supports, and the points of this rank on which they act.
+/// Loads, supports and temperatures, and the points of this rank on which they act.
 #[derive(Default)]
 pub struct Conditions<const D: usize> {
     loads: Vec<Load<D>>,
     supports: Vec<Support>,
     temperatures: Temperatures,
-    /// Loads and supports on each part of the points.
+    /// The points on which conditions act, by [`Part`].
     on_parts: Vec<OnPart<D>>,
 }
 
-/// Points of a part on which loads and supports act, in the order of the deck.
+/// Points of a [`Part`] on which conditions act, in the order of the deck.
 #[derive(Default)]
 pub struct OnPart<const D: usize> {
     loads: Vec<Loaded<D>>,
@@ -47,7 +47,8 @@ pub struct OnPart<const D: usize> {
 /// Work of loads and supports from a stored state 0 to the present state.
 ///
 /// f is the force density of a load or a reaction, and V is the volume of a point. A load step in which bonds
-/// break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work is ½ (f₀ + f₁)·(u₁ − u₀) V.
+/// break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work is
+/// ½ (f₀ + f₁)·(u₁ − u₀) V.
 /// From 1 to 2, supports do not move, and the force density of loads remains f₁. Only u₀ is stored, so the
 /// work of loads is computed as
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
@@ -55,19 +56,20 @@ pub struct OnPart<const D: usize> {
 pub enum Work {
     /// ½ (f₀ + f)·(u − u₀) V.
     Trapezoid,
-    /// At the first of several equilibria: for supports, ½ (f₀ + f₁)·(u₁ − u₀) V; for loads, the first term.
+    /// At the first of several equilibria: for supports, ½ (f₀ + f₁)·(u₁ − u₀) V; for loads, ½ (f₀ − f₁)·(u₁
+    /// − u₀) V.
     FirstEquilibrium,
-    /// At the last of several equilibria: for loads, the second term; for supports, nothing.
+    /// At the last of several equilibria: for supports, 0; for loads, f₁·(u₂ − u₀) V.
     LastEquilibrium,
 }
 
-/// Loads and supports on one part of the points.
+/// The conditions that act on a [`Part`] of the points.
 pub struct Here<'a, const D: usize> {
     all: All<'a, D>,
     on: &'a mut OnPart<D>,
 }
 
-/// Loads and supports that all parts share.
+/// The conditions of the stage, which all parts share.
 #[derive(Clone, Copy)]
 pub struct All<'a, const D: usize> {
     loads: &'a [Load<D>],
@@ -75,7 +77,7 @@ pub struct All<'a, const D: usize> {
     temperatures: &'a Temperatures,
 }
 
-/// Local indices of the owned points of a set, which is given by its index.
+/// Return the local indices of the owned points of the set with this index.
 pub fn members<const D: usize>(problem: &Problem, model: &Model<D>, set: usize) -> Vec<u32> {
     let chosen = |point: usize| {
         let body = problem.body_of(usize::from(model.block[point]));
@@ -88,8 +90,9 @@ pub fn members<const D: usize>(problem: &Problem, model: &Model<D>, set: usize) 
         .collect()
 }
 
-/// Local indices of the owned points on which a load on a set acts. Also the fraction of each point, if it
-/// can be below 1. With the fractions, the sum of the load does not change when the grid is refined.
+/// Return the local indices of the owned points on which a load on a set acts. Also return the fraction of
+/// each point inside the set, if it can be below 1. With these fractions, refinement does not change the
+/// total load.
 fn loaded<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -100,7 +103,7 @@ fn loaded<const D: usize>(
         return (members(problem, model, set), None);
     }
     let mut shares = SetFractions::new(grids);
-    // Sets of a load are never given by ids here, see `is_possible`.
+    // Sets of loads in runs with refinement never contain ids, so the id 0 is not used; see `is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
         set::contains(&problem.sets[set], problem.horizon, 0, position, body)
     };
@@ -113,7 +116,7 @@ fn loaded<const D: usize>(
     (points, Some(shares))
 }
 
-/// Local indices of the owned points that the result contains; `None` for all points. Collective.
+/// Return the local indices of the owned points that the result contains; `None` for all points. Collective.
 ///
 /// # Errors
 /// If the set of the result is empty; the error is the same on all ranks.
@@ -132,7 +135,7 @@ pub fn output_members<const D: usize>(
     Ok(Some(points))
 }
 
-/// Return an input error if a set of a condition has no points on any rank.
+/// Return an input error if the set of a condition or output has no points on any rank.
 pub fn not_empty(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -151,8 +154,8 @@ pub fn not_empty(
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Find the points of every condition that is `acting`. If two supports prescribe the same component of
-    /// a point, the later one applies.
+    /// Find the points of the conditions for which `acting` is true. If two supports prescribe the same
+    /// component of a point, the later support applies.
     ///
     /// # Errors
     /// If a set is empty; the error is the same on all ranks.
@@ -229,7 +232,8 @@ impl<const D: usize> Conditions<D> {
         Ok(conditions)
     }
 
-    /// Add a load on some of the owned points, in ascending order, with their fractions if there are any.
+    /// Add a load on some of the owned points, in ascending order. `shares` are the fractions of the points
+    /// on which the load acts; `None` if all are 1.
     fn add_load(
         &mut self,
         model: &Model<D>,
@@ -248,16 +252,16 @@ impl<const D: usize> Conditions<D> {
         self.loads.push(load);
     }
 
-    /// Prepare the positions of supported points at `time` (s). `step` is the last step (s), 0 at the
-    /// start.
+    /// Prepare the positions of supported points at `time` (s). `step` is the length of the last step (s), 0
+    /// at the start.
     pub fn set_places(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
             support.set_place(time, step);
         }
     }
 
-    /// Prepare the external forces at `time` (s), with `factors` by condition. Forces that have not changed are due only
-    /// with `all`.
+    /// Prepare the loads at `time` (s), with `factors` by condition. With `all`, also loads that have not
+    /// changed are applied again.
     pub fn set_loads(&mut self, time: f64, factors: &[f64], all: bool) {
         for load in &mut self.loads {
             load.set_time(time, factors, all);
@@ -276,12 +280,12 @@ impl<const D: usize> Conditions<D> {
         self.temperatures.set_time(time);
     }
 
-    /// Make the next [`Here::apply_temperatures`] set all temperatures.
+    /// Make the next [`Self::set_temperatures`] and [`Here::apply_temperatures`] set all temperatures.
     pub fn reset_temperatures(&mut self) {
         self.temperatures.reset();
     }
 
-    /// Split into the data that all parts share, and the data of each part.
+    /// Split into the conditions, and the points on which they act in each part.
     pub fn by_part(&mut self) -> (All<'_, D>, &mut [OnPart<D>]) {
         let all = All {
             loads: &self.loads,
@@ -291,8 +295,8 @@ impl<const D: usize> Conditions<D> {
         (all, &mut self.on_parts)
     }
 
-    /// A column per component over `local` points: 0 at owned points whose component a support prescribes,
-    /// otherwise 1.
+    /// Return a column per component over `local` points. Entries are 0 at owned points whose component a
+    /// support prescribes, otherwise 1.
     pub fn free_components(&self, local: usize) -> [Vec<f64>; D] {
         let mut free = std::array::from_fn(|_| vec![1.0; local]);
         for (number, part) in self.on_parts.iter().enumerate() {
@@ -324,9 +328,9 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) without work in
-    /// the trapezoidal rule. It has two parts: loads that act for one step on points at rest, and supported
-    /// components with prescribed velocity and acceleration.
+    /// Sum the kinetic energy (J) that a step (s) can add without work in the trapezoidal rule. It has two
+    /// parts: loads that act for one step on points at rest, and supported components with prescribed
+    /// velocity and acceleration.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density f of a point
     /// jumps, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without bound
@@ -361,7 +365,7 @@ fn part_of(point: u32) -> usize {
     point as usize / PART
 }
 
-/// Indices of owned points in their part, and their positions (m).
+/// Return the indices of owned points in their part, and their positions (m).
 fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16>, Vec<[f64; 3]>) {
     let each = points.iter().map(|point| *point as usize);
     each.map(|point| ((point % PART) as u16, model.position(point)))
@@ -369,7 +373,7 @@ fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16
 }
 
 impl<'a, const D: usize> Here<'a, D> {
-    /// Combine the shared data with the data of one part.
+    /// Combine the conditions with their points in one part.
     pub fn new(all: All<'a, D>, on: &'a mut OnPart<D>) -> Self {
         Self { all, on }
     }
@@ -384,7 +388,7 @@ impl<'a, const D: usize> Here<'a, D> {
         self.on.loads.is_empty() && self.on.supports.is_empty()
     }
 
-    /// Store forces and positions before the points move, for the work of the next step.
+    /// Store force densities and displacements before the points move, for the work of the next step.
     pub fn before_moving(&mut self, part: &Part<'_, D>) {
         let displacement = part.displacement.each_ref().map(|column| &**column);
         let reaction = part.reaction.as_ref();
@@ -392,8 +396,8 @@ impl<'a, const D: usize> Here<'a, D> {
         self.remember(displacement, reaction);
     }
 
-    /// Store forces and positions. The points of the part have these displacements (m) and reactions
-    /// (N/m³).
+    /// Store force densities and displacements for the work of the next step. The arguments are the
+    /// displacements (m) and reactions (N/m³) of all points of the part.
     pub fn remember(&mut self, displacement: [&[f64]; D], reaction: Option<[&[f64]; D]>) {
         for load in &mut self.on.loads {
             load.remember(displacement);
@@ -403,21 +407,21 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// After the points have moved, set the displacements of supported points.
+    /// Set the displacements of supported points, after the other points have moved.
     pub fn apply_displacements(&self, part: &mut Part<'_, D>) {
         for support in &self.on.supports {
             support.apply_displacements(self.all.supports, part);
         }
     }
 
-    /// Compute the forces of the loads that are due.
+    /// Compute the force densities of the loads that have changed.
     pub fn find_loads(&mut self) {
         for load in &mut self.on.loads {
             load.find(self.all.loads);
         }
     }
 
-    /// Update the external forces, if any load is due.
+    /// Update the external forces if any load has changed.
     pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
         if !self.all.loads.iter().any(|load| load.is_due) {
             return;
@@ -450,8 +454,8 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Add the work of loads and supports since the stored state. Forces and reactions must be those at the
-    /// present positions.
+    /// Add the work of loads and supports since [`Self::remember`]. Force densities and reactions must be
+    /// those at the present positions.
     pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
             load.add_work(part, work);

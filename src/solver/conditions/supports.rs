@@ -25,15 +25,15 @@ pub struct Support {
     guidance: Guidance,
 }
 
-/// Prescribed positions of the points.
+/// Prescribed values for the displacements of the supported points.
 struct Place {
     /// Length of the last step, s; 0 at the start.
     step: f64,
-    /// The values at the beginning and the end of this step.
+    /// The prescribed values at the start and the end of this step.
     values: [At; 2],
 }
 
-/// Prescribed velocities of the points.
+/// Time and step for the velocities and accelerations of the supported points.
 struct Guidance {
     time: f64,
     step: f64,
@@ -41,14 +41,14 @@ struct Guidance {
     same: Option<(f64, f64)>,
 }
 
-/// The points of a part on which a support acts.
+/// The points of a [`Part`] on which a support acts.
 pub struct Supported {
     /// Index of the support.
     support: usize,
     /// Indices of the points in the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
-    /// Force density (N/m³) and position (m) before the step.
+    /// Reaction (N/m³) and displacement (m) before the step.
     before: Vec<f64>,
     moved_from: Vec<f64>,
 }
@@ -74,7 +74,8 @@ impl Support {
         }
     }
 
-    /// Prepare the positions of points at `time` (s). `step` is the last step (s), 0 at the start.
+    /// Prepare the displacements of points at `time` (s). `step` is the length of the last step (s), 0 at the
+    /// start.
     pub fn set_place(&mut self, time: f64, step: f64) {
         self.place = Place {
             step,
@@ -92,10 +93,11 @@ impl Support {
         };
     }
 
-    /// Velocity (m/s) and acceleration (m/s²) of a point at a position (m) in the Verlet scheme, at a time
-    /// (s) with a step (s).
+    /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. The point is at a position
+    /// (m), and the step (s) begins at a time (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
-        // Before the start, and where its expression ends, as √(1 − t) does, the motion is extrapolated.
+        // The motion is extrapolated before the start, and where the expression has no value in the next
+        // step, such as √(1 − t).
         let change = |step: f64| self.values.expression.increment(position, time, step);
         let to_come = match change(step) {
             to_come if to_come.is_finite() || time < step => to_come,
@@ -131,13 +133,14 @@ impl Supported {
         }
     }
 
-    /// The component, and the indices of the points in the part.
+    /// The supported component, and the indices of the points in the part.
     pub fn points<'a>(&'a self, supports: &[Support]) -> (usize, impl Iterator<Item = usize> + 'a) {
         let points = self.points.iter().map(|point| usize::from(*point));
         (supports[self.support].component, points)
     }
 
-    /// Store reaction (N/m³) and position. The points of the part have these displacements (m).
+    /// Store reactions and displacements for the work of the next step. The arguments are the displacements
+    /// (m) and reactions (N/m³) of all points of the part.
     pub fn remember<const D: usize>(
         &mut self,
         supports: &[Support],
@@ -152,7 +155,8 @@ impl Supported {
         }
     }
 
-    /// After the points have moved, set their displacements, and their mean velocity in the last step.
+    /// Set the displacements of the points, and their mean velocities in the last step. Called after the
+    /// drift.
     pub fn apply_displacements<const D: usize>(
         &self,
         supports: &[Support],
@@ -167,14 +171,14 @@ impl Supported {
             let place = &mut moving.displacement[point];
             match support.motion {
                 Motion::Displacement => *place = value(&at[1], k),
-                // Trapezoidal rule from the positions before the drift.
+                // Trapezoidal rule for the velocity, from the displacement before the drift.
                 Motion::Velocity if *step > 0.0 => {
                     *place = self.moved_from[k];
                     for at in at {
                         *place += 0.5 * step * value(at, k);
                     }
                 }
-                // At the start, the points are at their initial displacement.
+                // At the start, the points have their initial displacement.
                 Motion::Velocity => {}
             }
             if *step > 0.0 {
@@ -183,8 +187,8 @@ impl Supported {
         }
     }
 
-    /// Set the velocities of the points and compute the reactions, which together with the other forces
-    /// give the prescribed motion in the Verlet scheme. Returns whether all values are finite.
+    /// Set the velocities of the points and compute the reactions. Together with the other forces, the
+    /// reactions give the prescribed motion in the Verlet scheme. Returns whether all values are finite.
     pub fn apply_velocities<const D: usize>(
         &self,
         supports: &[Support],
@@ -206,13 +210,14 @@ impl Supported {
         supports: &[Support],
         part: &mut Part<'_, D>,
     ) -> bool {
-        // With -0, the reaction is the force with the opposite sign, even for a force of 0.
+        // A required force of −0 makes the reaction the exact opposite of the other forces, even for a force
+        // of 0.
         self.react(supports[self.support].component, part, |_, _| (0.0, -0.0))
     }
 
     /// Set the velocities of the points, and compute the reactions that give the required total force
-    /// density (N/m³). `wanted` returns both for a point, given its index in this support and in the part.
-    /// Returns whether all values are finite.
+    /// density. For the index of a point in this support and in the part, `wanted` returns the velocity (m/s)
+    /// and the total force density (N/m³). Returns whether all values are finite.
     fn react<const D: usize>(
         &self,
         component: usize,
@@ -234,7 +239,7 @@ impl Supported {
         finite
     }
 
-    /// Add the work (J) of the support.
+    /// Add the work of the support in this step (J) to that of each point.
     pub fn add_work<const D: usize>(
         &self,
         supports: &[Support],

@@ -11,7 +11,7 @@ pub struct Temperature {
     now: At,
 }
 
-/// The points of a part whose temperature is prescribed.
+/// The points of a [`Part`] to which a temperature condition applies.
 pub struct Heated {
     /// Index of the temperature condition.
     temperature: usize,
@@ -26,7 +26,7 @@ pub struct Temperatures {
     each: Vec<Temperature>,
     /// The time (s) of the last [`Self::set_time`].
     time: Option<f64>,
-    /// Whether the temperatures of the points must be set.
+    /// Whether [`Self::apply`] must set the temperatures of the points.
     is_due: bool,
 }
 
@@ -41,8 +41,8 @@ impl Temperatures {
         self.each.len() - 1
     }
 
-    /// Prepare the temperatures at a time (s). The points are due at the first call. If temperatures
-    /// change, they are also due at each new time.
+    /// Prepare the temperatures at a time (s). [`Self::apply`] sets them after the first call and, if
+    /// temperatures change with time, after each call with a new time.
     pub fn set_time(&mut self, time: f64) {
         let is_new = self.time != Some(time);
         let changes = self.each.iter().any(|one| one.values.changes);
@@ -53,13 +53,14 @@ impl Temperatures {
         }
     }
 
-    /// Make the points due again at the next call of [`Self::set_time`].
+    /// Make [`Self::apply`] set all temperatures after the next call of [`Self::set_time`].
     pub fn reset(&mut self) {
         self.time = None;
     }
 
-    /// Set temperature and thermal stretch of the points of a part, if they are due. The last condition at
-    /// a point applies; without a condition, the point has the reference temperature of its material.
+    /// Set temperature and thermal stretch of the points of a part, if they have changed. If several
+    /// conditions apply to a point, the last one counts. A point without a condition has the reference
+    /// temperature of its material.
     pub fn apply<const D: usize>(&self, heated: &[Heated], part: &mut Part<'_, D>) {
         let (model, first) = (part.model, part.first);
         let (Some([temperature]), Some([stretch]), true) = (

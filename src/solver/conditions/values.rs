@@ -2,20 +2,20 @@
 
 use crate::expression::{Expression, Variable};
 
-/// An expression that is evaluated only as often as it can change.
+/// An expression that is evaluated once per time if it does not depend on the position.
 pub struct Values {
     pub expression: Expression,
-    /// Whether it depends on time.
+    /// Whether the expression depends on time.
     pub changes: bool,
-    /// Whether it depends on the position.
+    /// Whether the expression depends on the position.
     pub varies: bool,
 }
 
-/// The values at a given time.
+/// The values of an expression at a time.
 pub struct At {
     /// Time, s.
     time: f64,
-    /// Value of all points, if it is the same.
+    /// Common value of all points; `None` if the values depend on the position.
     same: Option<f64>,
 }
 
@@ -29,7 +29,7 @@ impl Values {
         }
     }
 
-    /// The values at a time (s).
+    /// Prepare the values at a time (s). A value that is the same for all points is computed here.
     pub fn at(&self, time: f64) -> At {
         let same = || self.expression.evaluate([0.0; 3], time);
         At {

@@ -5,7 +5,7 @@ use crate::comm::sum::{ExactSum, reduce};
 use crate::problem::Problem;
 use crate::solver::Simulation;
 
-/// Contact at one time; the same on all ranks.
+/// Contact quantities at one time; the same on all ranks.
 #[derive(Debug, Clone, Default)]
 pub struct ContactNow {
     /// Potential energy, J.
@@ -14,23 +14,23 @@ pub struct ContactNow {
     pub friction: f64,
     /// Energy dissipated by contact damping so far, J.
     pub damping: f64,
-    /// Contact of all pairs of points.
+    /// Contacts of all pairs of points.
     pub all: Touching,
-    /// Contact of each pair of bodies with its own rule.
+    /// Contacts of each pair of bodies that has a separate contact rule.
     pub pairs: Vec<Touching>,
     /// Rigid bodies and their kinetic energies, J.
     pub rigid: Vec<(RigidState, f64)>,
 }
 
-/// Pairs of points in contact.
+/// Totals over the pairs of points in contact.
 #[derive(Debug, Clone, Default)]
 pub struct Touching {
-    /// Number of pairs.
+    /// Number of pairs of points in contact.
     pub count: u64,
     /// The largest overlap, m.
     pub overlap: f64,
-    /// Force on the first of two bodies by component, N. Friction and damping follow from the velocities at
-    /// the full step.
+    /// Force on the first of the two bodies by component, N. Friction and damping are computed from the
+    /// velocities at the full step.
     pub force: Vec<f64>,
 }
 
@@ -42,7 +42,8 @@ struct PairSum<const D: usize> {
     force: [ExactSum; D],
 }
 
-/// Compute the present contact quantities; they are empty if the run has no contact. Collective.
+/// Compute the contact quantities at the present positions; they are empty if the run has no contact.
+/// Collective.
 pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> ContactNow {
     let (comm, model, fields) = (simulation.comm, &simulation.model, &simulation.fields);
     let Some(contact) = &mut simulation.contact else {
@@ -56,7 +57,7 @@ pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Contac
         overlap: 0.0,
         force: [ExactSum::ZERO; D],
     };
-    // The first entry is the total; one entry per pair of bodies follows.
+    // The first entry is the total. The other entries belong to the pairs of bodies.
     let mut sums: Vec<PairSum<D>> = (0..=bodies.len()).map(|_| new()).collect();
     for point in contact.open.iter().map(|point| *point as usize) {
         let body = simulation.problem.body_of(usize::from(model.block[point]));
@@ -124,7 +125,7 @@ pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Contac
     }
 }
 
-/// The bodies of each pair with its own rule.
+/// The bodies of each pair that has a separate contact rule.
 fn bodies_of_pairs(problem: &Problem) -> Vec<[usize; 2]> {
     let index = |name: &String| problem.bodies.iter().position(|body| body.name == *name);
     let pairs = problem.contact.iter().flat_map(|contact| &contact.pairs);

@@ -1,4 +1,4 @@
-//! Cells of present positions, for the contact search. Cells are hashed, so positions are not bounded.
+//! Cells of present positions, for the contact search. Cells are hashed, so positions may be anywhere.
 
 /// Integer coordinates of a cell; 0 beyond the dimension.
 pub(super) type Cell = [i64; 3];
@@ -16,7 +16,7 @@ pub(super) fn hash(cell: Cell) -> u64 {
     })
 }
 
-/// The cell and its adjacent cells in this dimension.
+/// The cell and its adjacent cells.
 pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item = Cell> {
     (0..3_usize.pow(dimension as u32)).map(move |k| {
         let shift = [k % 3, k / 3 % 3, k / 9].map(|shift| shift as i64 - 1);
@@ -69,7 +69,7 @@ impl Cells {
     }
 
     /// Call `visit` with the index of every point in the cell of a position (m) and in the adjacent cells.
-    /// These include all points within one edge of the position.
+    /// These include all points whose distance from the position is at most one edge of a cell.
     pub fn near(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
         let mask = self.starts.len() - 2;
         for cell in neighbourhood(cell_of(place, self.edge), self.dimension) {

@@ -1,9 +1,9 @@
 //! The ghosts of contact: points of other ranks that may touch owned points. They differ from the ghosts of
 //! the bonds, because contact depends on present positions.
 //!
-//! Any two ranks can have contact. Each cell of present space has a home rank, which is found by the hash
-//! of the cell. The home rank informs every rank with points in the cell about the other ranks with points
-//! in this or an adjacent cell.
+//! Any two ranks can have contact. Each cell of present positions has a home rank, given by the hash of the
+//! cell. The home rank informs every rank with points in the cell about the other ranks with points in this
+//! cell or in an adjacent one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,18 +16,18 @@ use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
 
-/// Edge of a cell, in reaches. With large cells, few points are near a cell border.
+/// Edge of a cell divided by the search radius. Large cells have fewer points near their borders.
 const CELL: f64 = 4.0;
 
-/// A point as it is sent to other ranks.
+/// A point in messages to other ranks.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Ghost {
-    /// Its id.
+    /// Id of the point.
     pub id: u64,
     /// Local index on its owner.
     pub index: u64,
-    /// Its block.
+    /// Block of the point.
     pub block: u64,
     /// Volume, m³.
     pub volume: f64,
@@ -42,7 +42,7 @@ pub(super) struct Ghost {
 pub(super) struct Ghosts<const D: usize> {
     /// The points, sorted by owner and then by id.
     pub points: Vec<Ghost>,
-    /// Edges of their cells, m.
+    /// Edge of a cell with the volume of each point, m.
     pub edges: Vec<f64>,
     /// Displacements by component, m.
     pub displacement: Vec<Vec<f64>>,
@@ -87,16 +87,16 @@ impl<const D: usize> Ghosts<D> {
     }
 }
 
-/// Message that a rank has points in a cell or in an adjacent one.
+/// Message to a home rank: the sender has points in a cell or in an adjacent one.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Claim {
     cell: Cell,
-    /// 1 if it has points in the cell itself.
+    /// 1 if the sender has points in the cell itself.
     inside: u64,
 }
 
-/// Message that another rank has points in a cell or in an adjacent one.
+/// Message from a home rank: another rank has points in a cell or in an adjacent one.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Partner {
@@ -104,8 +104,8 @@ struct Partner {
     rank: u64,
 }
 
-/// Find the points of other ranks within `reach` (m) of owned points in this dimension, sorted by owner,
-/// then by id. Also return the plan of their exchange with `width` values per point. Collective.
+/// Find the points of other ranks within `reach` (m) of owned points in this dimension, sorted by owner, then
+/// by id. Also return the exchange plan of these points for `width` values per point. Collective.
 fn find(
     comm: &dyn Communicator,
     own: &[Ghost],

@@ -47,11 +47,11 @@ pub use rigid::RigidState;
 pub use start::Coincident;
 pub use state::ContactState;
 
-/// Points handled by one task.
+/// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Look-ahead, steps: pairs that will touch within this time already count in the stable step, so it is
-/// shortened in time.
+/// Look-ahead, steps. The stable step includes pairs that will touch within this time, so the step is
+/// shortened before they touch.
 const LOOK_AHEAD: f64 = 2.0;
 
 /// Contact on one rank.
@@ -60,27 +60,27 @@ pub struct Contact<const D: usize> {
     /// Rule of each pair of blocks, in both orders.
     rules: Vec<Option<PairRule>>,
     blocks: usize,
-    /// Largest contact distance of any points, m.
+    /// Largest contact distance of any two points, m.
     largest: f64,
-    /// Edge of a cell with the volume of each owned point, m.
+    /// Edge of a cell that has the volume of the point, for each owned point, m.
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
-    /// Owned points that touch a rigid body: at present, and at the last evaluation.
+    /// Owned points that touch a rigid body, by the last evaluation and the one before.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
-    /// Owned points with a candidate that no bond joins to them.
+    /// Owned points that may touch a point to which no bond joins them.
     open: Vec<u32>,
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
-    /// Whether the lists and their bonds must be rebuilt; the same on all ranks.
+    /// Whether the lists of pairs and their bonded flags must be rebuilt; the same on all ranks.
     is_stale: bool,
     /// Limits that contact sets for the time step.
     demand: StepDemand,
     /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N².
     rigid_forces: ExactSum,
-    /// Buffers of [`Self::add_forces`]: the points with contact forces, and their forces.
+    /// Buffers of [`Self::add_forces`]: the points with contact forces, and the forces on each of them.
     active: Vec<u32>,
     sums: Vec<PointSum<D>>,
 }
@@ -88,13 +88,14 @@ pub struct Contact<const D: usize> {
 /// Settings of a contact force evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactEvaluation {
-    /// In a relaxation there are no velocities, and contact adds to the fictitious density.
+    /// Whether the evaluation is part of a relaxation or static solution: there are no velocities, and
+    /// contact adds to the fictitious density.
     pub is_quasi_static: bool,
-    /// Set at the end of a step, or when a load step has reached equilibrium.
+    /// Data of the step, if it ends here or if a load step has reached equilibrium; otherwise `None`.
     pub end: Option<StepEnd>,
 }
 
-/// Time and steps at the end of a step.
+/// Time and step lengths at the end of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepEnd {
     /// Time, s.
@@ -114,14 +115,15 @@ struct PointSum<const D: usize> {
     damping: [f64; D],
     /// Friction, N.
     friction: [f64; D],
-    /// Part of these forces that rigid bodies exert, N.
+    /// Part of these forces that comes from rigid bodies, N.
     of_rigid: [f64; D],
-    /// Half of the potential energies of its contacts with points, and the whole of those with rigid
-    /// bodies, J.
+    /// Potential energy, J: half of the energy of each contact with a point, and all of the energy of
+    /// contacts with rigid bodies.
     energy: f64,
-    /// Contribution to the step limits, summed over contacts now and within the look-ahead.
+    /// Contribution to the step limits, summed over present contacts and those expected within the
+    /// look-ahead.
     demand: Demand,
-    /// Whether the point touches anything.
+    /// Whether the point touches another point or a rigid body.
     touches: bool,
 }
 
@@ -197,7 +199,7 @@ impl<const D: usize> Contact<D> {
         }))
     }
 
-    /// Index of a rigid body whose motion is not finite, if there is one.
+    /// Index of the first rigid body whose motion is not finite; `None` if all are finite.
     pub fn lost_rigid(&self) -> Option<usize> {
         self.rigid.iter().position(|rigid| !rigid.is_finite())
     }
@@ -209,7 +211,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Move driven rigid bodies to their positions at a time (s), for the next load step of a relaxation.
+    /// Move driven rigid bodies to their positions at a time (s), for the next load step.
     pub fn place_rigid(&mut self, time: f64) {
         for rigid in &mut self.rigid {
             rigid.place(time);
@@ -222,7 +224,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
-    /// friction and damping from the present velocities, book their work, and apply the second half kick of
+    /// friction and damping from the present velocities, record their work, and apply the second half kick of
     /// rigid bodies. Otherwise, friction and damping do not change. Collective.
     pub fn add_forces(
         &mut self,
@@ -269,7 +271,7 @@ impl<const D: usize> Contact<D> {
             if let Some(StepEnd { step, .. }) = end {
                 fields.book_dissipation(point, volume, step, [friction, damping]);
             }
-            // Adding 0 would change the sign of −0.
+            // For other points, adding 0 would change the sign of −0.
             if sum.touches {
                 fields.add_contact(point, repulsion, sum.energy);
             } else {
@@ -289,7 +291,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Find the owned points that have contact forces now or had some at the last evaluation.
+    /// Find the owned points that have contact forces now, or had some at the last evaluation.
     fn find_active(
         &mut self,
         model: &Model<D>,
@@ -318,9 +320,9 @@ impl<const D: usize> Contact<D> {
         active.extend(&self.open);
     }
 
-    /// Sum the forces of points on rigid bodies, finish their step, and compute the limits for the next
-    /// step. `largest` contains the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned points.
-    /// Collective.
+    /// Sum the forces of points on rigid bodies, finish the step of the bodies, and compute the step limits
+    /// of contact. The third argument contains the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned
+    /// points. Collective.
     fn close_step(
         &mut self,
         comm: &dyn Communicator,
@@ -335,8 +337,8 @@ impl<const D: usize> Contact<D> {
             [self.demand.stiffness, self.demand.damping] = largest;
             return;
         }
-        // The following entries are the largest distances of a touching point from the centre of each rigid
-        // body.
+        // The entries from the third on are one distance per rigid body: the largest distance of a touching
+        // point from the centre.
         let mut largest = vec![0.0; 2 + self.rigid.len()];
         (largest[0], largest[1]) = (stiffness, damping);
         let mut sums = Vec::new();
@@ -371,7 +373,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Data of a point by its index: owned points first, then ghosts.
+    /// Return block and data of a point by its index: owned points first, then ghosts.
     fn point(
         &self,
         model: &Model<D>,
@@ -471,7 +473,7 @@ impl<const D: usize> Contact<D> {
         self.for_each_candidate(model, fields, point, |here, there, _, rule| {
             sum.add_demand(rule.demand(here, there, look_ahead));
             if let Some(touch) = rule.touch(here, there) {
-                // The other half of the energy belongs to the other point.
+                // The sum of the other point contains the other half of the energy.
                 sum.add(&touch, 0.5);
             }
         });

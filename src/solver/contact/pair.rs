@@ -19,20 +19,20 @@ const SHORT_RANGE_STIFFNESS: f64 = 15.0;
 /// Damping ratio of two points that stick by friction.
 const STICKING: f64 = 0.5;
 
-/// Contact between points of two blocks.
+/// Contact rule for the points of two blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PairRule {
-    /// Contact distance, m; if it is not given, `edge_share` times the mean of the edges of both points.
+    /// Contact distance, m. If `None`, it is `edge_share` times the mean of the edges of both points.
     radius: Option<f64>,
     edge_share: f64,
-    /// Upper limit of the contact distance as a fraction of the reference distance, so no force acts at
-    /// rest.
+    /// Upper limit of the contact distance as a fraction of the reference distance, so no force acts in the
+    /// reference positions.
     reference_share: f64,
     stiffness: Stiffness,
     response: Response,
 }
 
-/// Rule for the forces from overlap and velocities.
+/// Rule for forces that depend on overlap and velocities.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Response {
     static_friction: f64,
@@ -50,7 +50,7 @@ enum Stiffness {
     OfVolumes(f64),
 }
 
-/// Data of a point that contact needs.
+/// Data of a point for the computation of contact forces.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ContactPoint<const D: usize> {
     /// Reference position, m.
@@ -61,7 +61,7 @@ pub(super) struct ContactPoint<const D: usize> {
     pub velocity: [f64; D],
     /// Volume, m³.
     pub volume: f64,
-    /// Edge of a cell of that volume, m.
+    /// Edge of a cell that has the volume of the point, m.
     pub edge: f64,
     /// Mass, kg.
     pub mass: f64,
@@ -75,7 +75,7 @@ impl<const D: usize> ContactPoint<D> {
     }
 }
 
-/// Extend a vector to three components; those beyond the dimension are 0.
+/// Extend a vector to three components by zeros.
 pub(super) fn whole<const D: usize>(vector: [f64; D]) -> [f64; 3] {
     let mut whole = [0.0; 3];
     whole[..D].copy_from_slice(&vector);
@@ -107,13 +107,13 @@ pub(super) struct Touch<const D: usize> {
 }
 
 impl PairRule {
-    /// Contact between points of two blocks.
+    /// Create the rule for the points of two blocks.
     pub fn new(dimension: Dimension, rule: &ContactRule, blocks: [&Block<'_>; 2]) -> Self {
         let elastic = blocks.map(|block| block.body.material.elastic);
         let horizon = blocks[0].horizon.min(blocks[1].horizon);
         let (edge_share, reference_share, stiffness) = match rule.model {
             ContactModel::Penalty => {
-                // Both materials act in series, each with a thickness of half a horizon.
+                // The materials act in series. The layer of each material is half a horizon thick.
                 let [first, second] = elastic.map(|elastic| elastic.youngs_modulus);
                 let series = 2.0 * first * second / (first + second);
                 let modulus = rule.stiffness.unwrap_or(series);
@@ -149,8 +149,8 @@ impl PairRule {
         distance.min(self.reference_share * reference)
     }
 
-    /// Return contact distance minus present distance (m), the present distance (m), and the vector from
-    /// the first to the second point (m).
+    /// Return three quantities: contact distance minus present distance (m), the present distance (m), and
+    /// the vector from the first to the second point (m).
     fn overlap<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -176,8 +176,8 @@ impl PairRule {
         }
     }
 
-    /// Contribution of a pair to the step limits, if it touches, or will touch within a time (s) at its
-    /// present approach speed.
+    /// Contribution of a pair to the step limits; `None` if the pair does not touch and will not touch within
+    /// a time (s) at its present approach speed.
     pub fn demand<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -194,8 +194,8 @@ impl PairRule {
         })
     }
 
-    /// Contact force of the second point on the first, if they touch. Exchanging the points flips every
-    /// sign exactly.
+    /// Contact force of the second point on the first; `None` if they do not touch. If the points are
+    /// exchanged, the forces are exactly opposite.
     pub fn touch<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -217,7 +217,7 @@ impl PairRule {
 }
 
 impl Response {
-    /// Create the response from friction and damping of a rule.
+    /// Create the response from the friction and damping of a contact rule.
     pub fn new(rule: &ContactRule) -> Self {
         Self {
             static_friction: rule.static_friction,
@@ -240,9 +240,9 @@ impl Response {
         }
     }
 
-    /// Contact force for an overlap (m) and a stiffness (N/m). `normal` points from the point towards the
-    /// other object. `velocity` (m/s) is the velocity of the point relative to this object. `mass` is the
-    /// reduced mass, kg.
+    /// Contact force on a point for an overlap (m) and a stiffness (N/m). `normal` points from the point
+    /// towards the other point or body. `velocity` (m/s) is that of the point relative to this other object.
+    /// `mass` is the reduced mass, kg.
     pub fn touch<const D: usize>(
         &self,
         stiffness: f64,
@@ -284,7 +284,7 @@ impl Response {
     }
 }
 
-/// Damping ratio of two points with this coefficient of restitution, which is above 0 and at most 1.
+/// Damping ratio for a coefficient of restitution that is above 0 and at most 1.
 fn damping_ratio(restitution: f64) -> f64 {
     if restitution == 1.0 {
         return 0.0;
@@ -293,7 +293,7 @@ fn damping_ratio(restitution: f64) -> f64 {
     while restitution_of(high) > restitution {
         high *= 2.0;
     }
-    // Bisect until the interval contains no further number.
+    // Bisect until no floating-point number lies inside the interval.
     for _ in 0..64 {
         let middle = 0.5 * (low + high);
         if restitution_of(middle) >= restitution {
@@ -305,8 +305,8 @@ fn damping_ratio(restitution: f64) -> f64 {
     low
 }
 
-/// Coefficient of restitution of a damped linear spring without attraction (Schwager & Pöschel 2007, eq. 19
-/// to 21).
+/// Coefficient of restitution of a damped linear spring that never pulls, for its damping ratio (Schwager &
+/// Pöschel 2007, eq. 19 to 21).
 fn restitution_of(ratio: f64) -> f64 {
     let root = (1.0 - ratio * ratio).abs().sqrt();
     if root < 1e-8 {

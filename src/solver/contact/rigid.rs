@@ -23,22 +23,22 @@ type Wrench = [f64; WRENCH];
 pub struct RigidState {
     /// Position of the centre, m.
     pub position: [f64; 3],
-    /// Velocity, m/s; for a driven body, the mean of the last step.
+    /// Velocity, m/s; for a driven body, the mean velocity in the last step.
     pub velocity: [f64; 3],
     /// Rotation from the body's axes to the space axes: quaternion i, j, k, w.
     pub rotation: [f64; 4],
     /// Angular momentum, kg m²/s.
     pub angular_momentum: [f64; 3],
-    /// Contact force and torque of the points on the body.
+    /// Contact force and torque that the points exert on the body.
     pub contact: Wrench,
-    /// Parts of `contact` that come from friction and from damping.
+    /// The parts of `contact` from friction and from damping.
     friction: Wrench,
     damping: Wrench,
-    /// Displacement since the last equilibrium, m; 0 except in a relaxation.
+    /// Displacement of a driven body in the present load step, m; 0 in explicit stages.
     advance: [f64; 3],
     /// Prescribed force, N.
     load: [f64; 3],
-    /// Work of its load or of its drive, J.
+    /// Work of the prescribed force or motion, J.
     pub work: f64,
     /// Energy that friction has taken from the body, J; the rest is taken from the points.
     pub friction_energy: f64,
@@ -46,7 +46,7 @@ pub struct RigidState {
     pub damping_energy: f64,
 }
 
-/// A rigid body of a run.
+/// A rigid body with its definition, state and constants.
 #[derive(Debug)]
 pub(super) struct RigidBody {
     problem: problem::Rigid,
@@ -54,9 +54,9 @@ pub(super) struct RigidBody {
     start: [f64; 3],
     dimension: Dimension,
     pub state: RigidState,
-    /// Mass, kg; 0 for a driven body.
+    /// Mass, kg; 0 for a driven body, whose mass has no effect.
     mass: f64,
-    /// Inertia in the body's axes, kg m², and its inverse.
+    /// Inertia tensor in the body's axes (kg m²), and its inverse.
     inertia: [Matrix3<f64>; 2],
     response: Response,
     /// Stiffness of the contact layer by block: modulus over thickness, N/m³.
@@ -109,7 +109,7 @@ impl RigidBody {
         let moments = mass.max(f64::MIN_POSITIVE) * inertia(&problem.shape, dimension.count());
         let inverse = moments.try_inverse().unwrap_or_else(Matrix3::identity);
         let layer = |block: &Block<'_>| {
-            // Thickness of the layer: half a horizon of the points' material.
+            // The contact layer is half a horizon of the points' material thick.
             let modulus = problem
                 .rule
                 .stiffness
@@ -159,7 +159,7 @@ impl RigidBody {
         0.5 * (self.mass * Vector3::from(self.state.velocity).norm_squared() + turning)
     }
 
-    /// Values of expressions of t at a time (s); 0 if there are none.
+    /// Evaluate expressions of t at a time (s); the result is 0 if there are none.
     fn values(expressions: &[Expression], time: f64) -> [f64; 3] {
         std::array::from_fn(|d| {
             let value = expressions.get(d).map(|it| it.evaluate([0.0; 3], time));
@@ -192,7 +192,7 @@ impl RigidBody {
         }
     }
 
-    /// Move a driven body to its position at a time (s), at rest, for the next load step of a relaxation.
+    /// Move a driven body to its position at a time (s) without velocity, for the next load step.
     pub fn place(&mut self, time: f64) {
         if let RigidMotion::Driven(displacement) = &self.problem.motion {
             let moved = Self::values(displacement, time);
@@ -215,8 +215,8 @@ impl RigidBody {
         }
     }
 
-    /// Finish a step (s) that ends at a time (s): store the forces of the points, book their work, and
-    /// apply the second half kick.
+    /// Finish a step (s) that ends at a time (s): store the forces that the points exert, record their work,
+    /// and apply the second half kick.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
@@ -233,7 +233,8 @@ impl RigidBody {
         match &self.problem.motion {
             RigidMotion::Driven(_) => {
                 state.work -= work(&state.contact, &contact);
-                // A relaxation has no velocities. Further equilibria of a load step have no advance.
+                // In a load step, the velocity is 0 and work comes from `advance`. The first equilibrium
+                // resets `advance`, so further ones add no work.
                 for (d, advance) in state.advance.iter_mut().enumerate() {
                     let advance = std::mem::take(advance);
                     state.work -= 0.5 * (state.contact[d] + contact[d]) * advance;
@@ -258,9 +259,9 @@ impl RigidBody {
         (apart, rotation.transform_vector(&normal))
     }
 
-    /// Return contact distance minus present distance (m) of a point and the surface, and the normal there.
-    /// The contact distance is half the edge of the point's cell, or the distance at the start if that is
-    /// smaller.
+    /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
+    /// The overlap is contact distance minus present distance. The contact distance is half the edge of the
+    /// point's cell, or the distance at the start if that is smaller.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.place());
         let half = 0.5 * point.edge;
@@ -273,13 +274,13 @@ impl RigidBody {
         )
     }
 
-    /// Distance (m) of a position from the surface at the start; negative inside.
+    /// Distance (m) of a position from the surface at the start of the run; negative inside.
     pub fn start_distance(&self, place: [f64; 3]) -> f64 {
         let seen = Vector3::from(place) - Vector3::from(self.start);
         distance(&self.problem.shape, seen, self.dimension.count()).0
     }
 
-    /// Contact force of the body on a point of a block, if they touch.
+    /// Contact force of the body on a point of a block; `None` if they do not touch.
     pub fn touch<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> Option<Touch<D>> {
         let (overlap, normal) = self.overlap(point);
         if overlap <= 0.0 {
@@ -291,7 +292,7 @@ impl RigidBody {
         let arm = Vector3::from(place) - Vector3::from(self.state.position);
         let surface = self.surface_velocity(arm);
         let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
-        // The normal points out of the point, as for pairs of points.
+        // As for pairs of points, the normal points from the point to the body.
         let normal = std::array::from_fn(|d| -normal[d]);
         Some(
             self.response
@@ -299,12 +300,12 @@ impl RigidBody {
         )
     }
 
-    /// Distance of a position (m) from the centre, m.
+    /// Distance of a position (m) from the centre of the body, m.
     pub fn arm(&self, place: [f64; 3]) -> f64 {
         (Vector3::from(place) - Vector3::from(self.state.position)).norm()
     }
 
-    /// Add the reaction to the contact force on a point at a position (m) to the sums.
+    /// Add the opposite of the contact force on a point at a position (m) to the sums.
     pub fn add_opposite<const D: usize>(
         &self,
         sums: &mut WrenchSums,
@@ -325,9 +326,9 @@ impl RigidBody {
         }
     }
 
-    /// Contribution of a point to the step limits, if it touches the body or will touch it within a time
-    /// (s) at its present approach speed. Points farther away than an edge of their cell are skipped, so
-    /// most points need no velocity.
+    /// Contribution of a point to the step limits; `None` if it does not touch the body and will not touch it
+    /// within a time (s) at its present approach speed. The velocities of points with a gap of more than an
+    /// edge are not needed.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -368,8 +369,8 @@ impl RigidBody {
         Vector3::from(self.state.velocity) + spin.cross(&arm)
     }
 
-    /// Upper bound of 1/m + r²/I for points that touch the body within a distance r (m) of its centre,
-    /// 1/kg; 0 for a driven body.
+    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre; 0 for a driven
+    /// body.
     pub fn mobility(&self, reach: f64) -> f64 {
         if self.mass == 0.0 {
             return 0.0;
@@ -387,7 +388,7 @@ impl RigidBody {
         1.0 / self.mass + reach * reach * largest
     }
 
-    /// Whether all values of its state are finite.
+    /// Whether position and velocity are finite.
     pub fn is_finite(&self) -> bool {
         let RigidState {
             position, velocity, ..
@@ -399,7 +400,7 @@ impl RigidBody {
     }
 }
 
-/// Rotate `rotation` further by an angular velocity (1/s) over a time (s).
+/// Rotate `rotation` by an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
     // (1 + ½ Δt ω) q: the angle is accurate to third order, without a sine.

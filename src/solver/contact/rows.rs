@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-/// Points handled by one task.
+/// Number of points that one task processes.
 const CHUNK: usize = 1024;
 
-/// The points that may touch each owned point, in ascending order of ids.
+/// The points that may touch each owned point: one row per owned point, in ascending order of ids.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     /// Index of the first pair of each owned point.
     starts: Vec<usize>,
-    /// Index of the other point: owned points first, then those of other ranks.
+    /// Index of the other point of each pair: owned points first, then ghosts.
     others: Vec<u32>,
     ids: Vec<u64>,
-    /// Whether an intact bond joins the pair; such a pair has no contact.
+    /// Whether an intact bond joins the pair. Such a pair has no contact.
     is_bonded: Vec<bool>,
 }
 
@@ -21,12 +21,12 @@ pub(super) struct Rows {
 pub(super) struct FoundPair {
     /// Id of the other point.
     pub id: u64,
-    /// Its index.
+    /// Index of the other point.
     pub other: u32,
 }
 
 impl Rows {
-    /// Create the rows of `points` points. `find` finds the candidates of each. All pairs start unbonded.
+    /// Create the rows of `points` points. `find` adds the pairs of a point. All pairs start unbonded.
     pub fn new(points: usize, find: impl Fn(usize, &mut Vec<FoundPair>) + Sync) -> Self {
         let chunks = points.div_ceil(CHUNK);
         let chunks: Vec<(Vec<usize>, Vec<FoundPair>)> = (0..chunks)
@@ -58,25 +58,25 @@ impl Rows {
         rows
     }
 
-    /// Indices of the points that may touch an owned point and that no bond joins to it.
+    /// Indices of the points that may touch an owned point, without points to which an intact bond joins it.
     pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
         let row = self.starts[point]..self.starts[point + 1];
         row.filter(|pair| !self.is_bonded[*pair])
             .map(|pair| self.others[pair] as usize)
     }
 
-    /// Whether there are [points that may touch](Self::touching) an owned point.
+    /// Whether [`Self::touching`] of an owned point is not empty.
     pub fn is_open(&self, point: usize) -> bool {
         let row = self.starts[point]..self.starts[point + 1];
         self.is_bonded[row].contains(&false)
     }
 
-    /// Whether an owned point has no candidates.
+    /// Whether the row of an owned point is empty.
     pub fn is_empty(&self, point: usize) -> bool {
         self.starts[point] == self.starts[point + 1]
     }
 
-    /// Mark that a bond joins an owned point to the point with this id.
+    /// Mark the pair of an owned point and the point with this id as bonded.
     pub fn set_bonded(&mut self, point: usize, id: u64) {
         let row = self.starts[point]..self.starts[point + 1];
         if let Ok(place) = self.ids[row.clone()].binary_search(&id) {
@@ -84,13 +84,12 @@ impl Rows {
         }
     }
 
-    /// Mark that no bond joins an owned point to a point of its row.
+    /// Mark all pairs of an owned point as unbonded.
     pub fn set_unbonded(&mut self, point: usize) {
         self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
     }
 
-    /// Copy the bonded flags from earlier rows of the same points. Return the points with pairs that were
-    /// not in the earlier rows.
+    /// Copy the bonded flags from earlier rows of the same points. Return the points that have new pairs.
     pub fn inherit(&mut self, earlier: &Self) -> Vec<usize> {
         let mut new = Vec::new();
         for point in 0..self.starts.len() - 1 {

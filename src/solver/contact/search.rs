@@ -1,4 +1,4 @@
-//! The search of pairs that may touch, and of the bonds that exclude pairs from contact.
+//! Search of pairs that may touch, and of the bonds that exclude pairs from contact.
 
 use rayon::prelude::*;
 
@@ -12,13 +12,13 @@ use super::ghosts::{Ghost, Ghosts};
 use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
-/// Skin as a fraction of the largest contact distance: the distance by which points may approach between
-/// two searches. With this value, a row of a lattice at rest contains only the nearest neighbours.
+/// Skin as a fraction of the largest contact distance. It is the distance by which two points may approach
+/// between searches. With this skin, the rows of a lattice at rest contain only nearest neighbours.
 const SKIN: f64 = 0.4;
 
 impl<const D: usize> Contact<D> {
-    /// Repeat the search if a point has moved by half the skin. Returns whether all positions are finite on
-    /// all ranks. Collective.
+    /// Repeat the search if a point has moved by more than half the skin. Returns whether all positions are
+    /// finite on all ranks. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,
@@ -144,8 +144,8 @@ impl<const D: usize> Contact<D> {
         self.is_stale = false;
     }
 
-    /// Update the bonded flags of the points whose bonds broke in the last evaluation or were restored
-    /// since.
+    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Their bonds have broken in
+    /// the last evaluation, or a rollback has restored these bonds.
     pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
         for broken in forces.broken() {
             let point = broken.point;
@@ -158,7 +158,7 @@ impl<const D: usize> Contact<D> {
     }
 }
 
-/// Find the candidates of a point that an intact bond joins to it.
+/// Set the bonded flags of the pairs of a point.
 fn find_bonds<const D: usize>(rows: &mut Rows, model: &Model<D>, forces: &Forces<D>, point: usize) {
     if rows.is_empty(point) {
         return;

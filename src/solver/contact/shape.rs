@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::problem::RigidShape;
 
 /// Return the distance (m) of a position from the surface of a shape, negative inside, and the outward unit
-/// normal there. The position is relative to the centre of the shape, in its axes and dimension.
+/// normal of the surface. The position is relative to the centre of the shape, in the axes of the shape.
 pub(super) fn distance(
     shape: &RigidShape,
     place: Vector3<f64>,
@@ -25,7 +25,7 @@ pub(super) fn distance(
             let along = place.dot(&axis);
             let across = place - along * axis;
             let length = across.norm();
-            // Same as for a box, in the plane through the axis and the position.
+            // As for a box, in the plane through the axis of the cylinder and the position.
             let beyond = [along.abs() - half_length, length - radius];
             let normals = [along.signum() * axis, direction(across, length)];
             outside(&beyond, &normals)
@@ -60,7 +60,7 @@ fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     (*beyond, *normal)
 }
 
-/// Direction of a vector of this length; arbitrary for length 0.
+/// Unit vector along a vector of this length; an arbitrary axis if the length is 0.
 fn direction(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     if length > 0.0 {
         vector / length

@@ -54,8 +54,8 @@ pub struct Coincident {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Find the points of different bodies that start at the same position, if there are any; the result is
-    /// the same on all ranks. Call before the first step. Collective.
+    /// Find the pairs of points of different bodies that start at the same position; `None` if there are
+    /// none. The result is the same on all ranks. Call before the first step. Collective.
     pub fn coincident(
         &self,
         problem: &Problem,

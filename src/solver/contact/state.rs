@@ -8,7 +8,7 @@ use crate::solver::model::Model;
 use super::Contact;
 use super::rigid::RigidState;
 
-/// Number of consecutive steps for which a longer step was possible, before the step is lengthened.
+/// The step is lengthened after this number of consecutive steps that could have been longer.
 const CALM: u64 = 100;
 
 /// Limits that contact sets for the time step, over all ranks. They include contacts that will begin within
@@ -16,16 +16,16 @@ const CALM: u64 = 100;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
-    /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to
-    /// squared frequencies.
+    /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
+    /// squared angular frequencies.
     pub stiffness: f64,
     /// Largest 2 Σ c/m, 1/s.
     pub damping: f64,
-    /// Number of consecutive steps for which a longer step was possible.
+    /// Number of consecutive steps that could have been longer.
     calm: u64,
 }
 
-/// The contact state that is not in the fields of the points; the same on all ranks, except `at_rigid`.
+/// The contact state that is not part of the fields of the points; the same on all ranks, except `at_rigid`.
 #[derive(Debug, Clone, Default)]
 pub struct ContactState {
     rigid: Vec<RigidState>,
@@ -35,14 +35,14 @@ pub struct ContactState {
 }
 
 impl ContactState {
-    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included, because they are
-    /// found again.
+    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included; the next
+    /// evaluation finds them.
     pub fn words(&self) -> Vec<u64> {
         let demand = bytemuck::cast_slice(std::slice::from_ref(&self.demand));
         [demand, bytemuck::cast_slice(&self.rigid)].concat()
     }
 
-    /// Decode the words of [`Self::words`].
+    /// Decode the state from [`Self::words`].
     pub fn of_words(words: &[u64]) -> Self {
         let (demand, rigid) = words.split_at(size_of::<StepDemand>() / size_of::<u64>());
         Self {
@@ -54,7 +54,7 @@ impl ContactState {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Copy the contact state that is not in the fields.
+    /// Copy the contact state that is not part of the fields.
     pub fn state(&self) -> ContactState {
         ContactState {
             rigid: self.rigid.iter().map(|rigid| rigid.state).collect(),
@@ -63,8 +63,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Restore the state before the last step, for the same points. The bonds must have been restored
-    /// already.
+    /// Restore the state before a step that is rolled back, with unchanged points. The bonds must have been
+    /// restored before.
     pub fn undo(&mut self, state: &ContactState, model: &Model<D>, forces: &Forces<D>) {
         self.set_state(state);
         self.update_bonds(model, forces);
@@ -84,17 +84,17 @@ impl<const D: usize> Contact<D> {
         self.at_rigid[0].clone_from(&state.at_rigid);
     }
 
-    /// Whether contact limits the step, now or soon.
+    /// Whether contact limits the step, at present or within the look-ahead.
     pub fn is_felt(&self) -> bool {
         self.demand.stiffness > 0.0
     }
 
-    /// Whether a longer step has been possible for long enough to lengthen it.
+    /// Whether enough consecutive steps could have been longer, so that the step may be lengthened.
     pub fn is_calm(&self) -> bool {
         self.demand.calm >= CALM
     }
 
-    /// Stable step (s) with the present contact; `step` is the stable step without contact.
+    /// Stable step (s) with contact; `step` is the stable step without contact.
     ///
     /// With damping from the velocities half a step earlier, Δt² ω² + 2 Δt C/m < 4 is stable.
     pub fn stable_step(&self, step: f64) -> f64 {
@@ -103,7 +103,7 @@ impl<const D: usize> Contact<D> {
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Count the present step if it could have been longer.
+    /// Count the steps that could have been longer; reset the count if the present step could not.
     pub fn count_calm(&mut self, could_be_longer: bool) {
         self.demand.calm = if could_be_longer {
             self.demand.calm + 1

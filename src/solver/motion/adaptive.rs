@@ -1,23 +1,23 @@
 //! Adaptive time step: a step in which too many bonds of a point break is rolled back and repeated with a
 //! shorter step.
 //!
-//! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. These must carry
-//! it before they break themselves:
+//! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. A short step gives
+//! these bonds time to carry the load before they break:
 //!
 //! ```text
 //! N_b > most broken, Δt > smallest        undo the step, Δt ← Δt · reduce
 //! N_b ≤ stable broken in `steps` steps    Δt ← Δt · raise, up to the largest
 //! ```
 //!
-//! N_b is the largest number of bonds of a point that break in a step, over all ranks. So all ranks make the
-//! same decision.
+//! N_b is the largest number of bonds of a point that break in a step, over all ranks. All ranks therefore
+//! make the same decision.
 
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
 
 use super::integrator::Integrator;
 
-/// Verlet integrator with steps that follow this rule.
+/// Verlet integrator whose step follows an adaptive rule.
 pub struct AdaptiveVerlet(pub Adaptive);
 
 impl<const D: usize> Integrator<D> for AdaptiveVerlet {
@@ -27,7 +27,8 @@ impl<const D: usize> Integrator<D> for AdaptiveVerlet {
     }
 }
 
-/// Relative tolerance: a step this much shorter than the rest of the stage still ends the stage.
+/// Relative tolerance: a step that is shorter than the rest of the stage by this fraction still ends the
+/// stage.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
 /// State of the rule between steps; the same on all ranks.
@@ -37,7 +38,7 @@ pub struct StepControl {
     step: f64,
     /// Smallest and largest step, s.
     limits: [f64; 2],
-    /// Number of consecutive steps in which few bonds broke.
+    /// Number of consecutive steps in which at most `stable broken` bonds of any point broke.
     calm: u64,
     /// Number of steps rolled back so far.
     pub undone: u64,
@@ -46,7 +47,7 @@ pub struct StepControl {
 }
 
 impl StepControl {
-    /// Start a stage with a chosen step (s).
+    /// Start a stage in which the deck or the stable step gives this step (s).
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);
@@ -61,7 +62,7 @@ impl StepControl {
         [step, smallest, largest, counts[0], counts[1], counts[2]]
     }
 
-    /// Decode the words of [`Self::words`].
+    /// Decode the state from [`Self::words`].
     pub fn of_words([step, smallest, largest, calm, undone, most_broken]: [u64; 6]) -> Self {
         Self {
             step: f64::from_bits(step),
@@ -72,8 +73,8 @@ impl StepControl {
         }
     }
 
-    /// Decide whether a step of this size (s) is rolled back, given the largest number of bonds of a point
-    /// that broke in it. Adjust the size of the next step.
+    /// Decide whether a step of this size (s) is rolled back. `broken` is the largest number of bonds of a
+    /// point that broke in this step. Adjust the size of the next step.
     fn undoes(&mut self, rule: &Adaptive, size: f64, broken: u64) -> bool {
         let [smallest, largest] = self.limits;
         if broken > rule.most_broken && size > smallest {

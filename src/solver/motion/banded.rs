@@ -44,8 +44,8 @@ impl Banded {
         self.entries[row * (self.band + 1) + self.band + column - row] += value;
     }
 
-    /// Replace the matrix A by its factor L, L Lᵀ = A. Rows whose pivot is round-off become 0. Their
-    /// unknowns are 0 in [`Self::solve`], which then applies a generalized inverse.
+    /// Replace the matrix A by its factor L, with L Lᵀ = A. Rows whose pivot is round-off become 0. The
+    /// unknowns of these rows are 0 in [`Self::solve`], which then applies a generalized inverse.
     pub fn factor(&mut self) {
         let width = self.band + 1;
         for row in 0..self.size {
@@ -55,7 +55,7 @@ impl Banded {
             let at = |column: usize| self.band + column - row;
             let diagonal = own[self.band];
             for column in first..row {
-                // The range of columns, up to this one, in which both rows have entries.
+                // The first column in which both rows have entries.
                 let from = first.max(column.saturating_sub(self.band));
                 let other = &above[column * width..][..width];
                 let start = self.band + from - column;
@@ -101,7 +101,7 @@ impl Banded {
     }
 }
 
-/// The scalar product of two slices of the same length.
+/// Dot product of two slices of the same length.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -110,7 +110,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Springs from each of `count` nodes to the next two nodes; `support` holds the first node.
+    /// Assemble springs that connect each of `count` nodes to the next two nodes. A spring of stiffness
+    /// `support` holds the first node.
     fn chain(count: usize, support: f64) -> (Banded, Vec<Vec<f64>>) {
         let mut matrix = Banded::zero(count, 2);
         let mut full = vec![vec![0.0; count]; count];

@@ -31,7 +31,7 @@ impl Clock {
         [since, self.since.1, before, step, self.number]
     }
 
-    /// Decode the words of [`Self::words`] in a run that ends at `end` (s).
+    /// Decode a clock from [`Self::words`], in a run that ends at `end` (s).
     pub fn of_words([since, at, before, step, number]: [u64; 5], end: f64) -> Self {
         let [since, before, step] = [since, before, step].map(f64::from_bits);
         Self {
@@ -54,12 +54,12 @@ impl Clock {
         self.before
     }
 
-    /// Size of the step, s.
+    /// Length of the step, s.
     pub fn step(&self) -> f64 {
         self.step
     }
 
-    /// Number of steps made.
+    /// Number of completed steps.
     pub fn number(&self) -> u64 {
         self.number
     }
@@ -81,14 +81,14 @@ impl Clock {
         self.step = step;
     }
 
-    /// Return to the time before the last step, and change the step (s) from there on.
+    /// Return to the time before the last step, and continue from there with another step (s).
     pub fn retreat(&mut self, step: f64) {
         self.number -= 1;
         self.since = (self.before, self.number);
         self.step = step;
     }
 
-    /// Whether the next step differs in size from the last one, or is the first.
+    /// Whether the step has changed since the last step, or no step has been made.
     pub fn is_new_size(&self) -> bool {
         self.number == self.since.1
     }
@@ -99,7 +99,7 @@ impl Clock {
         self.end = end;
     }
 
-    /// Number of the step that reaches the end, if the step does not change.
+    /// Number of completed steps at the end, if the step does not change.
     pub fn last(&self) -> u64 {
         let (time, number) = self.since;
         number + steps_to(self.end - time, self.step) as u64
@@ -111,7 +111,7 @@ impl Clock {
     }
 }
 
-/// Number of steps (s) in a time (s), up to round-off; at least one.
+/// Number of steps of length `step` (s) in `time` (s), rounded up except for round-off; at least 1.
 pub fn steps_to(time: f64, step: f64) -> f64 {
     let steps = time / step;
     let whole = if (steps - steps.round()).abs() < 1e-9 * steps {

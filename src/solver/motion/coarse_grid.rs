@@ -25,37 +25,38 @@ use super::load_step::CHUNK;
 /// Minimum edge of a cell, horizons.
 const EDGE: f64 = 1.0;
 
-/// The factor by which edges grow until the matrix is small enough.
+/// Factor by which edges grow until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Multiply-adds of a solution per point: about as many as a force evaluation with few bonds needs.
+/// Allowed multiply-adds per point to solve with the factored matrix: about as many as a force evaluation
+/// with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// Multiply-adds of a solution that are allowed for a body of any size.
+/// Multiply-adds to solve with the factored matrix that are allowed for any number of points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.
 const FACTORIZATION: f64 = 2e8;
 
-/// Maximum number of nodes of a cell.
+/// Maximum number of nodes at the corners of a cell.
 const CORNERS: usize = 8;
 
 /// Maximum number of pairs of nodes of a cell.
 const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 
-/// The grid, and the factor of its stiffness matrix.
+/// The grid, and its stiffness matrix as a Cholesky factor.
 pub struct CoarseGrid<const D: usize> {
     lower: [f64; D],
     /// Cells per length along each axis, 1/m.
     per_length: [f64; D],
     cells: [usize; D],
-    /// Index distance of nodes, and of cells, that are adjacent along an axis.
+    /// Index difference of nodes, and of cells, that are adjacent along an axis.
     node_strides: [usize; D],
     cell_strides: [usize; D],
     matrix: Banded,
-    /// Forces on the nodes in rounding units, per thread.
+    /// Forces on the nodes in rounding units, one vector per task.
     parts: Vec<Vec<i64>>,
-    /// Sums of these forces over threads and ranks.
+    /// Sums of these forces over tasks and ranks.
     words: Vec<u64>,
     /// Displacements of the nodes by component, m.
     values: Vec<f64>,
@@ -64,16 +65,16 @@ pub struct CoarseGrid<const D: usize> {
 /// Contribution of a point to the stiffness of the grid.
 #[derive(Debug, Clone, Copy)]
 pub struct PointStiffness<const D: usize> {
-    /// λ V and G V, N m.
+    /// λ V and G V of the point, N m.
     pub moduli: [f64; 2],
-    /// Stiffness of its supported components, N/m; 0 if free.
+    /// Stiffness of the supported components, N/m; 0 for free components.
     pub springs: [f64; D],
 }
 
-/// The cell of a point, and the coordinates of the point in it.
+/// The cell of a point, and the position of the point in the cell.
 struct CellPosition<const D: usize> {
     cell: usize,
-    /// First node of the cell.
+    /// Index of the first node of the cell.
     node: usize,
     /// Coordinates from 0 to 1 along each axis.
     along: [f64; D],
@@ -208,7 +209,7 @@ impl<const D: usize> CoarseGrid<D> {
         self.matrix.factor();
     }
 
-    /// Solve for the displacements of the nodes under forces on the owned points (N/m³, by component).
+    /// Compute the displacements of the nodes under forces on the owned points (N/m³, by component).
     /// Collective.
     pub fn solve(&mut self, comm: &dyn Communicator, model: &Model<D>, force: &[Vec<f64>; D]) {
         let owned = model.owned();
@@ -253,7 +254,7 @@ impl<const D: usize> CoarseGrid<D> {
         self.matrix.solve(&mut self.values);
     }
 
-    /// A component of the displacement of an owned point after [`Self::solve`], m.
+    /// Interpolate a component of the displacement of an owned point (m) after [`Self::solve`].
     pub fn displacement(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let place = self.place(model, point);
         let of = |p: usize| place.weight(p) * self.values[(place.node + self.corner(p)) * D + d];
@@ -289,7 +290,8 @@ impl<const D: usize> CoarseGrid<D> {
         strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
     }
 
-    /// Stiffness of a cell per volume for λ V = 1 and for G V = 1, between components of its nodes.
+    /// Stiffness matrices of a cell between the components of its nodes, for λ = 1 and for G = 1, divided by
+    /// the volume of the cell.
     fn reference_stiffness(&self) -> [Vec<f64>; 2] {
         let mut both = [0; 2].map(|_| vec![0.0; (CORNERS * D) * (CORNERS * D)]);
         let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
@@ -342,29 +344,29 @@ impl<const D: usize> CellPosition<D> {
     }
 }
 
-/// Weight of the lower (0) or upper (1) end of a cell along an axis.
+/// Weight of the lower (`end` = 0) or upper (`end` = 1) face of a cell along an axis.
 fn weight(end: usize, along: f64) -> f64 {
     if end == 1 { along } else { 1.0 - along }
 }
 
-/// Pairs of nodes of a cell, p ≤ q.
+/// Pairs of nodes p and q of a cell, with p ≤ q.
 fn pairs<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     (0..1 << D).flat_map(|q| (0..=q).map(move |p| (p, q)))
 }
 
-/// Number of cells of a grid along each axis, and the numbering of its nodes.
+/// Number of cells along each axis, and the numbering of the nodes.
 struct Shape<const D: usize> {
     cells: [usize; D],
     node_strides: [usize; D],
     cell_strides: [usize; D],
-    /// Size and bandwidth of its matrix.
+    /// Size and bandwidth of the stiffness matrix.
     size: usize,
     band: usize,
 }
 
 impl<const D: usize> Shape<D> {
     /// Create the shape for a box with these lengths (m) and cells with at least this edge (m). Nodes are
-    /// numbered first along the axis with the fewest nodes, so the band is narrow.
+    /// numbered first along the axis with the fewest nodes, which gives the narrowest band.
     fn new(length: [f64; D], edge: f64) -> Self {
         let cells = length.map(|length| ((length / edge) as usize).max(1));
         let mut axes: [usize; D] = std::array::from_fn(|d| d);
@@ -393,8 +395,8 @@ mod tests {
     use crate::comm::threads;
     use crate::solver::palette_column::PaletteColumn;
 
-    /// Every `size`-th of 41 points, beginning with `first`. The points are 1 m apart and have a volume of
-    /// 1 m³.
+    /// Every `size`-th of 41 points, from point `first` on. The points are 1 m apart and have a volume of 1
+    /// m³.
     fn bar(first: usize, size: usize) -> (Model<1>, Vec<usize>) {
         let own: Vec<usize> = (first..41).step_by(size).collect();
         let model = Model {

@@ -1,19 +1,19 @@
-//! The time step that contact allows: shorter before stiff contact, longer again afterwards.
+//! Adjustment of the time step to contact: shorter before stiff contact, longer again afterwards.
 
 use crate::error::{Error, Result};
 use crate::problem::{Rigid, StepRule};
 use crate::solver::Simulation;
 use crate::solver::contact::Contact;
 
-/// Safety factor for a step that contact shortens, because contact probably stiffens further.
+/// Factor on a step that contact shortens, because the contact stiffness usually increases further.
 const CONTACT_RESERVE: f64 = 0.95;
 
 /// The step is lengthened only if it is below this fraction of the allowed step.
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a new step (s) if contact is too stiff for the present step, or if a longer step has been
-    /// possible for long enough. The new step divides the rest of the stage evenly.
+    /// Return a new step (s) if contact is too stiff for the present step, or if enough steps could have been
+    /// longer. The new step divides the rest of the stage evenly.
     pub fn step_for_contact(&self) -> Option<f64> {
         if self.is_quasi_static() {
             return None;
@@ -30,7 +30,8 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// The largest stable step (s) with the present contact.
+    /// The largest step that contact allows (s): the stable step with contact, times `safety` for automatic
+    /// steps. `None` in runs without contact.
     pub(in crate::solver) fn contact_limit(&self) -> Option<f64> {
         let contact = self.contact.as_ref()?;
         let safety = match self.time_rule().step {
@@ -40,7 +41,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
-    /// Count consecutive steps for which contact would allow a longer step.
+    /// Count consecutive steps that could have been longer with contact.
     pub(in crate::solver) fn count_calm_steps(&mut self) {
         let Some(limit) = self.contact_limit() else {
             return;

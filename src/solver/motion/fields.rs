@@ -1,32 +1,32 @@
-//! The fields of the points: one declaration for each, with its meaning and its handling.
+//! The fields of the points: one declaration each, with meaning, storage and output.
 //!
-//! Checkpoints, rollbacks and the result iterate over this list. A field that is added to it is saved,
+//! Checkpoints, rollbacks and the result iterate over the list of fields. A new field in this list is saved,
 //! rolled back and output as its description says. A field has one column of numbers per component.
 
 use crate::problem::{Action, Field, Problem};
 use crate::solver::bonds::{Broken, PlasticColumns};
 use crate::solver::model::Model;
 
-/// The meaning and the handling of a field.
+/// Name, unit and treatment of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Description {
     /// Name in standard terms.
     pub name: &'static str,
     /// SI unit.
     pub unit: &'static str,
-    /// Whether the field is part of the state of a run. Checkpoints contain state, and it migrates with its
-    /// points. Other fields are recomputed from the state.
+    /// Whether the field is part of the state of a run. The state is stored in checkpoints and migrates with
+    /// the points. Other fields are recomputed from the state.
     pub state: bool,
     /// Whether a rollback of a step restores the field.
     pub undone: bool,
-    /// Values of the field at a point that is created during a run, and at its parents when it is removed.
+    /// Effect of creating or removing a point during a run on the field.
     pub birth: Birth,
-    /// Name of the field in decks, if they can request it.
+    /// Name of the field in decks; `None` if decks cannot request it.
     pub output: Option<Field>,
 }
 
-/// Values that a new point gets from its parents, and values that a removed point returns to its parents,
-/// in equal parts.
+/// Values of a field that a new point gets from its parents, and values that a removed point returns to its
+/// parents in equal parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
@@ -44,7 +44,7 @@ pub enum Birth {
     FoundAnew,
 }
 
-/// A scalar, `Vec<f64>`, or a vector, `[Vec<f64>; D]`.
+/// A field as a slice of columns: a scalar is a `Vec<f64>`, a vector is a `[Vec<f64>; D]`.
 trait Columns {
     fn columns(&self) -> &[Vec<f64>];
     fn columns_mut(&mut self) -> &mut [Vec<f64>];
@@ -70,7 +70,7 @@ impl<const D: usize> Columns for [Vec<f64>; D] {
     }
 }
 
-/// Scalars, of which there may be none.
+/// A list of scalar fields, which may be empty.
 impl Columns for Vec<Vec<f64>> {
     fn columns(&self) -> &[Vec<f64>] {
         self
@@ -81,7 +81,7 @@ impl Columns for Vec<Vec<f64>> {
     }
 }
 
-/// A field that not every run has.
+/// A field that only some runs have.
 impl<T: Columns> Columns for Option<T> {
     fn columns(&self) -> &[Vec<f64>] {
         self.as_ref().map_or(&[], T::columns)
@@ -113,7 +113,7 @@ macro_rules! fields {
     };
 }
 
-/// A field of the state that a rollback restores.
+/// Description of a field of the state that a rollback restores.
 const STATE: Description = Description {
     name: "",
     unit: "",
@@ -123,14 +123,14 @@ const STATE: Description = Description {
     output: None,
 };
 
-/// A cumulative energy of the points.
+/// Description of a cumulative energy of the points.
 const ENERGY: Description = Description {
     unit: "J",
     birth: Birth::Shared,
     ..STATE
 };
 
-/// A force density that follows from the state.
+/// Description of a force density that is recomputed from the state.
 const FORCE_DENSITY: Description = Description {
     unit: "N/m^3",
     state: false,
@@ -138,11 +138,11 @@ const FORCE_DENSITY: Description = Description {
     ..STATE
 };
 
-/// Name of the field with one column per further result.
+/// Name of the field that has one column per further result.
 pub const NEWLY_BROKEN_OF_FURTHER: &str = "newly_broken_of_further";
 
 fields! {
-    /// u, m; first owned points, then ghosts.
+    /// Displacement u, m; owned points, then ghosts.
     displacement: [Vec<f64>; D] = Description {
         name: "displacement",
         unit: "m",
@@ -158,7 +158,7 @@ fields! {
         birth: Birth::FoundAnew,
         output: Some(Field::Temperature),
     };
-    /// Thermal stretch in the directions of the setting; first owned points, then ghosts; none without
+    /// Thermal stretch along the bar, in the plane, or in space; owned points, then ghosts. None without
     /// prescribed temperatures.
     thermal_stretch: Option<Vec<f64>> = Description {
         name: "thermal_stretch",
@@ -168,7 +168,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// u̇, m/s, at full steps, except between the steps of a [`Stepper`](crate::solver::Stepper).
+    /// Velocity u̇ at full steps, m/s. Between the steps of a [`Stepper`](crate::solver::Stepper), velocities
+    /// are those of half steps.
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",
@@ -210,12 +211,12 @@ fields! {
         output: Some(Field::NewlyBrokenBonds),
         ..STATE
     };
-    /// Energy that broken bonds have released at a point, J; none without damage.
+    /// Energy that broken bonds have released, per point, J; none without damage.
     freed_energy: Option<Vec<f64>> = Description {
         name: "freed_energy",
         ..ENERGY
     };
-    /// Part of the freed energy that bonds held above their criterion when they broke, J; none without
+    /// Part of the freed energy that was above the criterion of the bonds when they broke, J; none without
     /// damage.
     overshoot_energy: Option<Vec<f64>> = Description {
         name: "overshoot_energy",
@@ -236,7 +237,7 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Energy of the zero-energy control that an elastic body would have at a point, J/m³; none without
+    /// Energy of the zero-energy control that the point would have without plastic flow, J/m³; none without
     /// plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
@@ -251,12 +252,12 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Work done by loads and supports, J; none without them.
+    /// Work done by loads and supports, J; none without loads and supports.
     external_work: Option<Vec<f64>> = Description {
         name: "external_work",
         ..ENERGY
     };
-    /// Power that viscous damping dissipates, r ρ V u̇², W; none without it.
+    /// Power that viscous damping dissipates, r ρ V u̇², W; none without viscous damping.
     damping_power: Option<Vec<f64>> = Description {
         name: "damping_power",
         unit: "W",
@@ -302,13 +303,13 @@ fields! {
         name: "contact_damping_energy",
         ..ENERGY
     };
-    /// u̇ of the relaxation at half iterations, m per iteration; none without relaxation.
+    /// Velocity u̇ of the relaxation at half iterations, m per iteration; none without relaxation.
     relaxation_velocity: Option<[Vec<f64>; D]> = Description {
         name: "relaxation_velocity",
         unit: "m",
         ..STATE
     };
-    /// u at the last equilibrium, m; none without load steps.
+    /// Displacement u at the last equilibrium, m; none without load steps.
     equilibrium_displacement: Option<[Vec<f64>; D]> = Description {
         name: "equilibrium_displacement",
         unit: "m",
@@ -321,8 +322,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Fictitious density: upper bound of the stiffness of a point, N/m⁴. With it, an iteration of a
-    /// relaxation without contact is stable. None without load steps.
+    /// Fictitious density of a point, N/m⁴: an upper bound of its stiffness. Iterations of a relaxation
+    /// without contact are stable with this density. None without load steps.
     fictitious_density: Option<Vec<f64>> = Description {
         name: "fictitious_density",
         unit: "N/m^4",
@@ -331,7 +332,7 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Contribution of contact to the density of the relaxation, N/m⁴; none without contact or relaxation.
+    /// Contribution of contact to the fictitious density, N/m⁴; none without contact or relaxation.
     contact_density: Option<Vec<f64>> = Description {
         name: "contact_density",
         unit: "N/m^4",
@@ -348,13 +349,13 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Energy dissipated by viscous damping, J; none without it.
+    /// Energy dissipated by viscous damping, J; none without viscous damping.
     damped_energy: Option<Vec<f64>> = Description {
         name: "damped_energy",
         ..ENERGY
     };
-    /// Number of a point's bonds that have broken since the last output of each further result that has this
-    /// field; none without damage.
+    /// Number of a point's bonds that have broken since the last output of a further result; one column per
+    /// further result with this field. None without damage.
     newly_broken_of_further: Vec<Vec<f64>> = Description {
         name: NEWLY_BROKEN_OF_FURTHER,
         unit: "1",
@@ -363,7 +364,7 @@ fields! {
     };
 }
 
-/// The optional fields that a run needs; the same on all ranks.
+/// The quantities that decide which optional fields a run has; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Whether there are loads.
@@ -382,11 +383,11 @@ pub struct Needs {
     pub damage: bool,
     /// Number of further results with newly broken bonds.
     pub further_counts: usize,
-    /// Whether points keep a plastic state.
+    /// Whether any point has a plastic state.
     pub plasticity: bool,
     /// Whether there is contact.
     pub contact: bool,
-    /// Whether grids are coarsened again.
+    /// Whether refined regions are coarsened again.
     pub coarsening: bool,
 }
 
@@ -402,7 +403,7 @@ pub fn plastic_columns<'a>(
     std::array::from_fn(|_| columns.next().map(Vec::as_mut_slice).unwrap_or_default())
 }
 
-/// Density of the relaxation of the owned points, N/m⁴.
+/// Fictitious density of the owned points with the contribution of contact, N/m⁴.
 #[derive(Clone, Copy)]
 pub struct RelaxationDensity<'a> {
     bonds: &'a [f64],
@@ -410,7 +411,7 @@ pub struct RelaxationDensity<'a> {
 }
 
 impl RelaxationDensity<'_> {
-    /// Density of the relaxation at a point, N/m⁴.
+    /// Fictitious density of a point, N/m⁴.
     #[inline(always)]
     pub fn at(&self, point: usize) -> f64 {
         match self.contact {
@@ -420,12 +421,12 @@ impl RelaxationDensity<'_> {
     }
 }
 
-/// A component of the force densities of bonds and loads, N/m³.
+/// A component of the internal and external force densities, N/m³.
 #[derive(Clone, Copy)]
 pub struct Exerted<'a> {
-    /// Force density of the bonds.
+    /// Internal force density, of bonds and contact.
     pub internal: &'a [f64],
-    /// Force density of the loads, if there are any.
+    /// External force density of the loads; `None` in runs without loads.
     pub external: Option<&'a [f64]>,
 }
 
@@ -442,7 +443,7 @@ impl<'a> Exerted<'a> {
         }
     }
 
-    /// Sum of both at a point.
+    /// Sum of internal and external force density at a point.
     #[inline(always)]
     pub fn at(&self, k: usize) -> f64 {
         match self.external {
@@ -453,7 +454,7 @@ impl<'a> Exerted<'a> {
 }
 
 impl Needs {
-    /// The fields that a problem needs. `has_plasticity`: points of a law of the problem have a plastic state.
+    /// Find the needs of a problem. `has_plasticity` says whether a law of the problem has a plastic state.
     pub fn new(problem: &Problem, has_plasticity: bool) -> Self {
         let acts = |acts: fn(&Action) -> bool| {
             let mut conditions = problem.conditions.iter();
@@ -483,7 +484,8 @@ impl Needs {
 }
 
 impl<const D: usize> Fields<D> {
-    /// Iterate over the columns of the state, with the description of their field and their component.
+    /// Iterate over the columns of the state. Each item has the description of the field, the index of the
+    /// component, and the column.
     pub fn state(&self) -> impl Iterator<Item = (Description, usize, &Vec<f64>)> {
         let fields = self.each().filter(|(field, _)| field.state);
         fields.flat_map(|(field, columns)| {
@@ -556,12 +558,13 @@ impl<const D: usize> Fields<D> {
         self.acting(model, d, point) + reaction
     }
 
-    /// Book the energy and force of the bonds that broke at the end of a step (s).
+    /// Record the released energy and the lost force of the bonds that broke at the end of a step (s).
     ///
-    /// Their force acted in the first half kick of the step but not in the second. So the points received ½
-    /// F·Δℓ less energy from these bonds than the bonds held at the end. This difference stays with the
-    /// points. On average, a bond breaks in the middle of the step at whose end the break is detected. So
-    /// neither motion nor energy depends on the step to first order.
+    /// The force F of a breaking bond acted in the first half kick of the step, but not in the second. During
+    /// the step, the points therefore did ½ F·Δℓ less work on the bond than the bond held at the end of the
+    /// step. The points keep this difference. On average, a bond reaches its criterion in the middle of the
+    /// step at whose end the break is detected. Therefore neither motion nor energy depends on the step to
+    /// first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
         let velocity = &self.velocity;
         let (Some(count), Some(new), Some(freed), Some(overshoot)) = (
@@ -585,8 +588,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Add the contact forces on an owned point to the internal forces: the repulsion (N/m³) with its
-    /// potential (J), and the [booked](Self::book_dissipation) friction and damping.
+    /// Add the contact forces on an owned point to the internal forces. The forces are the repulsion (N/m³)
+    /// with its potential energy (J), and the friction and damping that [`Self::book_dissipation`] has
+    /// recorded.
     pub fn add_contact(&mut self, point: usize, repulsion: [f64; D], energy: f64) {
         let (Some(contact), Some(friction), Some(damping), Some(potential)) = (
             &mut self.contact_force,
@@ -603,7 +607,7 @@ impl<const D: usize> Fields<D> {
         potential[point] = energy;
     }
 
-    /// Clear the contact fields of an owned point without contact.
+    /// Set the contact fields of an owned point without contact to 0.
     pub fn clear_contact(&mut self, point: usize) {
         let columns = self.contact_force.iter_mut().flatten();
         let scalars = self
@@ -615,18 +619,18 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Clear friction and contact damping, which do not act in a relaxation.
+    /// Set friction and contact damping to 0, because they do not act in a relaxation.
     pub fn clear_dissipative_contact(&mut self) {
         let forces = [&mut self.friction, &mut self.contact_damping];
         let columns = forces.into_iter().flatten().flatten();
         columns.for_each(|column| column.fill(0.0));
     }
 
-    /// Density of the relaxation of each owned point (N/m⁴), with which an iteration is stable. It is
-    /// infinite for a point that does not take part because it has no bonds.
+    /// Fictitious density of each owned point (N/m⁴), with which iterations are stable. It is infinite for a
+    /// point without bonds, which does not move.
     ///
     /// # Panics
-    /// Without relaxation.
+    /// In a run without relaxation.
     pub fn relaxation_density(&self) -> RelaxationDensity<'_> {
         RelaxationDensity {
             bonds: self.fictitious_density.as_deref().expect("a relaxation"),
@@ -634,9 +638,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s). Book the
-    /// energy that they dissipated in this step, by the trapezoidal rule. Velocities are those in the
-    /// middle of the step.
+    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s). Add the energy
+    /// that they dissipated in this step, by the trapezoidal rule, with the velocities in the middle of the
+    /// step.
     pub fn book_dissipation(
         &mut self,
         point: usize,
@@ -672,14 +676,16 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds of one of the further results with this field.
+    /// Reset the count of newly broken bonds of a further result, given its index among those with this
+    /// count.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);
         }
     }
 
-    /// The columns of a field, if decks may ask for it and it is stored per point in this run; `None` otherwise.
+    /// The columns of a field; `None` if decks cannot request the field, or if this run does not store it per
+    /// point.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
             let there = !columns.is_empty() && description.output == Some(field);

@@ -1,17 +1,17 @@
 //! Load steps: from one equilibrium to the next, with any method.
 //!
-//! A load step advances the time, which is the load parameter, and with it loads and supports. A method
+//! A load step advances the time, which is the load parameter; loads and supports follow the time. A method
 //! then solves for the equilibrium: [`super::relaxation`] or [`super::newton`].
 //!
-//! Bonds break only at equilibria. Bonds that reach their criterion there break, and the next equilibrium
-//! is found at the same load, until no bond breaks. The history of bonds and points is part of the
-//! equilibrium. Each iteration computes the forces from trial values of the history: those after a step
-//! from the last equilibrium to the present positions. The history is stored at equilibrium.
+//! Bonds break only at equilibria. When bonds reach their criterion at an equilibrium, they break, and the
+//! next equilibrium is found at the same load, until no bond breaks. The history of bonds and points is part
+//! of the equilibrium. Iterations compute the forces from a trial history: the history after a step from the
+//! last equilibrium to the present positions. The history is stored at equilibrium.
 //!
-//! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). In a free body that is moved,
-//! loads and reactions are 0, and both sides are round-off. Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is also
-//! accepted as equilibrium. ρ is an upper bound of the stiffness of a point, so ε ‖V ρ u‖ is a bound of the
-//! forces from rounding u.
+//! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). In a free body that only moves
+//! rigidly, loads and reactions are 0, and both sides are round-off. Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is
+//! also accepted as equilibrium. ρ is an upper bound of the stiffness of a point, so ε ‖V ρ u‖ bounds the
+//! forces that come from rounding u.
 
 use rayon::prelude::*;
 
@@ -26,13 +26,13 @@ use crate::solver::model::Model;
 use super::Fields;
 use super::stable_step::largest_eigenvalue;
 
-/// Points handled by one task.
+/// Number of points that one task processes.
 pub(super) const CHUNK: usize = 4096;
 
-/// Factor from the stiffness bound to the fictitious density; it covers bonds that rotate.
+/// Factor from the stiffness bound to the fictitious density; the reserve covers bonds that rotate.
 const MARGIN: f64 = 1.2;
 
-/// Forces on the points below this fraction of ‖V ρ u‖ are round-off.
+/// The unbalanced force is round-off if its norm is below this fraction of ‖V ρ u‖.
 const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
 /// Progress of a load step; the same on all ranks.
@@ -42,13 +42,13 @@ pub struct LoadStep {
     pub iterations: u64,
     /// Number of iterations since bonds broke in this load step.
     pub since_breaking: u64,
-    /// ‖f‖/(‖loads‖ + ‖reactions‖), norms of the forces on the points. It is 0 if f is round-off, and NaN
+    /// ‖f‖/(‖loads‖ + ‖reactions‖), where f is the total force on a point. It is 0 if f is round-off, and NaN
     /// before the first load step.
     pub residual: f64,
-    /// Damping c of a relaxation; NaN at rest.
+    /// Damping c of a relaxation; NaN if all points are at rest.
     pub(super) damping: f64,
-    /// Largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N. The tolerance is relative to it, so it
-    /// does not shrink when a body is unloaded or breaks.
+    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, N. The tolerance is relative to this norm, so
+    /// it does not shrink when a body is unloaded or breaks.
     pub(super) scale: f64,
     /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,
@@ -74,13 +74,13 @@ impl Default for LoadStep {
 }
 
 impl LoadStep {
-    /// Message of the failure at a time (s).
+    /// Message for a load step that failed at a time (s).
     fn failure(&self, time: f64) -> String {
         let iterations = self.since_breaking;
         format!("t = {time:.6e} s: no equilibrium within {iterations} iterations")
     }
 
-    /// Compute the residual from the squared norms of [`balance`].
+    /// Compute the residual from the squared norms that [`balance`] returns.
     pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
         let scale = (loads + reactions).max(self.scale);
@@ -100,7 +100,7 @@ impl LoadStep {
         ]
     }
 
-    /// Decode the words of [`Self::words`].
+    /// Decode the state from [`Self::words`].
     pub fn of_words(words: [u64; 8]) -> Self {
         let [
             iterations,
@@ -126,14 +126,14 @@ impl LoadStep {
     }
 }
 
-/// Density (N/m⁴) with which iterations of Δt = 1 are stable. `eigenvalue` is the largest eigenvalue of D
-/// of [`super::stable_step`], N/m⁴.
+/// Fictitious density (N/m⁴) with which iterations of Δt = 1 are stable. `eigenvalue` is the largest
+/// eigenvalue of D of [`super::stable_step`], N/m⁴.
 pub fn stable_density(eigenvalue: f64) -> f64 {
     0.5 * MARGIN * eigenvalue
 }
 
-/// Upper bound of the stiffness of each owned point as a density (N/m⁴), with which iterations of Δt = 1
-/// are stable. It is infinite for a point without bonds. `stiffness` is D of [`super::stable_step`].
+/// Fictitious density of each owned point (N/m⁴): an upper bound of its stiffness, with which iterations of
+/// Δt = 1 are stable. It is infinite for a point without bonds. `stiffness` is D of [`super::stable_step`].
 pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     let density = |point: usize| {
         let entries = stiffness.each_ref().map(|column| column[point]);
@@ -166,8 +166,8 @@ pub(super) fn balance<const D: usize>(
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Record the last equilibrium, and advance time, loads and supports. If the step has the same size as
-    /// the last one and `extrapolates`, the points repeat their motion of the last load step.
+    /// Record the last equilibrium, and advance time, loads and supports. With `extrapolates`, the points
+    /// repeat their motion of the last load step if the step length has not changed.
     pub(super) fn begin_load_step(&mut self, extrapolates: bool) {
         self.walk(|part, mut here| {
             here.before_moving(part);
@@ -189,7 +189,7 @@ impl<const D: usize> Simulation<'_, D> {
         };
     }
 
-    /// Record the last equilibrium. If `again`, repeat the motion of the last load step.
+    /// Record the last equilibrium. With `again`, repeat the motion of the last load step.
     fn note_equilibrium(&mut self, again: bool) {
         let owned = self.model.owned();
         let fields = &mut self.fields;
@@ -213,8 +213,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Evaluate forces and reactions at the present positions, with the history that the points would have
-    /// if this were the equilibrium of the load step. Collective.
+    /// Evaluate forces and reactions at the present positions, with the history for an equilibrium at these
+    /// positions. Collective.
     pub(super) fn evaluate_at_rest(&mut self) {
         self.evaluate(self.bond_update_at_rest());
         self.apply_velocities();
@@ -233,7 +233,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Time increment of the bond history at the next equilibrium (s). The history advances once per load
-    /// step, no matter how often bonds break.
+    /// step, even if the load step has several equilibria.
     fn time_to_advance(&self) -> f64 {
         if self.load_step.has_broken {
             0.0
@@ -242,8 +242,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Bond update for a force evaluation at the present positions that does not change the state. During a
-    /// load step, it uses the history that bonds would have if this were the equilibrium.
+    /// Bond update for a force evaluation that does not change the state. During a load step, bonds have the
+    /// history for an equilibrium at the present positions.
     pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
         if self.load_step.is_settled {
             BondUpdate::None
@@ -252,8 +252,9 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// At equilibrium, break the bonds that reach their criterion. If none does, the load step is finished.
-    /// Returns whether any bond broke; in this case, the forces are still those before the breaks.
+    /// Break the bonds that reach their criterion at the present equilibrium. If no bond breaks, the load
+    /// step is finished. Returns whether any bond broke. If so, the forces still include those of the broken
+    /// bonds.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;
@@ -281,7 +282,7 @@ impl<const D: usize> Simulation<'_, D> {
         contact.map_or(ExactSum::ZERO, |contact| contact.rigid_forces().clone())
     }
 
-    /// Raise `scale` to the loads and reactions of the present equilibrium, if they are larger.
+    /// Raise `scale` to the norms of loads and reactions at the present equilibrium, if they are larger.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, mut reactions] = sums(model, fields, |point, _| {
@@ -297,11 +298,10 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.scale = self.load_step.scale.max(scale);
     }
 
-    /// Return an error if the present load step has failed. Collective.
+    /// Return an error if the load step has failed. Collective.
     ///
     /// # Errors
-    /// The message names a piece that is loaded but not supported, if there is one. Otherwise, it gives the
-    /// residual reached.
+    /// The message names a piece that has loads but no supports, or the residual if there is no such piece.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.load_step.has_failed {
             return Ok(());

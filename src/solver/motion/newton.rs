@@ -1,6 +1,6 @@
 //! Equilibria by an inexact Newton method with conjugate gradients.
 //!
-//! [`super::load_step`] defines an equilibrium, and when bonds break. An iteration is
+//! [`super::load_step`] defines the equilibrium and when bonds break. An iteration is
 //!
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
@@ -8,24 +8,24 @@
 //! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: nonlinearity of the forces
 //! ```
 //!
-//! η follows Eisenstat & Walker 1996, the differences Knoll & Keyes 2004. f includes the reactions, so it
-//! is 0 for supported components. All differences use the history of the last equilibrium with its trial
-//! update, so K is the consistent tangent at points that yield. ε is limited so that no point moves by more
-//! than `SHIFT` horizons. The relative error of the difference is then of the order of `SHIFT` for bonds
-//! that rotate, and of the order of (machine ε)/`SHIFT` from rounding.
+//! η follows Eisenstat & Walker 1996, the differences Knoll & Keyes 2004. f includes the reactions, so f is 0
+//! for supported components. All differences use the history of the last equilibrium with its trial update,
+//! so K is the consistent tangent at points that yield. ε is limited so that no point moves by more than
+//! `SHIFT` horizons. The relative error of the difference is then of the order of `SHIFT` for bonds that
+//! rotate, and of the order of (machine ε)/`SHIFT` from rounding.
 //!
 //! K is symmetric for laws with an energy. In a body that softens or buckles, K may not be positive
 //! definite. The conjugate gradients then stop at the first direction of negative curvature. The
 //! preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
 //! (`coarse_grid.rs`), for long waves.
 //!
-//! If a load step differs in size from the last one, or if bonds broke in the last one, the first
-//! iteration linearizes about the last equilibrium. The prescribed displacements are then part of the
-//! motion. Otherwise, the points first repeat their motion of the last load step.
+//! The first iteration of a load step linearizes about the last equilibrium in two cases: the size of the
+//! load step has changed, or bonds broke in the last load step. The prescribed displacements are then part of
+//! the motion. Otherwise, the points first repeat their motion of the last load step.
 //!
-//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. If
-//! bonds have broken in it, its load has been reached, and it is not repeated. The smaller load steps
-//! continue up to the end of the original load step.
+//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. It is not
+//! repeated if bonds have broken in it, because an equilibrium at its full load was then found. The smaller
+//! load steps continue up to the end of the original load step.
 
 use std::time::Instant;
 
@@ -42,7 +42,7 @@ use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
 use super::load_step::{CHUNK, sums};
 
-/// Largest component of the motion of a point in a difference, horizons.
+/// Largest displacement component of a point in a finite difference, horizons.
 const SHIFT: f64 = 1e-6;
 
 /// Maximum number of conjugate gradient iterations per Newton iteration.
@@ -61,17 +61,17 @@ const MOST_FORCING: f64 = 0.1;
 /// Lower bound of the tolerance of the linear problem, as a fraction of the tolerance of the load step.
 const LINEAR_TOLERANCE_SHARE: f64 = 0.5;
 
-/// Lower bound of the fraction of intact bonds in the diagonal.
+/// Lower bound of the fraction of intact bonds in the diagonal of the preconditioner.
 const LEAST_INTACT: f64 = 1e-3;
 
 /// State of the method between load steps; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonState {
-    /// Number of force evaluations of the present load step, with either method.
+    /// Number of force evaluations of the present load step, with any method.
     pub evaluations: u64,
     /// η of the next iteration.
     forcing: f64,
-    /// Mean of the diagonal of K over the fictitious density; NaN until it is computed.
+    /// Mean of the diagonal of K divided by the fictitious density; NaN until it is computed.
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,
@@ -104,7 +104,7 @@ impl NewtonState {
         ]
     }
 
-    /// Decode the words of [`Self::words`].
+    /// Decode the state from [`Self::words`].
     pub fn of_words([evaluations, forcing, diagonal, halvings, left]: [u64; 5]) -> Self {
         let [forcing, diagonal] = [forcing, diagonal].map(f64::from_bits);
         Self {
@@ -117,10 +117,10 @@ impl NewtonState {
     }
 }
 
-/// Newton–Krylov method with its vectors.
+/// Newton–Krylov method with its work vectors.
 pub struct NewtonKrylov<const D: usize> {
     rule: Static,
-    /// Allocated in the first iteration.
+    /// The work vectors; `None` before the first iteration.
     vectors: Option<Vectors<D>>,
 }
 
@@ -163,14 +163,14 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
     }
 }
 
-/// Vectors over the owned points.
+/// Work vectors over the owned points.
 struct Vectors<const D: usize> {
-    /// u about which differences are computed, m, and f at this u, N/m³.
+    /// Displacement u at which differences are computed (m), and force density f at u (N/m³).
     base: [Vec<f64>; D],
     force: [Vec<f64>; D],
-    /// x, m.
+    /// Correction x, m.
     correction: [Vec<f64>; D],
-    /// f − K x, N/m³.
+    /// Residual f − K x of the linear problem, N/m³.
     residual: [Vec<f64>; D],
     /// Present search direction, m.
     direction: [Vec<f64>; D],
@@ -266,7 +266,7 @@ impl<const D: usize> Vectors<D> {
         simulation.newton.adapt(linear, force);
     }
 
-    /// Store the forces at the base.
+    /// Store the total forces at the base u, and start the linear residual with them.
     fn note_force(&mut self, simulation: &Simulation<'_, D>) {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {
@@ -281,15 +281,15 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Improve x until ‖f − K x‖ is small. Always stop when it is below `allowed`, the norm ‖f‖ that is
-    /// accepted as equilibrium (N). Collective.
+    /// Improve x by conjugate gradients until ‖f − K x‖ is small. The tolerance is at least
+    /// `LINEAR_TOLERANCE_SHARE` times `allowed`, the norm ‖f‖ (N) that is accepted as equilibrium. Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
         let wanted = simulation.newton.forcing * first;
         let wanted = wanted.max(LINEAR_TOLERANCE_SHARE * allowed);
-        // Inner product of residual and preconditioned residual at the last direction, and the step length
-        // along it.
+        // Inner product of the residual and the preconditioned residual at the last direction, and the step
+        // length along this direction.
         let (mut power, mut length) = (f64::NAN, 0.0);
         for number in 0..MAX_CG_ITERATIONS {
             if linear.last.is_nan() || linear.last <= wanted {
@@ -297,7 +297,7 @@ impl<const D: usize> Vectors<D> {
             }
             self.precondition(simulation);
             let own = dot(simulation, &self.residual, &self.preconditioned);
-            // The residual changed by −`length` · K · (last direction).
+            // Along the last direction, the residual has changed by −`length` · K · direction.
             let kept = if number == 0 {
                 0.0
             } else {
@@ -383,12 +383,12 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Line search: move the points along x until |x·f| is small, and compute the residual there. Returns
+    /// Move the points along x until |x·f| is small, and compute the residual at the new positions. Returns
     /// ‖f‖, N. Collective.
     fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
         let at_base = dot(simulation, &self.force, &self.correction);
         let mut length = 1.0;
-        // Step lengths that bracket the sign change of x·f, with the values of x·f.
+        // Step lengths on both sides of the sign change of x·f, with their values of x·f.
         let (mut below, mut above) = ((0.0, at_base), None);
         for place in 1.. {
             move_from(simulation, &self.base, length, &self.correction);
@@ -421,7 +421,7 @@ impl<const D: usize> Vectors<D> {
         unreachable!("the loop returns")
     }
 
-    /// x·f of the present forces, J. Collective.
+    /// Product x·f of the correction with the total forces at the present positions, J. Collective.
     fn power(&self, simulation: &Simulation<'_, D>) -> f64 {
         let (model, fields) = (&simulation.model, &simulation.fields);
         let power = sums(model, fields, |point, _| {
@@ -431,7 +431,7 @@ impl<const D: usize> Vectors<D> {
         reduce(simulation.comm, &mut { power })[0]
     }
 
-    /// Recompute the preconditioner for the intact bonds, if bonds have broken since. Collective.
+    /// Recompute the preconditioner if bonds have broken since its last computation. Collective.
     fn refresh(&mut self, simulation: &mut Simulation<'_, D>) {
         if !std::mem::take(&mut self.is_stale) {
             return;
@@ -493,8 +493,8 @@ impl<const D: usize> Vectors<D> {
         });
     }
 
-    /// Estimate the mean of the diagonal of K over the fictitious density: for a vector s of random signs,
-    /// s·K s approximates the trace of K (Hutchinson 1990). Collective.
+    /// Estimate the mean of the diagonal of K divided by the fictitious density. For a vector s of random
+    /// signs, s·K s approximates the trace of K (Hutchinson 1990). Collective.
     fn measure_diagonal(&mut self, simulation: &mut Simulation<'_, D>) {
         let owned = simulation.model.owned();
         for d in 0..D {
@@ -532,7 +532,7 @@ impl<const D: usize> Vectors<D> {
         simulation.evaluate_at_rest();
     }
 
-    /// Repeat the load step with half its size, or mark it as failed. Collective.
+    /// Repeat the load step with half its size if this is allowed, otherwise mark it as failed. Collective.
     fn bisect_or_fail(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let can_be_halved = !simulation.load_step.has_broken
             && simulation.newton.halvings < rule.max_halvings
@@ -557,8 +557,7 @@ struct Linear {
 }
 
 impl NewtonState {
-    /// Choose the next η from the difference between the force norm `force` (N) and that of the linear
-    /// problem.
+    /// Choose the next η from the new force norm `force` (N) and the norms of the linear problem.
     fn adapt(&mut self, linear: Linear, force: f64) {
         let forcing = (force - linear.last).abs() / linear.first;
         if forcing.is_finite() {
@@ -568,7 +567,7 @@ impl NewtonState {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return to the last equilibrium, and halve the load step.
+    /// Return to the last equilibrium, and halve the size of the load step.
     fn return_to_equilibrium(&mut self) {
         let fields = &mut self.fields;
         for (d, equilibrium) in fields.equilibrium_displacement.iter().flatten().enumerate() {
@@ -584,7 +583,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.newton.left *= 2;
     }
 
-    /// After a load step: if it was the last part of a halved one, restore the original size.
+    /// Count a finished load step. At the end of the original load step, restore the original size.
     fn end_halves(&mut self) {
         self.newton.left -= 1;
         if self.newton.left > 0 {
@@ -599,7 +598,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Move the points to the base plus a multiple of a direction.
+/// Move the points to the base plus `length` times a direction.
 fn move_from<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     base: &[Vec<f64>; D],
@@ -624,7 +623,7 @@ fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; 
     }
 }
 
-/// Scalar product of a force density and a displacement, weighted by volume, J. Collective.
+/// Dot product of a force density and a displacement, weighted by volume, J. Collective.
 fn dot<const D: usize>(
     simulation: &Simulation<'_, D>,
     a: &[Vec<f64>; D],

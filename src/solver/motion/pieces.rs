@@ -1,4 +1,4 @@
-//! Pieces of the bodies: sets of points that intact bonds connect, and the check that supports hold them.
+//! Pieces: sets of points that intact bonds connect, and the check that supports hold the loaded pieces.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// A sum of loads below this fraction of the sum of their magnitudes is round-off.
 const ROUND_OFF: f64 = 1e-9;
 
-/// Data of the piece of each local point; the same at all points of a piece.
+/// Columns with one entry per local point; all points of a piece have the same entries.
 struct Pieces<const D: usize> {
     /// Smallest point id of the piece.
     first: Vec<f64>,
@@ -24,7 +24,7 @@ struct Pieces<const D: usize> {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Search for a piece that is loaded along an axis in which no support holds it. Collective.
+    /// Return an error if a piece has a load along an axis along which no support holds it. Collective.
     ///
     /// # Errors
     /// The message names the piece with the smallest point id.
@@ -93,7 +93,7 @@ impl<const D: usize> Simulation<'_, D> {
         (0..D).find(unbalanced).map(|d| (d, sums[d]))
     }
 
-    /// Find the pieces of all bodies. Collective.
+    /// Find the piece of each local point. Collective.
     fn find_pieces(&mut self) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {
@@ -101,7 +101,8 @@ impl<const D: usize> Simulation<'_, D> {
             is_free: self.conditions.free_components(local),
             is_unloaded: std::array::from_fn(|_| vec![1.0; local]),
         };
-        // A point without bonds in its reference family takes no part in a relaxation.
+        // A point without bonds in its reference family does not move in a relaxation, so its loads do not
+        // count.
         let density = self.fields.fictitious_density.as_deref();
         if let (Some(force), Some(density)) = (&self.fields.external_force, density) {
             for (is_unloaded, force) in pieces.is_unloaded.iter_mut().zip(force) {

@@ -1,6 +1,6 @@
 //! Adaptive dynamic relaxation: from one equilibrium to the next.
 //!
-//! A load step advances the time, which is the load parameter, and with it loads and supports. The points
+//! A load step advances the time, which is the load parameter; loads and supports follow the time. The points
 //! first repeat their motion of the last load step. Then the motion ρ ü + c ρ u̇ = f with a fictitious
 //! density ρ is integrated with Δt = 1 until it comes to rest (Underwood 1983; Kilic & Madenci 2010):
 //!
@@ -10,12 +10,12 @@
 //! c ← 2 √(u̇·¹K u̇ / u̇·ρ u̇),   ¹K u̇ = −(f_new − f_old)
 //! ```
 //!
-//! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1; it follows from the row
-//! sums of the stiffness. c damps the present motion critically. Its Rayleigh quotient uses u̇ rather than
-//! u, because the diagonal ¹K of the secants is known exactly along u̇. All sums are exact, so the result
-//! is bitwise independent of ranks and threads.
+//! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1; it follows from the row sums
+//! of the stiffness. c is the critical damping of the present motion. It is a Rayleigh quotient with u̇
+//! rather than u, because differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the result is
+//! bitwise independent of ranks and threads.
 //!
-//! [`super::load_step`] defines an equilibrium, and when bonds break.
+//! [`super::load_step`] defines the equilibrium and when bonds break.
 //!
 //! Contact is part of the equilibrium. Its repulsion has a potential; neither friction nor damping acts.
 //! Points in contact add the contact stiffness to ρ while they touch. Driven rigid bodies move with time,
@@ -33,7 +33,7 @@ use crate::solver::Simulation;
 use super::integrator::Integrator;
 use super::load_step::{CHUNK, balance, sums};
 
-/// Damped iterations towards each equilibrium.
+/// Integrator of dynamic relaxation: damped iterations towards each equilibrium.
 pub struct DynamicRelaxation(pub Relaxation);
 
 impl<const D: usize> Integrator<D> for DynamicRelaxation {
@@ -46,15 +46,15 @@ impl<const D: usize> Integrator<D> for DynamicRelaxation {
 /// Upper limit of the damping c; from c = 2 on, the velocity would change its sign.
 const MOST_DAMPING: f64 = 1.9;
 
-/// Sums before the forces are recomputed: u̇·f and u̇·ρ u̇, J.
+/// Sums with the forces before an evaluation: u̇·f and u̇·ρ u̇, J.
 struct Before {
     power: ExactSum,
     inertia: ExactSum,
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Make one iteration towards the equilibrium of this load step. If it has been found, begin the next
-    /// load step. Collective.
+    /// Make one iteration towards the equilibrium of the load step. If the last load step is finished, begin
+    /// the next one. Collective.
     fn relax(&mut self, rule: &Relaxation) {
         let (start, forces) = (Instant::now(), self.times.forces.whole());
         let before = if self.load_step.is_settled {

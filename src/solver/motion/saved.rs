@@ -1,4 +1,4 @@
-//! The state of a run, ordered by global ids, as a checkpoint stores it.
+//! The state of a run in the layout of checkpoints: points are ordered by global id.
 //!
 //! It consists of the fields that are declared as state, and the bond state.
 
@@ -18,7 +18,7 @@ use super::newton::NewtonState;
 /// The state of the points in this rank's range of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Saved {
-    /// The components of all fields that are state.
+    /// The columns of all fields of the state.
     pub columns: Vec<SavedColumn>,
     /// State of the bonds.
     pub bonds: SavedBonds,
@@ -29,38 +29,38 @@ pub struct Saved {
 /// A component of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedColumn {
-    /// Name of the field and index of the component, or name of the further result whose newly broken bonds it
-    /// counts.
+    /// Name of the field and index of the component. For a count of newly broken bonds, the name of the
+    /// further result.
     pub name: String,
-    /// Value of each point.
+    /// Values of the points, ordered by id.
     pub values: Vec<f64>,
 }
 
 /// Bond state of the points in this rank's range of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedBonds {
-    /// Number of bytes of each point.
+    /// Number of bytes for each point.
     pub lengths: Vec<u32>,
-    /// Bytes of the points in order.
+    /// Bytes of all points, ordered by id.
     pub bytes: Vec<u8>,
 }
 
-/// Start of the names of columns that count newly broken bonds of a further result. A restart may change the
-/// further results.
+/// Prefix of the names of columns that count newly broken bonds for a further result. Such columns may be
+/// missing in a checkpoint, because a restart may change the further results.
 const NEWLY_BROKEN_OF: &str = "newly_broken_of_";
 
-/// The part of the words of a progress that is not decoded yet.
+/// The words of the progress that are not decoded yet.
 struct Words<'a>(&'a [u64]);
 
 impl<'a> Words<'a> {
-    /// Decode the next words.
+    /// Take the next `N` words.
     fn next<const N: usize>(&mut self) -> [u64; N] {
         let (words, rest) = self.0.split_first_chunk().expect("enough words");
         self.0 = rest;
         *words
     }
 
-    /// Return the next `count` words.
+    /// Take the next `count` words.
     fn split(&mut self, count: usize) -> &'a [u64] {
         let (words, rest) = self.0.split_at(count);
         self.0 = rest;
@@ -69,7 +69,7 @@ impl<'a> Words<'a> {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Encode the progress of the run, without point data.
+    /// Encode the progress of the run, which does not include point data.
     pub fn progress(&self) -> Vec<u64> {
         let mut words = self.progress_without_factors();
         words.extend(self.load_factors.words());
@@ -95,7 +95,7 @@ impl<const D: usize> Simulation<'_, D> {
         words
     }
 
-    /// Restore the progress from [`Self::progress`].
+    /// Restore the progress from the words of [`Self::progress`].
     pub(in crate::solver) fn continue_from(&mut self, progress: &[u64]) {
         let mut words = Words(progress);
         let [stage] = words.next();
@@ -118,7 +118,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_factors = LoadFactors::of_words(words.0, self.problem.conditions.len());
     }
 
-    /// Name of a component of a field of the state.
+    /// Name of a column of the state in checkpoints.
     fn column_name(&self, field: Description, component: usize) -> String {
         if field.name == NEWLY_BROKEN_OF_FURTHER {
             let output = self.problem.further_counts().nth(component);
@@ -135,7 +135,7 @@ impl<const D: usize> Simulation<'_, D> {
         names.collect()
     }
 
-    /// The present state, distributed to ranks by id. Collective.
+    /// Collect the present state, with points distributed to ranks by id. Collective.
     pub fn save(&self, order: &IdOrder) -> Saved {
         Saved {
             columns: self.saved_columns(order).collect(),
@@ -144,7 +144,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// The columns of the state one by one. Each is distributed by id when it is requested. Collective.
+    /// Iterate over the columns of the state. Each column is distributed to ranks by id when it is requested.
+    /// Collective.
     pub fn saved_columns(&self, order: &IdOrder) -> impl Iterator<Item = SavedColumn> {
         let owned = self.model.owned();
         let state = self.fields.state();
@@ -154,7 +155,7 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// The bond state, distributed by id. Collective.
+    /// Collect the bond state, distributed to ranks by id. Collective.
     pub fn saved_bonds(&self, order: &IdOrder) -> SavedBonds {
         let own = self.forces.saved_lengths(self.model.owned());
         let bytes = self.forces.saved(&own);
@@ -182,7 +183,7 @@ impl<const D: usize> Simulation<'_, D> {
         for (column, name) in self.fields.state_mut().zip(&names) {
             let mut columns = saved.columns.iter();
             let Some(saved) = columns.find(|saved| saved.name == *name) else {
-                // A further result is new and has no count yet.
+                // The checkpoint has no count for a further result that the restart adds.
                 column.fill(0.0);
                 continue;
             };
@@ -194,7 +195,8 @@ impl<const D: usize> Simulation<'_, D> {
         Ok(())
     }
 
-    /// Check that a saved state has the columns with these names and the bonds with these lengths.
+    /// Check that a saved state has the columns with these names, the bonds with these lengths, and the
+    /// length of the progress.
     fn fits(&self, names: &[String], lengths: &[u32], saved: &Saved) -> Result<()> {
         let error = |what: String| Err(Error::run(format!("the checkpoint {what}")));
         let saved_names: Vec<&str> = (saved.columns.iter())

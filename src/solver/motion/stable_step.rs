@@ -12,8 +12,8 @@ use crate::comm::{self, Communicator};
 
 use crate::solver::model::Model;
 
-/// Stable step (s) over all ranks; infinite if no point has a bond. `stiffness` is D of each owned point
-/// (N/m⁴) as columns xx, yy, zz, xy, yz, xz.
+/// Return the stable step over all ranks, s; infinite if no point has a bond. `stiffness` is D of each owned
+/// point (N/m⁴) as columns xx, yy, zz, xy, yz, xz.
 pub fn stable_step<const D: usize>(
     comm: &dyn Communicator,
     model: &Model<D>,
@@ -21,8 +21,7 @@ pub fn stable_step<const D: usize>(
 ) -> f64 {
     let own = (0..model.owned())
         .into_par_iter()
-        // Inside a body, consecutive points usually have equal families and equal entries, so the last
-        // result is reused.
+        // Inside a body, consecutive points usually have equal entries, so the last result is reused.
         .map_init(Default::default, |last: &mut ([f64; 6], f64), point| {
             let entries = stiffness.each_ref().map(|column| column[point]);
             if entries != last.0 {

@@ -1,4 +1,4 @@
-//! Rollback of a step: restore fields, bonds and clock to their values before it.
+//! Rollback of a step: restore the state of the run before the step.
 
 use crate::solver::Simulation;
 use crate::solver::bonds::KeptBonds;
@@ -6,19 +6,19 @@ use crate::solver::contact::{Contact, ContactState};
 
 use super::Clock;
 
-/// Copy of the state of a run at the end of a step. Memory is allocated only if a run needs it.
+/// Copy of the state of a run at the end of a step; empty in runs without rollbacks.
 #[derive(Debug, Default)]
 pub struct Kept {
     clock: Option<Clock>,
     fields: Vec<Vec<f64>>,
     bonds: KeptBonds,
     contact: Option<ContactState>,
-    /// Factors of the loads.
+    /// Factors of the loads in the current step.
     load_factors: Vec<f64>,
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Copy the present state. Memory of an earlier copy is reused.
+    /// Copy the present state into `kept`, whose memory is reused.
     pub fn keep(&self, kept: &mut Kept) {
         kept.clock = Some(self.clock);
         let columns = self.fields.each().filter(|(field, _)| field.undone);
@@ -38,7 +38,7 @@ impl<const D: usize> Simulation<'_, D> {
         kept.contact = self.contact.as_ref().map(Contact::state);
     }
 
-    /// Restore the copied state. Repeating the same steps gives bitwise the same results.
+    /// Restore the copied state. If the same steps are repeated, their results are bitwise the same.
     pub fn undo(&mut self, kept: &Kept) {
         let Some(clock) = kept.clock else { return };
         self.clock = clock;

@@ -10,7 +10,7 @@ use crate::solver::model::Model;
 use super::integrator::Integrator;
 use super::walk::{Moving, Part};
 
-/// Verlet integrator with the step of the stage, or shorter steps if contact needs them.
+/// Verlet integrator with the step of the stage. Contact may require shorter steps.
 pub struct Verlet;
 
 impl<const D: usize> Integrator<D> for Verlet {
@@ -32,7 +32,7 @@ fn constants<const D: usize>(model: &Model<D>, block: u16) -> Constants {
     (model.density[block], model.damping[block])
 }
 
-/// The constants, if all points of the part have the same ones. The compiler can then vectorize over
+/// Return the constants if all points of the part have the same ones. The compiler can then vectorize over
 /// points.
 fn same_constants<const D: usize>(part: &Part<'_, D>) -> Option<Constants> {
     let (first, others) = part.blocks().split_first()?;
@@ -40,7 +40,8 @@ fn same_constants<const D: usize>(part: &Part<'_, D>) -> Option<Constants> {
     is_same.then(|| constants(part.model, *first))
 }
 
-/// Half a kick with the forces at the old positions, then the drift: u̇ += ½ Δt ü, u += Δt u̇. `step` in s.
+/// Apply half a kick with the forces at the old positions, then the drift: u̇ += ½ Δt ü, u += Δt u̇. `step`
+/// is Δt, s.
 pub fn half_kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) {
     for_each_component(part, |place, velocity, force, (density, damping)| {
         let mut total = force;
@@ -53,8 +54,8 @@ pub fn half_kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) {
     });
 }
 
-/// Half a kick with the forces at the new positions. Damping uses the final velocity: u̇ ← (u̇ + ½ Δt
-/// f/ρ)/(1 + ½ r Δt). Returns whether all velocities are finite. `step` in s.
+/// Apply half a kick with the forces at the new positions. The damping uses the final velocity: u̇ ← (u̇ + ½
+/// Δt f/ρ)/(1 + ½ r Δt). Returns whether all velocities are finite. `step` is Δt, s.
 pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
     for_each_component(part, |_, velocity, force, (density, damping)| {
         *velocity += 0.5 * step * (force / density);
@@ -65,8 +66,8 @@ pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bo
     })
 }
 
-/// Fuse [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next step of the same length (s).
-/// Both are adjacent, and there is no damping. The results are bitwise the same.
+/// Apply [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next step in one loop. The steps
+/// have the same length (s), and there is no damping. The results are bitwise the same as with two loops.
 pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
     for_each_component(part, |place, velocity, force, (density, _)| {
         let half_kick = 0.5 * step * (force / density);
@@ -106,7 +107,7 @@ fn for_each_point(
     let (places, velocities) = (&mut moving.displacement[..count], moving.velocity);
     let internal = &moving.force.internal[..count];
     let mut all = true;
-    // The loop exists twice, so that the check for external forces is outside of it.
+    // The loop exists twice, so that it does not contain the check for external forces.
     match moving.force.external {
         None => {
             for k in 0..count {

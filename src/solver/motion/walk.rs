@@ -1,5 +1,5 @@
-//! A loop over the owned points in parts, on several threads. A part is small enough to stay in the cache
-//! for all work on it.
+//! A loop over the owned points in parts, on several threads. A part is small enough that its fields stay in
+//! the cache.
 
 use rayon::iter::split;
 use rayon::prelude::*;
@@ -13,14 +13,14 @@ use super::fields::Exerted;
 /// Number of points of a part; the last part may have fewer.
 pub const PART: usize = 2048;
 
-/// A column of numbers of some points for each of `N` components.
+/// For each of `N` components, a column with one number per point of a part.
 type Columns<'a, const N: usize> = [&'a mut [f64]; N];
 
 /// A part of the owned points with their fields.
 pub struct Part<'a, const D: usize> {
-    /// The points and their constants.
+    /// All local points and their constants.
     pub model: &'a Model<D>,
-    /// Local index of the first point.
+    /// Local index of the first point of the part.
     pub first: usize,
     /// Entries of [`Fields::displacement`].
     pub displacement: Columns<'a, D>,
@@ -43,7 +43,7 @@ pub struct Part<'a, const D: usize> {
     bond_inputs: BondInputs<'a, D>,
 }
 
-/// One component of the motion of some points, and of the forces on them.
+/// One component of the motion of the points of a part, and of the forces on them.
 pub struct Moving<'a> {
     /// Displacements, m.
     pub displacement: &'a mut [f64],
@@ -51,7 +51,7 @@ pub struct Moving<'a> {
     pub velocity: &'a mut [f64],
     /// Force densities, N/m³.
     pub force: Exerted<'a>,
-    /// Reactions, N/m³, if there are any.
+    /// Reactions, N/m³; `None` in runs without supports.
     pub reaction: Option<&'a mut [f64]>,
 }
 
@@ -84,22 +84,22 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Number of points.
+    /// Number of points of the part.
     pub fn count(&self) -> usize {
         self.velocity[0].len()
     }
 
-    /// Blocks of the points.
+    /// Blocks of the points of the part.
     pub fn blocks(&self) -> &'a [u16] {
         &self.model.block[self.first..self.first + self.count()]
     }
 
-    /// Entries of these points in a field of all owned points.
+    /// Return the entries of the part's points from a field over all owned points.
     pub fn of<'f>(&self, field: &'f [Vec<f64>; D]) -> [&'f [f64]; D] {
         (field.each_ref()).map(|column| &column[self.first..self.first + self.count()])
     }
 
-    /// One component of the motion.
+    /// Return one component of the motion.
     pub fn component(&mut self, d: usize) -> Moving<'_> {
         Moving {
             displacement: self.displacement[d],
@@ -112,8 +112,8 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Compute the power of damping at the present velocities. Add the energy that damping dissipates in a
-    /// step (s), by the trapezoidal rule.
+    /// Compute the power of viscous damping at the present velocities. Add the energy that damping has
+    /// dissipated in a step (s), by the trapezoidal rule.
     pub fn add_damped_energy(&mut self, step: f64) {
         let (model, first) = (self.model, self.first);
         let Some([powers, energies]) = &mut self.damping else {
@@ -142,7 +142,7 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Split off the first `count` points.
+    /// Split off the first `count` points of the part.
     fn split_off_first(&mut self, count: usize) -> Self {
         let first = self.first;
         self.first += count;
@@ -166,7 +166,7 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 }
 
-/// Split off the first entries of columns.
+/// Split off the first `count` entries of columns.
 fn cut<'a, const N: usize>(columns: &mut Columns<'a, N>, count: usize) -> Columns<'a, N> {
     columns.each_mut().map(|column| {
         let (first, others) = std::mem::take(column).split_at_mut(count);
@@ -180,10 +180,10 @@ pub fn parts(owned: usize) -> usize {
     owned.div_ceil(PART)
 }
 
-/// Several parts, and one entry of additional data per part.
+/// One or several adjacent parts, with one entry of `each` of [`walk`] per part.
 type Parts<'a, C, const D: usize> = (Part<'a, D>, &'a mut [C]);
 
-/// Split the parts into two halves, unless there is only one.
+/// Split several parts into two halves; a single part is not split.
 fn halves<C, const D: usize>(
     (mut points, each): Parts<'_, C, D>,
 ) -> (Parts<'_, C, D>, Option<Parts<'_, C, D>>) {
@@ -195,8 +195,8 @@ fn halves<C, const D: usize>(
     ((points_of_first, first), Some((points, second)))
 }
 
-/// Call `work` with each part of all points and its entry of `each`. Returns whether all calls returned
-/// true.
+/// Call `work` with each part of the points and the entry of `each` for this part. Returns whether all calls
+/// returned true.
 ///
 /// # Panics
 /// If `each` does not have one entry per part.

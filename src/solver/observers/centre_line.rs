@@ -1,10 +1,10 @@
 //! Centre lines of connected damaged points: the path of a crack and its branches.
 //!
-//! Damage is spread over a band some spacings wide. Dijkstra's method finds the shortest path along the
-//! band from the start of the crack to each point. The path length divides the points into sections. If a
-//! section consists of unconnected parts, the parts lie on different branches. The centre lines join the
-//! centroids of successive parts (the level-set diagram of Lazarus & Verroust 1999). A wide or ragged band
-//! shifts only these centroids slightly.
+//! Damage is spread over a band some spacings wide. Dijkstra's method finds the shortest path along the band
+//! from the start of the crack to each point. The points are grouped into sections by their path length.
+//! Within a section, each set of connected points is a part; different parts lie on different branches. The
+//! centre lines join the centroids of successive parts (the level-set diagram of Lazarus & Verroust 1999). A
+//! wide or ragged band shifts these centroids only slightly.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -19,12 +19,12 @@ type Vector = Vector3<f64>;
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
-/// A damaged point, part of the band of a crack.
+/// A damaged point in the band of damage around a crack.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Damaged {
     /// Position, m.
     pub place: [f64; 3],
-    /// Weight of the point in the centroid of its part.
+    /// Weight of the point in the centroid of the points of its part.
     pub weight: f64,
 }
 
@@ -45,8 +45,8 @@ pub type Branch = Vec<Vertex>;
 pub struct Reach {
     /// Points up to this distance apart are connected, m.
     pub link: f64,
-    /// Length of a section, m, at least `link`. Shorter branches are dropped. Points up to this distance
-    /// from the start of the crack begin a path.
+    /// Length of a section, m; at least `link`. Shorter branches are dropped. Paths begin at the points up to
+    /// this distance from the start of the crack.
     pub section_length: f64,
 }
 
@@ -57,9 +57,8 @@ pub fn length(branches: &[Branch]) -> f64 {
     branches.iter().map(own).fold(0.0, |sum, own| sum + own)
 }
 
-/// Find the branches of a crack that starts at `from` (m). The first branch is the one with the longest
-/// path to its tip. The result is empty if no point is near the start. It depends only on the points and
-/// their order.
+/// Find the branches of a crack that starts at `from` (m). The first branch has the longest path to its tip.
+/// The result is empty if no point is near the start. It depends only on the points and their order.
 pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch> {
     let places: Vec<[f64; 3]> = points.iter().map(|point| point.place).collect();
     let bins = Bins::new(&places, reach.link * (1.0 + TOLERANCE));
@@ -69,17 +68,18 @@ pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch>
     lines(from, points, &parts, reach)
 }
 
-/// The shortest paths along the band from the start.
+/// The shortest paths along the band from the start of the crack.
 struct Ways {
     /// Path length of each reached point, m; infinite for other points.
     length: Vec<f64>,
-    /// The preceding point on the path; none for the first point.
+    /// The preceding point on the path; `None` for points where a path begins.
     before: Vec<Option<usize>>,
     /// The reached points, ordered by path length, then by index.
     order: Vec<usize>,
 }
 
-/// A candidate for the next reached point. The greatest one has the shortest path, then the lowest index.
+/// A candidate for the next reached point. The order makes the candidate with the shortest path the greatest;
+/// equal ones are ordered by index, the lowest first.
 #[derive(PartialEq)]
 struct Next {
     length: f64,
@@ -102,7 +102,7 @@ impl PartialOrd for Next {
 }
 
 impl Ways {
-    /// Find the paths by Dijkstra's method, starting from all points within a section length of the start.
+    /// Find the paths by Dijkstra's method, from all points within a section length of the start.
     fn new(from: [f64; 3], places: &[[f64; 3]], bins: &Bins, reach: Reach) -> Self {
         let mut ways = Self {
             length: vec![f64::INFINITY; places.len()],
@@ -145,7 +145,7 @@ impl Ways {
 
 /// Connected points of one section.
 struct Part {
-    /// The preceding part, towards the start.
+    /// The part before this one, towards the start of the crack.
     parent: Option<usize>,
     members: Vec<usize>,
     /// Largest path length of the points of this part and of its descendants, m.
@@ -162,8 +162,8 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
         if part_of[*first].is_some() {
             continue;
         }
-        // The point of a part with the shortest path has its predecessor in an earlier section, or has no
-        // predecessor.
+        // The point with the shortest path in a part is preceded by a point of an earlier section, or by
+        // none.
         let parent = ways.before[*first].and_then(|before| part_of[before]);
         let number = parts.len();
         part_of[*first] = Some(number);
@@ -198,8 +198,8 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
     parts
 }
 
-/// Handle parts without children (stubs) at forks. If all parts at a fork are stubs, merge them into one;
-/// otherwise, drop the stubs.
+/// Remove parts without children (stubs) at forks. If all children of a part are stubs, they are merged into
+/// one part. Otherwise, the stubs are dropped.
 fn drop_stubs(parts: &mut [Part]) {
     for number in 0..parts.len() {
         let children = std::mem::take(&mut parts[number].children);
@@ -215,7 +215,7 @@ fn drop_stubs(parts: &mut [Part]) {
             parts[*last].members.sort_unstable();
             kept.push(*last);
         }
-        // Sort by path length, longest first; among equal ones, the part reached first comes first.
+        // The child with the longest path comes first; equal ones are ordered by their index.
         kept.sort_by(|a, b| {
             let order = parts[*b].farthest.total_cmp(&parts[*a].farthest);
             order.then(a.cmp(b))
@@ -226,8 +226,8 @@ fn drop_stubs(parts: &mut [Part]) {
 
 /// Join the centroids of successive parts to branches.
 fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
-    // Vertex of a part: its centroid. For a part without children, the vertex is moved along the line as
-    // far as the points of the part extend.
+    // The vertex of a part is its centroid. For a part without children, the vertex is moved along the line
+    // to the farthest point of the part.
     let place = |part: &Part, before: Vector| {
         let members = || part.members.iter().map(|member| &points[*member]);
         let (mut sum, mut weight) = (Vector::zeros(), 0.0);
@@ -248,8 +248,8 @@ fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Ve
         place: from,
         along: 0.0,
     };
-    // The parts without parents are the candidates for the first part. Only the one that extends farthest
-    // is used.
+    // The branches begin at the part without a parent that extends farthest. Other parts without parents are
+    // not used.
     let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
     let farther = |a: &usize, b: &usize| {
         let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);

@@ -1,4 +1,4 @@
-//! The columns of the history, with name, unit and value of each in one place.
+//! The columns of the history: name, unit and value of each column are defined together.
 
 use crate::component::AXES;
 use crate::solver::contact::ContactNow;
@@ -9,7 +9,7 @@ use super::fragments::Fragments;
 use super::history::Energies;
 use super::tip::TipNow;
 
-/// Global quantities of one row of the history; the same on all ranks.
+/// Global quantities for one row of the history; the same on all ranks.
 pub struct GlobalState {
     /// Time and step of the run.
     pub clock: Clock,
@@ -17,16 +17,16 @@ pub struct GlobalState {
     pub energies: Energies,
     /// Momentum by component, kg m/s.
     pub momentum: Vec<f64>,
-    /// Angular momentum about the origin, kg m²/s: z in plane problems; x, y and z in 3-D. Empty if the
-    /// history does not contain it.
+    /// Angular momentum about the origin, kg m²/s: z in 2-D; x, y and z in 3-D. Empty if the history does not
+    /// contain it.
     pub angular_momentum: Vec<f64>,
     /// Number of bonds broken since the start.
     pub broken: u64,
-    /// Number of points above the damage threshold.
+    /// Number of points whose damage exceeds the threshold.
     pub cracked_points: u64,
     /// Corners of the bounding box of the cracked points, m.
     pub cracked_extent: [[f64; 3]; 2],
-    /// Number of points whose intact bonds are too few for their law.
+    /// Number of points with too few intact bonds for their law.
     pub singular_points: u64,
     /// State of the present load step.
     pub load_step: LoadStep,
@@ -42,13 +42,13 @@ pub struct GlobalState {
     pub points: u64,
     /// Energy that refinements have added, J.
     pub refinement_energy: f64,
-    /// Force of the supports on each set by component, N.
+    /// Force of the supports on each set of `reactions` by component, N.
     pub reactions: Vec<Vec<f64>>,
-    /// Force of the supports in a given direction, N.
+    /// Component of the support force in the requested direction, N, of each support force.
     pub support_forces: Vec<f64>,
     /// Values of the columns of each probe.
     pub probes: Vec<Vec<f64>>,
-    /// Values of the columns of the statistics of each field.
+    /// Values of the requested statistics of each field.
     pub statistics: Vec<Vec<f64>>,
     /// Position of each front, m.
     pub fronts: Vec<f64>,
@@ -58,14 +58,14 @@ pub struct GlobalState {
     pub tips: Vec<TipNow>,
     /// Quantities of contact.
     pub contact: ContactNow,
-    /// Fragments, if the history contains them.
+    /// Fragments; empty if the history does not contain them.
     pub fragments: Fragments,
 }
 
-/// Function that computes the value of a column.
+/// Function that computes the value of a column from the global quantities.
 type Value = Box<dyn Fn(&GlobalState) -> f64>;
 
-/// The columns in order.
+/// The columns of the history, in order.
 pub struct Columns {
     dimension: usize,
     names: Vec<(String, &'static str)>,
@@ -110,13 +110,13 @@ impl Columns {
         &self.names
     }
 
-    /// Value of a column in a row.
+    /// Value of the column with this name in a row; `None` if there is no such column.
     pub fn value(&self, row: &[f64], name: &str) -> Option<f64> {
         let place = self.names.iter().position(|(own, _)| own == name);
         place.map(|place| row[place])
     }
 
-    /// Compute the present row.
+    /// Compute a row from the present global quantities.
     pub fn row(&self, now: &GlobalState) -> Vec<f64> {
         self.values.iter().map(|value| value(now)).collect()
     }

@@ -1,9 +1,10 @@
-//! In runs without `[contact]`, bodies that no bond joins pass through one another. This module finds points of such
-//! bodies that are nearer than their spacing, and points of bonded bodies that are nearer than half of it after bonds
-//! have broken.
+//! In runs without `[contact]`, bodies that no bond joins pass through each other. This module finds points
+//! of two such bodies that are nearer than their spacing. For bodies whose bonds have broken, it finds points
+//! that are nearer than half their spacing.
 //!
-//! Where the boxes around two bodies overlap, their points are distributed to the ranks by cells of space, so that each
-//! rank compares a part. Points of the second body go to all cells within reach.
+//! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks by
+//! spatial cells, so that each rank compares a part. Points of the second body are sent to the ranks of all
+//! cells that are near enough.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -14,19 +15,22 @@ use crate::points::distance_squared;
 use crate::solver::Simulation;
 use crate::solver::model::Model;
 
-/// Edge of a cell, in units of the largest distance. With large cells, few points are near a cell border.
+/// Edge of a cell divided by the largest distance that counts. Large cells have fewer points near their
+/// borders.
 const CELL: f64 = 8.0;
 
-/// Points that start nearer than their spacing count only below this fraction of their initial distance.
+/// Two points that start nearer than their spacing count only if their distance falls below this fraction of
+/// the initial distance.
 const NEARER: f64 = 0.9;
 
-/// Points of bodies that bonds joined count below this fraction of their spacing: compression alone rarely reaches it.
+/// Two points of bodies that bonds joined count if their distance is below this fraction of their spacing.
+/// Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
-/// Points handled by one task.
+/// Number of points that one task processes.
 const CHUNK: usize = 1 << 15;
 
-/// Two points of different bodies that are nearer than bodies that touch can be.
+/// Two points of different bodies that are nearer than points of touching bodies can be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Bodies of the points, the lower index first.
@@ -35,7 +39,7 @@ pub struct Contact {
     pub ids: [u64; 2],
     /// Midpoint of the points, m.
     pub place: [f64; 3],
-    /// Their distance, m.
+    /// Distance of the points, m.
     pub distance: f64,
     /// Whether bonds joined the bodies at the start of the run.
     pub were_bonded: bool,
@@ -52,28 +56,28 @@ pub struct ContactWatch {
 /// Two bodies that may pass through each other.
 #[derive(Clone, Copy)]
 struct Pair {
-    /// The lower index first.
+    /// Indices of the bodies, the lower one first.
     bodies: [usize; 2],
-    /// Whether bonds joined them at the start.
+    /// Whether bonds joined the bodies at the start of the run.
     were_bonded: bool,
 }
 
-/// A pair of bodies whose boxes overlap.
+/// A pair of bodies whose bounding boxes overlap or nearly touch.
 #[derive(Clone, Copy)]
 struct Meeting {
     pair: Pair,
-    /// The largest distance that counts, m.
+    /// Largest distance of two points that is compared, m.
     radius: f64,
-    /// Corners of the region in which points of both bodies can be, m.
+    /// Corners of a box that contains all points of one body within `radius` of the other body, m.
     lower: [f64; 3],
     upper: [f64; 3],
 }
 
-/// A point as sent to the ranks that compare it.
+/// A point in messages to the ranks that compare it.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Candidate {
-    /// Twice the index of the meeting, plus 1 for the second body.
+    /// Twice the index of the [`Meeting`], plus 1 for points of the second body.
     side: u64,
     id: u64,
     place: [f64; 3],
@@ -120,8 +124,8 @@ impl ContactWatch {
         Self { pairs, spacing }
     }
 
-    /// The nearest two points of different bodies, if they are nearer than bodies that touch can be; the same on all
-    /// ranks. Collective.
+    /// Find the nearest two points of different bodies; `None` if no two points are nearer than points of
+    /// touching bodies can be. The result is the same on all ranks. Collective.
     pub fn look<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
         let meetings = self.meetings(simulation);
         if meetings.is_empty() {
@@ -144,12 +148,12 @@ impl ContactWatch {
         agree_on_nearest(comm, nearest)
     }
 
-    /// The pairs of bodies whose bounding boxes are nearer than their points may be.
+    /// Find the pairs of bodies whose bounding boxes overlap or are at most the mean of their spacings apart.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();
         }
-        // Lower corners, and upper corners with the sign changed.
+        // Lower corners of the bounding boxes, and negative upper corners, so that one minimum gives both.
         let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
@@ -203,7 +207,7 @@ fn place_of<const D: usize>(
     place
 }
 
-/// The owned points in the regions where bodies may meet, packed for each rank.
+/// Select the owned points in the boxes where bodies may touch, packed for each rank.
 fn candidates<const D: usize>(
     simulation: &Simulation<'_, D>,
     meetings: &[Meeting],
@@ -248,7 +252,7 @@ fn candidates<const D: usize>(
     outgoing
 }
 
-/// The ranks that compare the points in the cells within `reach` of a position.
+/// The ranks that compare points in the cells that contain positions within `reach` (m) of `place`.
 fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
     let mut homes = Vec::with_capacity(1);
     for corner in 0..1_u32 << D {
@@ -266,7 +270,8 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
     homes
 }
 
-/// Find the nearest of the given points of two bodies whose distance is below their spacing.
+/// Find the nearest two of the given points of two bodies; `None` if their distance is not below the limit
+/// for their spacing.
 fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
     if first.is_empty() || second.is_empty() {
         return None;
@@ -303,7 +308,7 @@ fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<C
     nearest
 }
 
-/// Select the nearest pair over all ranks, by distance, then by ids. Collective.
+/// Return the nearest pair of all ranks; pairs at equal distance are ordered by ids. Collective.
 fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Contact> {
     let found = own.map(|contact| {
         let ([a, b], [x, y, z]) = (contact.bodies, contact.place);

@@ -11,10 +11,10 @@ use crate::solver::conditions::{members, not_empty};
 use super::centre_line::{Branch, Damaged, Reach, branches};
 
 /// Distance, in horizons, up to which damaged points are connected. It bridges a gap of one point in a row,
-/// and branches still separate soon.
+/// but branches soon separate.
 const LINK: f64 = 2.0 / 3.0;
 
-/// Minimum of the same distance in spacings, so that diagonal neighbours are connected for any horizon.
+/// Minimum of this distance in spacings, so that diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.5;
 
 /// A crack whose path is tracked.
@@ -24,7 +24,7 @@ pub struct CrackPath {
     reach: Reach,
 }
 
-/// A point above the damage threshold, as sent to all ranks.
+/// A point above the damage threshold, in messages to all ranks.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Found {
@@ -34,7 +34,7 @@ struct Found {
 }
 
 impl CrackPath {
-    /// Find the points of the set in which the crack is tracked. Collective.
+    /// Find the points of the set in which the crack path is tracked. Collective.
     ///
     /// # Errors
     /// If the set is empty; the error is the same on all ranks.
@@ -67,8 +67,8 @@ impl CrackPath {
         &self.rule.name
     }
 
-    /// Find the branches for the given damage of the owned points. The result is bitwise the same on all
-    /// ranks and for any number of ranks. Collective.
+    /// Find the branches of the crack for the given damage of the owned points. The result is bitwise the
+    /// same on all ranks, and for any number of ranks. Collective.
     pub fn branches<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

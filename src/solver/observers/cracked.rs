@@ -1,4 +1,4 @@
-//! Number and bounding box of the cracked points.
+//! Number and bounding box of the cracked points, whose damage exceeds the threshold.
 
 use crate::comm::{self, Communicator};
 use crate::solver::Simulation;
@@ -14,7 +14,7 @@ pub struct Cracked {
 }
 
 impl Cracked {
-    /// Find the cracked points at the time of the snapshot.
+    /// Find the cracked points of this rank at the time of the snapshot.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>, snapshot: &Snapshot) -> Self {
         let mut cracked = Self {
             points: 0,
@@ -35,7 +35,7 @@ impl Cracked {
         cracked
     }
 
-    /// Corners (m) of the bounding box of the cracked points of all ranks; NaN if there is none.
+    /// Corners (m) of the bounding box of the cracked points of all ranks; NaN if there are none.
     pub fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
         comm::min(comm, &mut self.lower);
         comm.max(&mut self.upper);

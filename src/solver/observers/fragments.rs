@@ -15,10 +15,10 @@ pub struct Fragments {
     pub count: u64,
     /// Number of points without intact bonds.
     pub loose: u64,
-    /// Mass of the fragment with the most points, kg. Among equally large ones, it is the fragment with the
-    /// smallest id.
+    /// Mass of the largest fragment, which has the most points, kg. If several fragments have as many points,
+    /// it is that with the smallest id.
     pub largest_mass: f64,
-    /// Momentum of this fragment by component, kg m/s.
+    /// Momentum of the largest fragment by component, kg m/s.
     pub largest_momentum: Vec<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Fragments {
         for id in &ids {
             *own.entry(*id as u64).or_default() += 1;
         }
-        // Each fragment is assigned to a rank, which counts its points.
+        // A rank is assigned to each fragment and counts its points.
         let mut outgoing = vec![Vec::new(); comm.size()];
         for (fragment, points) in own {
             let home = (fragment % comm.size() as u64) as usize;

@@ -7,7 +7,7 @@ use super::reach::Course;
 use super::row_fields::RowFields;
 use crate::solver::Simulation;
 
-/// A front that is tracked.
+/// A tracked front.
 pub struct Front {
     rule: problem::Front,
     course: Course,
@@ -17,7 +17,7 @@ impl Front {
     /// Find the points along the line. Collective.
     ///
     /// # Errors
-    /// If there is no such point; the error is the same on all ranks.
+    /// If no point lies along the line; the error is the same on all ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::Front,
@@ -37,8 +37,8 @@ impl Front {
         })
     }
 
-    /// Position along the line (m) up to which the magnitude of the field exceeds the threshold; NaN if it
-    /// exceeds it nowhere. Collective.
+    /// Position along the line (m) up to which the magnitude of the field exceeds the threshold; NaN if it is
+    /// below the threshold everywhere. Collective.
     pub fn position<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

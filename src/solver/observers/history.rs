@@ -26,12 +26,12 @@ use super::snapshot::Snapshot;
 use super::statistics::{self, FieldStatistics};
 use super::tip::Tip;
 
-/// Points summed by one task.
+/// Number of points that one task sums.
 const CHUNK: usize = 4096;
 
 /// A point whose values the history contains.
 struct Probe {
-    /// Local index on the rank that owns the point.
+    /// Local index of the point on its owner; `None` on other ranks.
     point: Option<usize>,
     /// Requested fields other than displacement and velocity.
     fields: Vec<Field>,
@@ -48,7 +48,7 @@ pub struct HistoryObserver {
     fronts: Vec<Front>,
     cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
-    /// Energy (J) in the first row, and number of bonds that were intact before any could break.
+    /// Energy (J) in the first row, and number of bonds that were intact before any bond could break.
     start: Option<(f64, u64)>,
 }
 
@@ -57,7 +57,7 @@ pub struct HistoryObserver {
 pub struct Energies {
     /// ½ Σ ρ V u̇² of the points.
     pub kinetic: f64,
-    /// Σ W V.
+    /// Σ W V, with the strain energy density W.
     pub strain: f64,
     /// Energy released by broken bonds.
     pub fracture: f64,
@@ -67,9 +67,9 @@ pub struct Energies {
     pub work: f64,
     /// Energy dissipated by viscous damping, bonds that yield, friction and contact damping.
     pub dissipated: f64,
-    /// Error of the energy balance; 0 for an exact integrator. The balance is kinetic (including rigid
-    /// bodies) + strain + contact + fracture + dissipated − work. The error is its change since the start,
-    /// minus the energy that refinements and changes of the density scale have added.
+    /// Error of the energy balance kinetic (including rigid bodies) + strain + contact + fracture +
+    /// dissipated − work; 0 for an exact integrator. The error is the change of this sum since the start.
+    /// Energy that refinements and changes of the density scale have added is subtracted.
     pub error: f64,
 }
 
@@ -84,17 +84,18 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Energy at the start, J; the error of the energy balance is relative to it.
     pub first_energy: f64,
-    /// Kinetic energy, J, that loads and prescribed motions can add in a step before they do work.
+    /// Kinetic energy, J, that loads and prescribed motions can add in a step without work in the trapezoidal
+    /// rule.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
 }
 
 impl HistoryObserver {
-    /// Find the sets, probes, lines and tips.
+    /// Find the points of all sets, probes, fronts, crack paths and tips of the history.
     ///
     /// # Errors
-    /// If a set is empty or a line has no points; the error is the same on all ranks.
+    /// If a set is empty or no point lies along the line of a front; the error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;
@@ -141,7 +142,7 @@ impl HistoryObserver {
         })
     }
 
-    /// Find the sets, probes, lines and tips again after points have migrated. Collective.
+    /// Find the points of the history again after points have migrated. Collective.
     ///
     /// # Errors
     /// Same as for [`Self::new`].
@@ -160,8 +161,8 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Reference values of later rows: the energy (J) in the first row, and the number of bonds that were
-    /// intact before any could break.
+    /// Reference values for all rows: the energy (J) in the first row, and the number of bonds that were
+    /// intact before any bond could break.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
@@ -171,7 +172,7 @@ impl HistoryObserver {
         self.start = Some(start);
     }
 
-    /// Read earlier rows, as returned by [`Self::row`].
+    /// Read the lengths of crack tips from earlier rows, for the speeds of the tips.
     pub fn recall(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
@@ -327,7 +328,7 @@ impl HistoryObserver {
         }
     }
 
-    /// Distribute the probe values from the owners of the points to all ranks. Collective.
+    /// Collect the values of the probes on all ranks. Collective.
     fn probe_values<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -353,7 +354,7 @@ impl HistoryObserver {
             }
             counts.push(bits.len() - before);
         }
-        // Only the owner contributes nonzero bits to the sum.
+        // Other ranks than the owner contribute 0, so the sum has the bits of the owner's value.
         simulation.comm.sum(&mut bits);
         let mut values = bits.into_iter().map(f64::from_bits);
         let of_probe = |count: usize| values.by_ref().take(count).collect();
@@ -371,7 +372,7 @@ pub fn column_names(problem: &Problem) -> Vec<(String, &'static str)> {
     columns.names().to_vec()
 }
 
-/// Whether points of a problem can have too few bonds for their law.
+/// Whether a law of the problem can have points with too few bonds.
 fn can_be_singular<const D: usize>(problem: &Problem) -> bool {
     let mut blocks = problem.blocks();
     blocks.any(|block| Law::<D>::needs_shape(&block_laws(problem, &block).law))
@@ -519,7 +520,7 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
     columns
 }
 
-/// The column with the length of a tip, from which its speed follows.
+/// Name of the column with the length of a crack tip.
 fn length_of(tip: &str) -> String {
     format!("tip_{tip}_length")
 }
@@ -530,7 +531,7 @@ fn sum(values: &[f64]) -> ExactSum {
     sum
 }
 
-/// Kinetic, strain and fracture energy and external work of all points, J. Collective.
+/// Sum kinetic, strain and fracture energy and external work over all points, J. Collective.
 pub fn state_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> [f64; 4] {
     let snapshot = Snapshot::new(simulation);
     let mut sums = point_sums(simulation, &snapshot);
@@ -541,7 +542,7 @@ pub fn state_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> [f6
     std::array::from_fn(|k| sums[k])
 }
 
-/// Kinetic, strain and fracture energy (J), then momentum by component (kg m/s), of the owned points.
+/// Sum kinetic, strain and fracture energy (J), then momentum by component (kg m/s), over the owned points.
 pub(in crate::solver) fn point_sums<const D: usize>(
     simulation: &Simulation<'_, D>,
     snapshot: &Snapshot,
@@ -564,7 +565,7 @@ pub(in crate::solver) fn point_sums<const D: usize>(
     sums_over(model.owned(), 3 + D, add)
 }
 
-/// Rotation axes of bodies: z in plane problems, all in 3-D, none in 1-D.
+/// Axes of the angular momentum: z in 2-D, all in 3-D, none in 1-D.
 fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
     match dimension {
         1 => 0..0,
@@ -573,7 +574,8 @@ fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
     }
 }
 
-/// Angular momentum Σ ρ V y × u̇ of the owned points about the origin (kg m²/s), by axis; y is the deformed position.
+/// Sum the angular momentum ρ V y × u̇ of the owned points about the origin (kg m²/s), by axis. y is the
+/// deformed position.
 fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<ExactSum> {
     let (model, fields) = (&simulation.model, &simulation.fields);
     let axes = rotation_axes(D);
@@ -588,7 +590,8 @@ fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Exact
     })
 }
 
-/// Compute several sums over the points below `count`.
+/// Compute several exact sums over the points with local index below `count`. `add` adds the terms of a
+/// point.
 fn sums_over(
     count: usize,
     width: usize,

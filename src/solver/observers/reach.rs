@@ -8,22 +8,22 @@ use crate::problem::Line;
 
 use crate::solver::Simulation;
 
-/// Relative tolerance of distances, in horizons: points within it count as equally far, and as within a
-/// limit.
+/// Relative tolerance of distances, in horizons. Points whose distances differ less count as equally far, and
+/// a point at a limit counts as within the limit.
 const TOLERANCE: f64 = 1e-9;
 
-/// This rank's points along a line, and the coordinate (m) of each along the line.
+/// This rank's points along a line, and the coordinate of each point along the line (m).
 pub struct Course {
     line: Line,
     points: Vec<(u32, f64)>,
 }
 
-/// The farthest position above the threshold.
+/// The farthest position along the line at which values exceed the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reached {
     /// Distance from the start of the line, m.
     pub along: f64,
-    /// Position, m. Its distance from the line is that of the farthest point.
+    /// Position, m. It is as far from the line as the farthest point above the threshold.
     pub position: [f64; 3],
 }
 
@@ -54,19 +54,20 @@ impl Course {
         }
     }
 
-    /// Whether no rank has such a point. Collective.
+    /// Whether no rank has a point along the line. Collective.
     pub fn is_empty(&self, comm: &dyn Communicator) -> bool {
         total(comm, self.points.len() as u64) == 0
     }
 
-    /// Find how far the points with a `value` (by local index) above the threshold extend; `None` if no
-    /// point is above. The result is bitwise the same for any number of ranks. Collective.
+    /// Find how far the points whose `value` exceeds the threshold extend along the line. `value` is given by
+    /// local index. The result is `None` if no value exceeds the threshold. It is bitwise the same for any
+    /// number of ranks. Collective.
     ///
-    /// The search starts at the farthest of these points (among equally far ones, that with the smallest
-    /// id). The next points are the nearest ones ahead of it within one horizon. Between both, the value is
-    /// interpolated linearly to the threshold. If several next points are equally far, the largest value is
-    /// used. When values grow, the position grows without jumps, even when the next point exceeds the
-    /// threshold.
+    /// The search starts at the farthest point above the threshold; if several are equally far, at the one
+    /// with the smallest id. The next points are the nearest points ahead of this point, within one horizon.
+    /// The value is interpolated linearly between this point and the next points to find the threshold. If
+    /// several next points are equally near, the largest value is used. When values grow, the position
+    /// therefore grows without jumps, even when the next point exceeds the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -1,4 +1,4 @@
-//! Fields for a row of the history.
+//! Cache of the fields for a row of the history.
 
 use crate::problem::Field;
 use crate::solver::Simulation;
@@ -20,7 +20,8 @@ impl<'s> RowFields<'s> {
         }
     }
 
-    /// Get a field over the owned points in the layout of [`Snapshot::field`].
+    /// Return a field over the owned points in the layout of [`Snapshot::field`], and compute it at the first
+    /// request.
     pub fn get<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

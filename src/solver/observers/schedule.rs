@@ -28,8 +28,8 @@ impl Schedule {
         }
     }
 
-    /// Whether output is due: in the first step that reaches a multiple of the interval or a given time, up
-    /// to round-off.
+    /// Whether output is due: at the start, at the end, and in the first step that reaches a multiple of the
+    /// interval or a given time, up to round-off.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;
@@ -38,7 +38,7 @@ impl Schedule {
         self.reached(time) > self.reached(before) || self.is_interval_over(clock, before)
     }
 
-    /// Whether the last step, which began at the time `before` (s), reached a multiple of the interval.
+    /// Whether the last step, which began at `before` (s), reached a multiple of the interval.
     fn is_interval_over(&self, clock: &Clock, before: f64) -> bool {
         let passed =
             |seconds, before| multiples(clock.time(), seconds) > multiples(before, seconds);
@@ -47,14 +47,15 @@ impl Schedule {
             Some(Interval::Steps(steps)) => clock.number().is_multiple_of(steps),
             Some(Interval::Seconds(seconds)) => passed(seconds, before),
             Some(Interval::SecondsAtSteps { seconds, steps }) => {
-                // The time of the previous check, computed with the present step even if steps have changed.
+                // Time of the previous check. The present step is used even if the step has changed since
+                // then.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
             }
         }
     }
 
-    /// Number of given times that have been reached at a time (s), up to round-off.
+    /// Number of given times up to a time (s), except for round-off.
     fn reached(&self, time: f64) -> usize {
         self.times
             .partition_point(|given| given * (1.0 - ROUNDING) <= time)
@@ -73,10 +74,10 @@ impl Schedule {
             }
         };
         let [whole, before] = [last, last - 1].map(multiples);
-        // The end counts once, even if it is a multiple of the interval.
+        // The output at the end counts once, even if the end is a multiple of the interval.
         let intervals = 1 + (whole as u64).min(last) + u64::from(whole == before);
         let steps = self.times.iter().map(|given| {
-            // The first step at or after the time, up to round-off.
+            // The first step that reaches the given time, up to round-off.
             let steps = (given * (1.0 - ROUNDING) / step).ceil();
             steps as u64
         });
@@ -89,10 +90,11 @@ impl Schedule {
     }
 }
 
-/// Relative round-off of the clock: by this fraction, a time may fall short of a given time.
+/// Relative round-off of the clock: a step that falls short of a given time by less than this fraction
+/// reaches it.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of intervals (s) that have passed at a time (s), up to round-off.
+/// Number of whole intervals of length `seconds` in `time` (s), up to round-off.
 fn multiples(time: f64, seconds: f64) -> f64 {
     (time / seconds + 1e-9).floor()
 }
@@ -131,7 +133,7 @@ mod tests {
 
     #[test]
     fn given_times() {
-        // The first step at or after each given time; each step counts once.
+        // Output is due at the first step that reaches a given time, and once per step.
         assert_eq!(
             due(None, &[0.3, 0.55, 0.58, 0.7], 0.1, 10),
             [0, 3, 6, 7, 10]

@@ -1,4 +1,4 @@
-//! Snapshot of a run at one time. Fields for the result are computed on request.
+//! Snapshot of a run at one time. Fields for the result are computed from the snapshot on request.
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -12,7 +12,7 @@ use crate::solver::bonds::Stored;
 use crate::solver::motion::Fields;
 use crate::solver::palette_column::PaletteColumn;
 
-/// Bond quantities at one time. They are computed once, and fields and history use them.
+/// Bond quantities at one time, computed once for all fields and the history.
 pub struct Snapshot {
     /// Bond quantities of the owned points.
     pub stored: Stored,
@@ -32,8 +32,8 @@ impl Snapshot {
         Self { stored }
     }
 
-    /// Take a snapshot without energies. It can be used neither for a row of the history nor for
-    /// [`Field::StrainEnergyDensity`].
+    /// Take a snapshot without energies. Rows of the history and [`Field::StrainEnergyDensity`] need a
+    /// snapshot with energies.
     pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.intact_families(&simulation.model);
         stored.softened = simulation.forces.softened(&simulation.model);
@@ -51,15 +51,14 @@ impl Snapshot {
         }
     }
 
-    /// Number of intact bonds of the owned points. In a sum over ranks, each bond counts once from each
-    /// end.
+    /// Number of intact bonds of the owned points. In the sum over all ranks, each bond counts twice.
     pub fn intact(&self) -> u64 {
         let counts = self.stored.neighbours.iter();
         counts.map(|count| *count as u64).sum()
     }
 
-    /// Compute a field over the owned points at the time of the snapshot. The values are row-major with
-    /// [`Field::components`] entries per point.
+    /// Compute a field over the owned points at the time of the snapshot. The values are ordered by point,
+    /// with [`Field::components`] entries per point.
     pub fn field<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -127,7 +126,8 @@ impl Snapshot {
             }
             Field::Strain => strain(simulation),
             Field::Singular => simulation.forces.singular(model),
-            // Without prescribed temperatures, points have the reference temperature.
+            // Runs without prescribed temperatures do not store this field; all points have the reference
+            // temperature.
             Field::Temperature => {
                 let point = |point| model.expansion_of(point).reference_temperature;
                 (0..count).map(point).collect()
@@ -146,9 +146,10 @@ impl Snapshot {
     }
 }
 
-/// Convert Kirchhoff stress to Cauchy stress, row by row: divide by the ratio of deformed to undeformed
-/// volume. In plane stress, the law gives the out-of-plane stretch. By default, Hooke's law with
-/// logarithmic strains gives ε_zz = −ν/(1 − ν) (ε_xx + ε_yy). Under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
+/// Convert Kirchhoff stress to Cauchy stress, with six components per point. The stress is divided by J, the
+/// ratio of deformed to undeformed volume. J needs the out-of-plane stretch. In plane stress, the law gives
+/// this stretch. If the law does not, Hooke's law with logarithmic strains gives ε_zz = −ν/(1 − ν) (ε_xx +
+/// ε_yy). Under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
@@ -156,7 +157,7 @@ fn cauchy_stress<const D: usize>(
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        // Thermal expansion is isotropic.
+        // Thermal expansion is isotropic, so it is divided out of F.
         let thermal = 1.0 + free_stretch(simulation, point);
         let gradient = gradient / thermal;
         let in_plane = determinant(&gradient);
@@ -176,20 +177,20 @@ fn cauchy_stress<const D: usize>(
             _ => in_plane,
         };
         let growth = growth * thermal.powi(3);
-        // The volume ratio of an inverted body is not meaningful, so 1 is used.
+        // The volume ratio of an inverted family has no meaning, so 1 is used.
         let growth = if growth > 0.0 { growth } else { 1.0 };
         stress.iter_mut().for_each(|entry| *entry /= growth);
     }
     kirchhoff
 }
 
-/// Green–Lagrange strain ½(FᵀF − I) in 3-D, row by row: xx, yy, zz, xy, yz, xz.
+/// Green–Lagrange strain ½(FᵀF − I) in 3-D, with the components xx, yy, zz, xy, yz, xz of each point.
 fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     let mut rows = Vec::with_capacity(6 * gradients.len());
     for (point, gradient) in gradients.iter().enumerate() {
         let across = stretch_across(simulation, point, gradient);
-        // It is computed from F − I, so that small strains lose no digits.
+        // The strain is computed from F − I, so that small strains lose no digits.
         let mut change = Matrix3::identity() * (across - 1.0);
         change
             .view_mut((0, 0), (D, D))
@@ -204,8 +205,8 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     rows
 }
 
-/// Stretch of an owned point perpendicular to the directions of the setting, for this deformation gradient.
-/// It is 1 if the setting has no such strain.
+/// Stretch of an owned point perpendicular to the plane or bar, for this deformation gradient. It is 1 if the
+/// strain in this direction is 0, and in 3-D.
 fn stretch_across<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
@@ -214,7 +215,7 @@ fn stretch_across<const D: usize>(
     let thermal = 1.0 + free_stretch(simulation, point);
     let elastic_gradient = gradient / thermal;
     let in_setting = determinant(&elastic_gradient);
-    // The area ratio of an inverted body is not meaningful, so 1 is used.
+    // The area ratio of an inverted family has no meaning, so 1 is used.
     let in_setting = if in_setting > 0.0 { in_setting } else { 1.0 };
     let ratio = || elastic(simulation, point).poisson_ratio;
     let across = match simulation.problem.dimension {
@@ -239,9 +240,8 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
     simulation.problem.block(block).body.material.elastic
 }
 
-/// Trace of the 3-D strain of an owned point, from the strain in the directions of the setting. Without
-/// out-of-plane stress, a plate has ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar has ε_yy = ε_zz = −ν ε_xx.
-/// Thermal strain is added.
+/// Trace of the 3-D strain of an owned point, from the trace in the plane or along the bar. In plane stress,
+/// ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx. Thermal strain is added.
 fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_setting: f64) -> f64 {
     let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
@@ -260,8 +260,8 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_settin
     share * (in_setting - D as f64 * free) + 3.0 * free
 }
 
-/// Thermal stretch of an owned point, if the setting allows it to expand perpendicular to its directions.
-/// Otherwise 0, because the determinant of F is then that of the 3-D deformation.
+/// Thermal stretch of an owned point that can expand freely perpendicular to the plane or bar, or in 3-D. It
+/// is 0 under plane or uniaxial strain, because the determinant of F is then that of the 3-D deformation.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],
@@ -269,7 +269,7 @@ fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) ->
     }
 }
 
-/// Thermal stress −E α (T − T₀) of an owned point whose strain perpendicular to the setting is 0, Pa.
+/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa.
 fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let Some(temperature) = &simulation.fields.temperature else {
         return 0.0;
@@ -280,7 +280,7 @@ fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) 
     -material.elastic.youngs_modulus * material.expansion.coefficient * change
 }
 
-/// Plastic strain of an owned point; 0 without plasticity.
+/// Plastic state of an owned point. Only its plastic strain is set, which is 0 without plasticity.
 fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticState {
     let strain = fields.plastic_strain.as_ref();
     PlasticState {
@@ -291,9 +291,9 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
     }
 }
 
-/// Compute the stress perpendicular to the directions of the setting, if the strain there is 0. In plane
+/// Compute the stress perpendicular to the plane or bar, if the strain in this direction is 0. In plane
 /// strain, the law gives zz; the default is ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 − ν) xx.
-/// Temperature adds −E α ΔT and −E α ΔT/(1 − ν), respectively.
+/// Temperature adds −E α ΔT in plane strain, and −E α ΔT/(1 − ν) under uniaxial strain.
 fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
     let by_law = match simulation.problem.dimension {
@@ -324,7 +324,7 @@ fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<
     }
 }
 
-/// Convert columns to rows with this number of components; missing columns are 0.
+/// Reorder columns to `components` values per point, for `count` points. Missing columns are 0.
 fn rows(columns: &[Vec<f64>], count: usize, components: usize) -> Vec<f64> {
     let mut values = vec![0.0; components * count];
     for (d, column) in columns.iter().enumerate() {

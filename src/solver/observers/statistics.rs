@@ -11,7 +11,7 @@ use crate::solver::conditions::{members, not_empty};
 
 use super::row_fields::RowFields;
 
-/// Points summed by one task.
+/// Number of points that one task sums.
 const CHUNK: usize = 4096;
 
 /// The statistics of a field over a set.
@@ -56,7 +56,7 @@ impl Totals {
     }
 }
 
-/// Name and unit of each column.
+/// Name and unit of each column of the statistics.
 pub fn columns(rule: &problem::FieldStatistics) -> impl Iterator<Item = (String, &'static str)> {
     let problem::FieldStatistics {
         name, field, of, ..
@@ -69,7 +69,7 @@ impl FieldStatistics {
     /// Find the points of the set. Collective.
     ///
     /// # Errors
-    /// If the set is empty; the same on all ranks.
+    /// If the set is empty; the error is the same on all ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::FieldStatistics,
@@ -92,7 +92,7 @@ impl FieldStatistics {
         })
     }
 
-    /// The totals of this rank.
+    /// Compute the sums and extremes over this rank's points of the set.
     fn totals<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -115,8 +115,8 @@ impl FieldStatistics {
         chunks.reduce(|| Totals::EMPTY, |a, b| a.merge(&b))
     }
 
-    /// Compute the values of all columns of several statistics, one list for each. They are bitwise the
-    /// same for any number of ranks and threads. Collective.
+    /// Compute the values of all columns, one list per statistics. The values are bitwise the same for any
+    /// number of ranks and threads. Collective.
     pub fn values<const D: usize>(
         all: &[Self],
         simulation: &mut Simulation<'_, D>,
@@ -141,7 +141,7 @@ impl FieldStatistics {
                 Statistic::Sum => sum,
                 Statistic::Integral => integral,
                 Statistic::Mean => integral / statistics.volume,
-                // The minimum of -0 and 0 depends on the order, so 0 is written for both.
+                // The minimum of −0 and 0 depends on their order, so the sum with 0 replaces −0 by 0.
                 Statistic::Minimum => smallest[k] + 0.0,
                 Statistic::Maximum => largest[k] + 0.0,
             };

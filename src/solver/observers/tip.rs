@@ -1,4 +1,4 @@
-//! Crack tips: position and speed of the end of the damage in one direction.
+//! Crack tips: position and speed of the farthest damage in one direction.
 
 use crate::error::{Error, Result};
 use crate::problem;
@@ -7,7 +7,7 @@ use super::reach::{Course, Reached};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
-/// A crack tip that is tracked.
+/// A tracked crack tip.
 pub struct Tip {
     name: String,
     threshold: f64,
@@ -15,7 +15,7 @@ pub struct Tip {
     growth: Growth,
 }
 
-/// The present state of a crack tip; NaN if no point is above its threshold.
+/// State of a crack tip at the time of a row; NaN if no point is above its threshold.
 #[derive(Debug, Clone, Copy)]
 pub struct TipNow {
     /// Position, m.
@@ -80,25 +80,26 @@ impl Tip {
         }
     }
 
-    /// Move the past lengths of an earlier observer of the same tip to this one.
+    /// Take over the past lengths from an earlier observer of the same tip.
     pub fn take_past(&mut self, earlier: &mut Self) {
         std::mem::swap(&mut self.growth, &mut earlier.growth);
     }
 
-    /// Add a past length (m) at a time (s).
+    /// Add a length (m) of an earlier row at a time (s).
     pub fn recall(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);
     }
 }
 
-/// The length of a crack over time, for its speed.
+/// The length of a crack over time, from which its speed is computed.
 ///
-/// The speed is the mean over the last horizon of growth. The interval begins at the latest row in which
-/// the crack was at least one horizon shorter. Before it has grown that far, it begins at the latest row
-/// with the initial length. Over a shorter distance, the steps of the lattice would be visible. Over a
-/// fixed time, the speed would depend on how often rows are written. A crack at rest from the start has
-/// speed 0. If a crack stops, its speed falls as one horizon divided by the time since the beginning of the
-/// interval.
+/// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
+/// latest row in which the crack was at least one horizon shorter. If there is no such row, it begins at the
+/// latest row with the initial length.
+///
+/// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
+/// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
+/// speed falls as one horizon divided by the length of the interval.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.

@@ -8,15 +8,15 @@ use crate::solver::assign::cutoffs;
 /// Ratio of a facet's side to a cell's side, so that rounding opens no gap.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
-/// The facets of all ranks. A facet lies between adjacent points whose bond is broken now, or was broken
-/// when the grid there was refined.
+/// The facets of all ranks. A facet lies between two adjacent points whose bond is broken, or was broken when
+/// the grid between them was refined.
 pub struct Facets {
     all: Vec<Facet>,
     bins: Bins,
 }
 
 impl Facets {
-    /// Find the facets of the present bonds. Collective.
+    /// Find the facets of the broken bonds. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let model = &simulation.model;
@@ -48,8 +48,8 @@ impl Facets {
             }
         });
         let mut all = all_gather_many(comm, &own);
-        // On a refined grid, bonds may be too short to detect faces from a coarser grid, so these are
-        // stored.
+        // Bonds on a refined grid may be shorter than the spacing of the coarser grid. Facets of the coarser
+        // grid are therefore taken from the stored faces.
         let faces = simulation.grids.suppressed_faces().into_iter();
         all.extend(faces.map(|(centre, edges, axis)| Facet {
             centre,
@@ -66,7 +66,7 @@ impl Facets {
         }
     }
 
-    /// Whether there are no facets; the same on all ranks.
+    /// Whether no facet exists; the same on all ranks.
     pub fn are_none(&self) -> bool {
         self.all.is_empty()
     }
@@ -85,7 +85,8 @@ impl Facets {
         any
     }
 
-    /// Whether one of the facets `near` an end lies between the ends (m).
+    /// Whether a line between two positions (m) crosses a facet. `near` must contain the facets near one of
+    /// the positions.
     pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);
         facets.any(|facet| facet.is_crossed(from, to))

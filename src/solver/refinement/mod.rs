@@ -1,11 +1,10 @@
-//! Refinement during a run: which points are refined, the state of new points, and which points are
-//! removed.
+//! Refinement during a run: which points are refined or removed, and the state of new points.
 //!
-//! Points with much strain energy or damage are triggers. All points within a horizon of a trigger are
+//! Points with much strain energy or damage trigger refinement: all points within a horizon of them are
 //! refined (Dipasquale et al. 2014, §2.1). A new point gets the mean state of its parents. It takes its
-//! volume from them in equal parts, so mass and momentum are conserved. Bonds between existing points do
-//! not change. A new bond starts broken if it crosses a pre-crack or a face along which a crack separates
-//! points. No point is created between points that a crack separates.
+//! volume from the parents in equal parts, so mass and momentum are conserved. Bonds between existing points
+//! do not change. A new bond starts broken if it crosses a pre-crack, or a face between points that a crack
+//! separates. No point is created between points that a crack separates.
 
 use std::cell::OnceCell;
 use std::time::Instant;
@@ -31,7 +30,7 @@ use facets::Facets;
 use past::{NOWHERE, Past};
 pub use trigger::is_possible;
 
-/// Number of points created and removed at once, over all ranks.
+/// Number of points that a refinement has created and removed, over all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Regridded {
     /// Number of points that were created.
@@ -40,12 +39,12 @@ pub struct Regridded {
     pub left: u64,
 }
 
-/// Totals of all refinements since the start; the same on all ranks.
+/// Total changes by all refinements since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Refined {
-    /// Kinetic and strain energy that they added, J; negative if they removed energy.
+    /// Kinetic and strain energy that refinements have added, J; negative if they have removed energy.
     pub energy: f64,
-    /// Number of intact bonds that they added minus those removed; each bond counts once from each end.
+    /// Number of intact bonds that refinements have added, minus those removed. Each bond counts twice.
     pub bonds: i64,
 }
 
@@ -55,7 +54,7 @@ impl Refined {
         [self.energy.to_bits(), self.bonds as u64]
     }
 
-    /// Decode the words of [`Self::words`].
+    /// Decode the totals from [`Self::words`].
     pub fn of_words([energy, bonds]: [u64; 2]) -> Self {
         Self {
             energy: f64::from_bits(energy),
@@ -64,20 +63,20 @@ impl Refined {
     }
 }
 
-/// State of the points before a change of grids, in the order of ids.
+/// State of the points before a change of grids, distributed to ranks in the order of ids.
 struct Kept {
-    /// State of the points by row; the last number of a row is the previous block.
+    /// State of the points, one row per point. The last number of a row is the previous block.
     rows: Vec<f64>,
     /// Length of a row.
     width: usize,
     /// Number of broken bonds of each point.
     lengths: Vec<u32>,
-    /// Ids of the neighbours j of the broken bonds, ascending for each point.
+    /// Ids of the neighbours j of these broken bonds, ascending for each point.
     broken: Vec<u64>,
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Check whether new points can get bonds.
+    /// Check that the bonds of new points can get a state.
     ///
     /// # Errors
     /// If bonds have a history; the error is the same on all ranks.
@@ -90,20 +89,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Whether a check for points to refine is due.
+    /// Whether the step is one at which points are checked for refinement.
     pub fn is_refinement_due(&self) -> bool {
         self.trigger().is_some_and(|trigger| {
-            // The first step of a stage can differ from the last one of the stage before.
+            // At the end of a stage, no check is made, because the first step of the next stage may have
+            // another length.
             self.clock.number().is_multiple_of(trigger.every_steps) && !self.is_stage_over()
         })
     }
 
-    /// Refine and coarsen as the triggers of the problem request. A point is coarsened if
-    /// neither a trigger nor a point with missing bonds has been near it for long enough. If points were
-    /// created or removed, return their numbers. Collective.
+    /// Refine and coarsen as the trigger of the problem requests. A point is coarsened if neither a
+    /// triggering point nor a point with broken bonds has been near it for the time in the deck. Return the
+    /// numbers of created and removed points; `None` if the grids do not change. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The points are lost then.
+    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
+    /// freed.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -142,7 +143,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }))
     }
 
-    /// Sum of kinetic and strain energy (J), and number of intact bonds from both ends, over all ranks.
+    /// Sum kinetic and strain energy (J) over all ranks, and count the intact bonds; each bond counts twice.
     fn held(&self, snapshot: &Snapshot) -> (f64, u64) {
         let sums = point_sums(self, snapshot);
         // Both energies are in one sum, which is rounded once.
@@ -152,10 +153,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (energy, comm::total(self.comm, snapshot.intact()))
     }
 
-    /// Move the run to other grids, with the state of all points and bonds. Collective.
+    /// Continue the run on other grids, with the state of all points and bonds. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The points are lost then.
+    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
+    /// freed.
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -190,24 +192,25 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// The points of other grids in the level-0 cells of this rank.
+    /// Create the points of other grids in the level-0 cells of this rank.
     fn pieces_on(&self, grids: &Grids<'a>) -> Vec<Point> {
         let coarse = self.pieces().into_iter();
         let coarse = coarse.filter(|point| point.id < grids.coarsest());
         grids.points(grids.unrefined(coarse))
     }
 
-    /// Create the run at time 0 on other grids.
+    /// Create the run on other grids, at time 0.
     fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
         Self::of_points(self.problem, self.comm, (pieces, grids), None, &mut || {
             Ok(())
         })
     }
 
-    /// Restore the grids of an earlier part of the run, at time 0. Collective.
+    /// Restore the grids that an earlier part of the run had refined, at time 0. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The points are lost then.
+    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
+    /// freed.
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
@@ -219,8 +222,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// State of the points of other grids. This rank creates the given `pieces` of these points.
-    /// Collective.
+    /// Collect the state of the points of other grids. `pieces` are the points of these grids that this rank
+    /// creates, and `left` are the nodes that are removed. Collective.
     fn kept(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> Kept {
         let comm = self.comm;
         let past = Past::new(self, grids, left);
@@ -243,7 +246,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// For each owned point, the ids of the neighbours to which its bond is broken, ascending.
+    /// For each owned point, return the ids of the neighbours j of its broken bonds, ascending.
     fn broken(&self) -> Vec<Vec<u64>> {
         let mut broken = vec![Vec::new(); self.model.owned()];
         self.forces
@@ -252,8 +255,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         broken
     }
 
-    /// Break the bonds that were broken before, and bonds of new points that cross facets. The last number
-    /// of a row is the previous block of the point.
+    /// Break the bonds that were broken before the refinement, and bonds of new points that cross facets. The
+    /// last number of a row is the previous block of the point.
     fn inherit(
         &mut self,
         rows: &[f64],
@@ -297,7 +300,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             own.binary_search(&model.ids[there]).is_ok()
         };
         let cut = |here: usize, there: usize| {
-            // This bond already existed between these ends.
+            // Both points still have their previous blocks, so this bond existed before the refinement.
             if same[here] == 1.0 && same[there] == 1.0 {
                 return was_broken(here, there);
             }
@@ -319,7 +322,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.forces.cut(|point| concerned[point], cut);
     }
 
-    /// Set the state of the owned points from rows. The last number of a row is not part of the state.
+    /// Set the state of the owned points from rows. The last number of a row is the previous block, which is
+    /// not part of the state.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
         let volume = &self.model.volume;
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);

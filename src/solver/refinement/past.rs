@@ -1,4 +1,4 @@
-//! State of points before a refinement, and initial state of new points.
+//! State of points before a refinement, from which new points get their initial state.
 
 use rustc_hash::FxHashMap;
 
@@ -7,25 +7,26 @@ use crate::refine::{GridIndex, Grids, NodeKey};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
-/// Value in place of a block, for a point that did not exist before a refinement.
+/// Previous block of a point that did not exist before a refinement.
 pub const NOWHERE: f64 = -1.0;
 
-/// State of the local points, including ghosts, before a refinement. The columns are their state, with
-/// energies as densities, and their block as the last column.
+/// State of the local points, including ghosts, before a refinement. Energies are stored as densities. The
+/// last column is the block of the point.
 pub struct Past {
     pub columns: Vec<Vec<f64>>,
-    /// How new points get each column.
+    /// For each column, the rule by which new points get their values.
     births: Vec<Birth>,
-    /// Local index by body and grid index, in steps of the finest level, of points where a grid is refined.
+    /// Local index by body and grid index (in steps of the finest level). It contains the points where one of
+    /// the grids is refined.
     at: FxHashMap<(usize, GridIndex), usize>,
-    /// Which local points are removed.
+    /// Whether each local point is removed.
     leaves: Vec<bool>,
 }
 
 impl Past {
-    /// Collect the state before the nodes `left` are removed. Each node has its body, its canonical level,
-    /// and its grid index in steps of the finest level. The finest level comes first, and all ranks have
-    /// the same nodes. Collective.
+    /// Collect the state before the nodes `left` are removed. Each node consists of its body, its canonical
+    /// level, and its grid index in steps of the finest level. Nodes of the finest level must come first. All
+    /// ranks pass the same nodes. Collective.
     pub fn new<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
@@ -140,7 +141,7 @@ impl Past {
         (0..owned).filter(|point| !self.leaves[*point])
     }
 
-    /// A node and its parents, if this rank has all of them.
+    /// Local indices of a node and of its parents; `None` if this rank does not have all of them.
     fn with_parents(
         &self,
         grids: &Grids<'_>,
@@ -152,7 +153,7 @@ impl Past {
         Some((at(place)?, parents.collect::<Option<_>>()?))
     }
 
-    /// Ids and rows of the owned points that stay, and of the new points in this rank's `pieces`.
+    /// Ids and rows of the owned points that are not removed, and of the new points in this rank's `pieces`.
     pub fn rows<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
@@ -181,7 +182,7 @@ impl Past {
         (ids, rows)
     }
 
-    /// Index of the row of a new point, which is the mean of its parents.
+    /// Index of the first number in the row of a new point. The row is the mean of the rows of its parents.
     fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
         if let Some(row) = born.at.get(&(body, place)) {
             return *row;
@@ -213,10 +214,10 @@ impl Past {
     }
 }
 
-/// The rows of new points.
+/// The rows of new points, one after the other.
 #[derive(Default)]
 struct Born {
-    /// Index of the first number of the row, by body and grid index.
+    /// Index of the first number of each row, by body and grid index.
     at: FxHashMap<(usize, GridIndex), usize>,
     rows: Vec<f64>,
 }

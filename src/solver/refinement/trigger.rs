@@ -1,4 +1,4 @@
-//! Triggers: which points are refined during a run, and when.
+//! Triggers of refinement: which points are refined during a run, and when.
 
 use crate::comm::all_gather_many;
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
-/// A trigger; the points within its horizon are refined.
+/// A point in messages to all ranks: it marks the points within its horizon.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Source {
@@ -17,25 +17,25 @@ struct Source {
     horizon: f64,
 }
 
-/// Points that the triggers of all ranks select.
+/// Nodes that the triggering points of all ranks select.
 pub struct Wanted {
-    /// Points to refine.
+    /// Nodes at which the grid is refined.
     pub finer: Vec<NodeKey>,
-    /// Refined points to coarsen.
+    /// Nodes at which the grid is coarsened.
     pub coarser: Vec<NodeKey>,
 }
 
 /// Smallest damage that is not round-off.
 const LEAST_DAMAGE: f64 = 1e-9;
 
-/// With more grid positions than this within the horizon of a finer point, coarsening is not checked.
+/// Maximum number of grid positions within the horizon of a finer point, for which coarsening is checked.
 const MOST_PLACES: f64 = 1e4;
 
-/// Check that a run can refine as its problem requests.
+/// Check that a run supports the refinement of its problem.
 ///
 /// # Errors
-/// For horizons of very many spacings, and for loads on sets given by ids. During a run, also for
-/// relaxation and for steps that are rolled back.
+/// If horizons have very many spacings, or loads act on sets given by ids. For refinement during a run, also
+/// with relaxation or with steps that are rolled back.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
@@ -117,13 +117,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.trigger().is_some()
     }
 
-    /// Select the points to refine: those within the horizon of a trigger. Select the points to coarsen:
-    /// refined points that have not been within the horizon of a trigger or of a point with missing bonds
-    /// for long enough. Collective.
+    /// Select nodes to refine at the points within the horizon of a triggering point. Select nodes to coarsen
+    /// at refined points for which this was not true for the time in the deck. The points must also have been
+    /// outside the horizons of points with broken bonds for this time. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
         let pick = |block, position| self.grids.refining(block, position);
-        // Without coarsening, points that cannot be refined further are skipped.
+        // Without coarsening, points that cannot be refined further are not checked.
         let matters =
             |block, position| trigger.coarsen_after.is_some() || pick(block, position).is_some();
         let seen = self.seen(&self.sources(|point| triggers[point]), matters);
@@ -150,7 +150,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Wanted { finer, coarser }
     }
 
-    /// Apply `pick` to the blocks and positions of the marked points of all ranks.
+    /// Return the nodes that `pick` selects for the blocks and positions of the marked points, over all
+    /// ranks.
     fn picks(
         &self,
         marked: &[bool],
@@ -162,7 +163,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own.collect::<Vec<_>>())
     }
 
-    /// Mark the owned points that are triggers.
+    /// Mark the owned points that trigger refinement.
     fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
         let mut most = [0.0_f64];
@@ -192,7 +193,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (0..model.owned()).map(is_trigger).collect()
     }
 
-    /// The marked points of all ranks with their horizons.
+    /// Collect the marked points of all ranks with their horizons.
     fn sources(&self, marked: impl Fn(usize) -> bool) -> Vec<Source> {
         let model = &self.model;
         let own = (0..model.owned()).filter(|point| marked(*point));
@@ -205,8 +206,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own)
     }
 
-    /// Mark the owned points within the horizon of one of the sources. Only points for which `matters` (of
-    /// block and position) is true are checked.
+    /// Mark the owned points within the horizon of a source. Only points for which `matters(block, position)`
+    /// is true are checked.
     fn seen(&self, sources: &[Source], matters: impl Fn(usize, [f64; 3]) -> bool) -> Vec<bool> {
         let model = &self.model;
         let longest = sources
