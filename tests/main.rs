@@ -41,6 +41,7 @@ mod physics {
     mod dynamics;
     mod history;
     mod impact;
+    mod initial_files;
     mod load_factors;
     mod newton;
     mod pressed;
