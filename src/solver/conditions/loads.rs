@@ -49,6 +49,11 @@ impl<const D: usize> Load<D> {
         }
     }
 
+    /// Index of its condition.
+    pub fn condition(&self) -> usize {
+        self.condition
+    }
+
     /// Gets ready for a time (s) and factors by condition; `all`: also where nothing changes.
     pub fn set_time(&mut self, time: f64, factors: &[f64], all: bool) {
         let scale = factors[self.condition];
@@ -99,6 +104,17 @@ impl<const D: usize> Loaded<D> {
             let share = self.shares.as_ref().map(|shares| shares[k]);
             *force = whole.map(|component| share.map_or(component, |share| share * component));
         }
+    }
+
+    /// Index of the load.
+    pub fn load(&self) -> usize {
+        self.load
+    }
+
+    /// The points, by their index in the part, and the force density on them, N/m³.
+    pub fn densities(&self) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
+        let points = self.points.iter().map(|point| usize::from(*point));
+        points.zip(self.force.iter().copied())
     }
 
     /// Set the external forces of these points to 0.
