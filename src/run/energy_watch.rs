@@ -1,4 +1,4 @@
-//! Detection of unstable steps by the energy balance.
+//! Detection of unstable steps and of lost energy by the energy balance.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -6,7 +6,7 @@ use crate::comm::sum::reduce;
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
 use crate::solver::motion::Clock;
-use crate::solver::observers::HistoryRow;
+use crate::solver::observers::{Energies, HistoryRow};
 
 /// Ratio of energy gain to energy input above which a warning is printed. Near the stable step, the energy of
 /// the shortest waves at full steps oscillates by several times its mean, so smaller gains do not prove
@@ -21,6 +21,10 @@ const CERTAIN_GAIN: f64 = 1e9;
 
 /// If breaking bonds have added more energy than this fraction of the energy input, a warning is printed.
 const MAX_ADDED_FRACTION: f64 = 0.01;
+
+/// Error of the energy balance at the end of a run, as a fraction of the largest energy, above which a
+/// warning is printed. The explicit runs of `inputs/` have less than 0.01, also on coarse grids.
+const MAX_FINAL_ERROR: f64 = 0.2;
 
 /// Strain below which strain energy may be round-off.
 const ROUNDOFF_STRAIN: f64 = 1e-9;
@@ -118,5 +122,54 @@ impl EnergyWatch {
             clock.time(),
             100.0 * added / self.input,
         ))
+    }
+
+    /// Check the last row of a run. Return a warning if the energy balance does not close. `is_quasi_static`:
+    /// whether the run has load steps.
+    pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
+        let Energies {
+            kinetic,
+            strain,
+            fracture,
+            overshoot: _,
+            work,
+            dissipated,
+            error,
+        } = row.energies;
+        let all = [
+            kinetic,
+            strain,
+            fracture,
+            work,
+            dissipated,
+            row.first_energy,
+        ];
+        let largest = all.map(f64::abs).into_iter().fold(self.floor, f64::max);
+        if error.abs() <= MAX_FINAL_ERROR * largest {
+            return None;
+        }
+        let (size, percent) = (error.abs(), 100.0 * error.abs() / largest);
+        Some(if error > 0.0 {
+            let remedy = if is_quasi_static {
+                "twice as many load steps"
+            } else {
+                "half the time step"
+            };
+            format!(
+                "the energy has grown by {size:.3e} J, {percent:.0} % of the largest energy, which no load or support has \
+                 put in; repeat with {remedy} and compare"
+            )
+        } else if is_quasi_static {
+            format!(
+                "load steps have lost {size:.3e} J, {percent:.0} % of the largest energy, in jumps between equilibria: loads \
+                 that act in full in the first load step, or end at once, bodies that are stopped, unstable cracks, \
+                 snap-through or pieces that turn"
+            )
+        } else {
+            format!(
+                "the time steps have lost {size:.3e} J, {percent:.0} % of the largest energy; repeat with half the time step \
+                 and compare"
+            )
+        })
     }
 }

@@ -274,9 +274,10 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // The work of changing temperatures is not computed, so the energy of such runs is not checked.
-        let is_closed = !self.problem.is_quasi_static() && !self.problem.temperature_changes();
+        // The energy input from changing temperatures is not counted, so such runs are not checked.
+        let is_closed = !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
+        let is_quasi_static = self.problem.is_quasi_static();
         while !stepper.is_over() {
             if stepper.is_refinement_due()
                 && let Some(regridded) = stepper.at_full_step().refine()?
@@ -342,7 +343,9 @@ impl<'a> Job<'a> {
                     }
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
-                if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
+                if let (Some(energy), Some(row), false) =
+                    (&mut energy, recorder.row_of(&clock), is_quasi_static)
+                {
                     let growth = energy.check(row, &clock);
                     let of_breaking = energy.check_breaking(row, &clock);
                     match growth {
@@ -375,6 +378,11 @@ impl<'a> Job<'a> {
             }
         }
         self.warn_of_overshoot(recorder);
+        if let (Some(energy), Some(row)) = (&energy, &recorder.last_row)
+            && let Some(text) = energy.check_end(row, is_quasi_static)
+        {
+            self.observer.message(&Message::Warning(text));
+        }
         Ok(LoopEnd::Complete)
     }
 

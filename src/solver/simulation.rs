@@ -123,8 +123,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Create and distribute the points and bonds, and evaluate the forces at time 0.
     ///
     /// # Errors
-    /// If the points cannot be created, if a set of a condition is empty, or if there is no stable step.
-    /// The error is the same on all ranks.
+    /// If the points cannot be created, if a set of a condition is empty, if there is no stable step, or if no
+    /// support holds a loaded piece in load steps. The error is the same on all ranks.
     pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
@@ -151,6 +151,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         between()?;
         let mut simulation = Self::of_points(problem, comm, (pieces, refined), None, between)?;
         simulation.begin();
+        simulation.check_loads_are_held()?;
         simulation.can_bond_new_points()?;
         simulation.times.set_up = start.elapsed();
         Ok(simulation)

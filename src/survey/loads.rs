@@ -23,7 +23,7 @@ const LARGE_LAYER: u64 = 4_000_000;
 
 /// Check all conditions and append warnings. Collective.
 pub fn check_conditions<const D: usize>(
-    simulation: &Simulation<'_, D>,
+    simulation: &mut Simulation<'_, D>,
     warnings: &mut Vec<Warning>,
 ) {
     let problem = simulation.problem;
@@ -40,6 +40,10 @@ pub fn check_conditions<const D: usize>(
         }
     }
     inward_normals(simulation, &points, warnings);
+    if let Some(torque) = simulation.unheld_torque() {
+        let condition = &problem.conditions[torque.condition];
+        warn(condition, &torque.description, warnings);
+    }
 }
 
 fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {

@@ -7,6 +7,7 @@ use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
+use fissure::error::ErrorKind;
 use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
@@ -200,9 +201,19 @@ fn failure<const D: usize>(mut simulation: Simulation<D>) -> String {
     }
 }
 
+/// The message with which the set-up fails on each rank.
+fn refusals<const D: usize>(ranks: usize, deck: &str) -> Vec<String> {
+    let problem = problem(deck);
+    threads::run(ranks, |comm: &dyn Communicator| {
+        let error = Simulation::<D>::new(&problem, comm).err().unwrap();
+        assert_eq!(error.kind, ErrorKind::Input);
+        error.message
+    })
+}
+
 #[test]
 fn a_body_that_nothing_holds_says_so() {
-    let deck = plate_with_hole("load_steps = 1, iterations = 300")
+    let deck = plate_with_hole("load_steps = 2, iterations = 300")
         .replace(
             "hold = {",
             "other = { set = 'top', body_force = [0, 1e-9] }\n hold = {",
@@ -211,12 +222,52 @@ fn a_body_that_nothing_holds_says_so() {
             "set = 'bottom', displacement = [0, 0]",
             "set = 'bottom', displacement = ['free', 0]",
         );
-    simulate(&deck, |simulation: Simulation<2>| {
-        let text = failure(simulation);
-        let wanted = "no equilibrium within 300 iterations: loads of 1.500e-3 N act along x on a piece of body \
-                      `plate` that no support holds along x";
+    let wanted = "[condition.push] body_force: at t = 5.000000e-1 s, loads of 7.500e-4 N act along x on a piece of body \
+                  `plate` that no support holds along x";
+    for text in refusals::<2>(2, &deck) {
         assert!(text.contains(wanted), "{text}");
-    });
+    }
+}
+
+/// A bar with a weight that acts in the second of four load steps.
+fn weighed_bar(method: &str, weight: f64, hold: &str) -> String {
+    format!(
+        "dimension = '1d'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.m.pmb = {{ density = 2, youngs_modulus = 5 }}
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.02 }}
+        body.a = {{ material = 'm', damage = 'brittle', shape.box = {{ lower = [0], upper = [12] }} }}
+        set.left.where = 'x < 3'
+        condition.weight = {{ set = 'a', body_force = ['if(t > 0.4 && t < 0.6, {weight}, 0)'] }}
+        {hold}
+        time = {{ end = 1, method = '{method}', relaxation = {{ load_steps = 4, iterations = 2000 }} }}
+        "
+    )
+}
+
+#[test]
+fn a_body_does_not_drift_until_forces_are_round_off() {
+    for method in ["relaxation", "static"] {
+        let wanted = "loads of 1.200e-2 N act along x on a piece of body `a` that no support holds along x. The piece \
+                      has 12 points";
+        let text = simulate(&weighed_bar(method, 1e-3, ""), failure::<1>);
+        assert!(text.starts_with("t = 5.000000e-1 s: "), "{method}: {text}");
+        assert!(text.contains(wanted), "{method}: {text}");
+    }
+}
+
+#[test]
+fn a_piece_that_breaks_off_is_named() {
+    let hold = "condition.hold = { set = 'left', displacement = [0] }";
+    for method in ["relaxation", "static"] {
+        for ranks in [1, 2] {
+            let wanted = "loads of 9.000e-2 N act along x on a piece of body `a` that no support holds along x. The \
+                          piece has 9 points; point 3 at [3.5] m is one of them";
+            for text in simulate_on::<1, _>(ranks, &weighed_bar(method, 0.01, hold), failure) {
+                assert!(text.contains(wanted), "{method}: {text}");
+            }
+        }
+    }
 }
 
 /// Return the deck of a plate in three strips without bonds between them; the left strip is fixed.
@@ -247,15 +298,18 @@ fn a_loaded_piece_that_nothing_holds_is_named() {
     let wanted = "loads of 2.500e-1 N act along y on a piece of body `left` that no support holds along y. The \
                   piece has 60 points; point 8 at [8.5, 0.5] m is one of them";
     for ranks in [1, 2, 3] {
-        let texts = simulate_on::<2, _>(ranks, &strips(push), failure);
-        for text in texts {
+        for text in refusals::<2>(ranks, &strips(push)) {
+            assert!(
+                text.starts_with("[condition.push] force: "),
+                "{ranks}: {text}"
+            );
             assert!(text.contains(wanted), "{ranks}: {text}");
         }
     }
     // A support along x does not prevent motion along y.
     let guided = "condition.guide = { set = 'last', displacement = [0, 'free'] }
                   condition.push = { set = 'last', force = [0.25, 0.5] }";
-    let text = simulate(&strips(guided), failure::<2>);
+    let text = refusals::<2>(1, &strips(guided)).remove(0);
     let wanted = "loads of 5.000e-1 N act along y on a piece of body `right` that no support holds along y. The \
                   piece has 72 points";
     assert!(text.contains(wanted), "{text}");

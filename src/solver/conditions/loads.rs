@@ -50,6 +50,11 @@ impl<const D: usize> Load<D> {
         }
     }
 
+    /// Index of its condition.
+    pub fn condition(&self) -> usize {
+        self.condition
+    }
+
     /// Prepare the load for a time (s). `factors` has a factor per condition. With `all`, the force density
     /// is computed even if it has not changed.
     pub fn set_time(&mut self, time: f64, factors: &[f64], all: bool) {
@@ -101,6 +106,17 @@ impl<const D: usize> Loaded<D> {
             let share = self.shares.as_ref().map(|shares| shares[k]);
             *force = whole.map(|component| share.map_or(component, |share| share * component));
         }
+    }
+
+    /// Index of the load.
+    pub fn load(&self) -> usize {
+        self.load
+    }
+
+    /// Iterate over the points, by their index in the part, and the force density on them, N/m³.
+    pub fn densities(&self) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
+        let points = self.points.iter().map(|point| usize::from(*point));
+        points.zip(self.force.iter().copied())
     }
 
     /// Set the external forces of the loaded points to 0.

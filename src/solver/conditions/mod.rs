@@ -328,9 +328,33 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sum the kinetic energy (J) that a step (s) can add without work in the trapezoidal rule. It has two
-    /// parts: loads that act for one step on points at rest, and supported components with prescribed
-    /// velocity and acceleration.
+    /// Sum `weight` over these owned points for each load, a function of a point and the force of the load on
+    /// it (N). Returns the indices of the conditions and the sums. `points` is sorted.
+    pub fn load_sums(
+        &self,
+        model: &Model<D>,
+        points: &[usize],
+        weight: impl Fn(usize, [f64; D]) -> f64,
+    ) -> (Vec<usize>, Vec<ExactSum>) {
+        let conditions = self.loads.iter().map(Load::condition).collect();
+        let mut sums = vec![ExactSum::ZERO; self.loads.len()];
+        for (number, part) in self.on_parts.iter().enumerate() {
+            for loaded in &part.loads {
+                for (point, density) in loaded.densities() {
+                    let point = number * PART + point;
+                    if points.binary_search(&point).is_ok() {
+                        let force = density.map(|density| model.volume[point] * density);
+                        sums[loaded.load()].add(weight(point, force));
+                    }
+                }
+            }
+        }
+        (conditions, sums)
+    }
+
+    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) without work in
+    /// the trapezoidal rule. It has two parts: loads that act for one step on points at rest, and supported
+    /// components with prescribed velocity and acceleration.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density f of a point
     /// jumps, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without bound

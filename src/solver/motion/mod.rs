@@ -6,6 +6,7 @@ pub mod clock;
 mod coarse_grid;
 mod contact_step;
 pub mod fields;
+pub mod held;
 pub mod integrator;
 pub mod load_step;
 pub mod newton;

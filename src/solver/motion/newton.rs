@@ -144,7 +144,9 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
         } else {
             vectors.iterate(simulation, &rule);
         }
-        if simulation.load_step.residual <= rule.tolerance {
+        if simulation.is_drifting() {
+            vectors.bisect_or_fail(simulation, &rule);
+        } else if simulation.load_step.residual <= rule.tolerance {
             if simulation.break_or_settle() {
                 vectors.is_stale = true;
                 simulation.evaluate_at_rest();

@@ -1,100 +1,33 @@
-//! Pieces: sets of points that intact bonds connect, and the check that supports hold the loaded pieces.
+//! Pieces of the bodies: sets of points that intact bonds connect.
 
 use std::collections::BTreeMap;
 
-use crate::comm::sum::{ExactSum, reduce};
-use crate::comm::{Found, agree, least, total};
-use crate::error::{Error, Result};
+use crate::comm::{Found, least, total};
 use crate::solver::Simulation;
 
-/// Names of the components.
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// A sum of loads below this fraction of the sum of their magnitudes is round-off.
-const ROUND_OFF: f64 = 1e-9;
-
-/// Columns with one entry per local point; all points of a piece have the same entries.
-struct Pieces<const D: usize> {
+/// Data of the piece of each local point; the same at all points of a piece.
+pub(super) struct Pieces<const D: usize> {
     /// Smallest point id of the piece.
     first: Vec<f64>,
     /// 1 for each component that no support prescribes at any point of the piece, else 0.
-    is_free: [Vec<f64>; D],
+    pub is_free: [Vec<f64>; D],
     /// 0 for each component in which a load acts on a point of the piece, else 1.
-    is_unloaded: [Vec<f64>; D],
+    pub is_unloaded: [Vec<f64>; D],
+}
+
+/// A piece and this rank's points of it.
+pub(super) struct Piece {
+    /// Smallest point id of the piece.
+    first: u64,
+    /// Local indices of the points of this rank, ascending.
+    pub points: Vec<usize>,
+    /// Number of points of the piece over all ranks.
+    pub count: u64,
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return an error if a piece has a load along an axis along which no support holds it. Collective.
-    ///
-    /// # Errors
-    /// The message names the piece with the smallest point id.
-    pub(in crate::solver) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
-        let pieces = self.find_pieces();
-        let mut suspects: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
-        for point in 0..self.model.owned() {
-            let suspect =
-                |d: usize| pieces.is_free[d][point] == 1.0 && pieces.is_unloaded[d][point] == 0.0;
-            if (0..D).any(suspect) {
-                let points = suspects.entry(pieces.first[point] as u64).or_default();
-                points.push(point);
-            }
-        }
-        let mut from = 0;
-        loop {
-            let own = suspects.range(from..).next();
-            let own = own.map(|(first, _)| Found {
-                key: 0.0,
-                ids: [*first],
-                payload: (),
-            });
-            let Some(Found { ids: [first], .. }) = least(self.comm, own) else {
-                return Ok(());
-            };
-            let points = suspects.get(&first).map_or(&[][..], |points| &points[..]);
-            let count = total(self.comm, points.len() as u64);
-            if let Some((component, force)) = self.unbalanced_load(&pieces, points) {
-                let named = points.iter().find(|point| self.model.ids[**point] == first);
-                let named = named.map(|point| {
-                    let axis = AXES[component];
-                    let block = usize::from(self.model.block[*point]);
-                    Error::run(format!(
-                        "{failure}: loads of {force:.3e} N act along {axis} on a piece of body `{}` that no \
-                         support holds along {axis}. The piece has {count} points; point {first} at {:?} m is \
-                         one of them. Prescribe its displacement along {axis} at some points, or remove its \
-                         loads",
-                        self.problem.block(block).body.name,
-                        &self.model.position(*point)[..D],
-                    ))
-                });
-                agree(self.comm, named.map_or(Ok(()), Err))?;
-            }
-            from = first + 1;
-        }
-    }
-
-    /// Return the first free component in which the loads on a piece do not cancel, and the sum of these
-    /// loads (N). Collective.
-    fn unbalanced_load(&self, pieces: &Pieces<D>, points: &[usize]) -> Option<(usize, f64)> {
-        let mut is_held = [0.0; D];
-        let mut sums = [const { ExactSum::ZERO }; 6];
-        for point in points {
-            for d in 0..D {
-                let force = self.fields.external_force.as_ref();
-                let force = force.map_or(0.0, |force| force[d][*point]);
-                let force = force * self.model.volume[*point];
-                sums[d].add(force);
-                sums[3 + d].add(force.abs());
-                is_held[d] = 1.0 - pieces.is_free[d][*point];
-            }
-        }
-        self.comm.max(&mut is_held);
-        let sums = reduce(self.comm, &mut sums);
-        let unbalanced = |d: &usize| is_held[*d] == 0.0 && sums[*d].abs() > ROUND_OFF * sums[3 + d];
-        (0..D).find(unbalanced).map(|d| (d, sums[d]))
-    }
-
-    /// Find the piece of each local point. Collective.
-    fn find_pieces(&mut self) -> Pieces<D> {
+    /// Find the pieces of all bodies. Collective.
+    pub(super) fn find_pieces(&mut self) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {
             first: model.ids.iter().map(|id| *id as f64).collect(),
@@ -115,6 +48,71 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.spread_least(&mut pieces.columns());
         pieces
+    }
+
+    /// In the order of their smallest ids, call `look` with the pieces whose points are suspects, until it
+    /// returns a value. `is_suspect` has the same value at all points of a piece. Collective.
+    pub(super) fn first_of_pieces<T>(
+        &self,
+        pieces: &Pieces<D>,
+        is_suspect: impl Fn(usize) -> bool,
+        mut look: impl FnMut(Piece) -> Option<T>,
+    ) -> Option<T> {
+        let mut suspects: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for point in (0..self.model.owned()).filter(|point| is_suspect(*point)) {
+            let points = suspects.entry(pieces.first[point] as u64).or_default();
+            points.push(point);
+        }
+        let mut from = 0;
+        loop {
+            let own = suspects.range(from..).next();
+            let own = own.map(|(first, _)| Found {
+                key: 0.0,
+                ids: [*first],
+                payload: (),
+            });
+            let Found { ids: [first], .. } = least(self.comm, own)?;
+            let points = suspects.remove(&first).unwrap_or_default();
+            let count = total(self.comm, points.len() as u64);
+            let piece = Piece {
+                first,
+                points,
+                count,
+            };
+            if let Some(result) = look(piece) {
+                return Some(result);
+            }
+            from = first + 1;
+        }
+    }
+
+    /// Describe a piece: the name of a body that it belongs to, its size, and the position of a point. Collective.
+    pub(super) fn describe_piece(&self, piece: &Piece) -> [String; 2] {
+        let ids = &self.model.ids;
+        let named = piece.points.iter().find(|k| ids[**k] == piece.first);
+        let own = named.map(|point| {
+            let [x, y, z] = self.model.position(*point);
+            Found {
+                key: 0.0,
+                ids: [piece.first],
+                payload: [f64::from(self.model.block[*point]), x, y, z],
+            }
+        });
+        let Some(Found {
+            payload: [block, position @ ..],
+            ..
+        }) = least(self.comm, own)
+        else {
+            unreachable!("a rank owns the point with the smallest id");
+        };
+        let body = self.problem.block(block as usize).body.name.clone();
+        let size = format!(
+            "The piece has {} points; point {} at {:?} m is one of them",
+            piece.count,
+            piece.first,
+            &position[..D],
+        );
+        [body, size]
     }
 }
 

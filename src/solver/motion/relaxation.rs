@@ -68,7 +68,9 @@ impl<const D: usize> Simulation<'_, D> {
         self.look(before);
         let forces = self.times.forces.whole() - forces;
         self.times.motion += start.elapsed().saturating_sub(forces);
-        if self.load_step.residual <= rule.tolerance {
+        if self.is_drifting() {
+            self.load_step.has_failed = true;
+        } else if self.load_step.residual <= rule.tolerance {
             if self.break_or_settle() {
                 self.stop();
                 self.evaluate_at_rest();

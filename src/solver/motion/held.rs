@@ -1,0 +1,277 @@
+//! The check that supports hold the loaded pieces in load steps.
+
+use crate::comm::sum::{ExactSum, reduce};
+use crate::error::{Error, Result};
+use crate::problem::{Method, Relaxation, Static, Time};
+use crate::solver::Simulation;
+use crate::solver::model::Model;
+
+use super::Fields;
+use super::load_step::sums;
+use super::pieces::Piece;
+
+/// Names of the components.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// A sum of loads below this fraction of the sum of their magnitudes is round-off.
+const ROUND_OFF: f64 = 1e-9;
+
+/// A torque below this fraction of the sum of its magnitudes turns a piece by a small angle only.
+const SMALL_TORQUE: f64 = 0.01;
+
+/// Loads that act on a piece along an axis in which no support holds it.
+struct UnheldLoad {
+    piece: Piece,
+    component: usize,
+    /// Sum of the loads along the axis, N.
+    force: f64,
+}
+
+/// Loads that turn a piece that no support holds; equal on all ranks.
+pub struct UnheldTorque {
+    /// Index of the condition with the largest torque.
+    pub condition: usize,
+    /// Description of the piece, the axis and the torque.
+    pub description: String,
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Check that supports hold the loaded pieces at the first and the last load step of each stage.
+    /// Collective.
+    ///
+    /// # Errors
+    /// The message names the piece with the smallest point id.
+    pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
+        for (stage, time) in self.load_times() {
+            let found = self.with_loads(stage, time, |simulation| {
+                let unheld = simulation.unheld_load()?;
+                let component = unheld.component;
+                let along = |_: usize, force: [f64; D]| force[component];
+                let condition = simulation.largest_load(&unheld.piece.points, along);
+                Some((condition, simulation.describe_unheld_load(&unheld)))
+            });
+            if let Some((condition, text)) = found {
+                let condition = &self.problem.conditions[condition];
+                let (name, quantity) = (&condition.name, condition.quantity);
+                let message = format!("[condition.{name}] {quantity}: at t = {time:.6e} s, {text}");
+                return Err(Error::input(message).at(&condition.place));
+            }
+        }
+        Ok(())
+    }
+
+    /// Find loads of the first stage that turn a piece that no support holds in the plane of the rotation. The
+    /// simulation must be at time 0. Positions of later stages are unknown. Collective.
+    pub fn unheld_torque(&mut self) -> Option<UnheldTorque> {
+        let times = self.load_times().into_iter();
+        let mut times = times.filter(|(stage, _)| *stage == 0 && D > 1);
+        times.find_map(|(stage, time)| self.with_loads(stage, time, Self::find_unheld_torque))
+    }
+
+    /// Stage and time (s) of the first and the last load step of each stage with load steps. Empty with
+    /// contact, which can also hold pieces.
+    fn load_times(&self) -> Vec<(usize, f64)> {
+        let (mut times, mut begin) = (Vec::new(), 0.0);
+        for (stage, Time { end, method, .. }) in
+            self.stages.iter().map(|stage| stage.time).enumerate()
+        {
+            if let Some(load_steps) = method.load_steps().filter(|_| self.contact.is_none()) {
+                let first = begin + (end - begin) / load_steps as f64;
+                times.extend([(stage, first), (stage, end)]);
+            }
+            begin = end;
+        }
+        times
+    }
+
+    /// Call `look` with the loads and supports of a stage at a time (s). Afterwards, those of the first stage
+    /// at time 0 act again.
+    fn with_loads<T>(
+        &mut self,
+        stage: usize,
+        time: f64,
+        look: impl FnOnce(&mut Self) -> Option<T>,
+    ) -> Option<T> {
+        self.set_stage_loads(stage, time);
+        let result = if self.conditions.have_loads() {
+            look(self)
+        } else {
+            None
+        };
+        self.set_stage_loads(0, 0.0);
+        result
+    }
+
+    /// Let the loads and supports of a stage act, with the loads at a time (s).
+    fn set_stage_loads(&mut self, stage: usize, time: f64) {
+        let components = self.fields.external_force.iter_mut().flatten();
+        components.for_each(|component| component.fill(0.0));
+        self.enter(stage);
+        self.apply_loads(time, true);
+    }
+
+    /// Return an error if a piece is loaded along an axis in which no support holds it. Collective.
+    ///
+    /// # Errors
+    /// The message names the piece with the smallest point id.
+    pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
+        self.unheld_load().map_or(Ok(()), |unheld| {
+            let text = self.describe_unheld_load(&unheld);
+            Err(Error::run(format!("{failure}: {text}")))
+        })
+    }
+
+    /// Whether the positions count as an equilibrium because forces are round-off at large displacements, but
+    /// a loaded piece is not held. Collective.
+    pub(super) fn is_drifting(&mut self) -> bool {
+        self.load_step.residual == 0.0
+            && self.contact.is_none()
+            && self.conditions.have_loads()
+            && self.unheld_load().is_some()
+    }
+
+    /// Find the piece with the smallest point id that is loaded along an axis in which no support holds it,
+    /// so that no equilibrium within the tolerance exists. Collective.
+    fn unheld_load(&mut self) -> Option<UnheldLoad> {
+        let allowed = self.allowed_force();
+        let pieces = self.find_pieces();
+        let is_suspect = |point: usize, d: usize| {
+            pieces.is_free[d][point] == 1.0 && pieces.is_unloaded[d][point] == 0.0
+        };
+        let any = |point: usize| (0..D).any(|d| is_suspect(point, d));
+        self.first_of_pieces(&pieces, any, |piece| {
+            let mut is_held = [0.0; D];
+            let mut sums = [const { ExactSum::ZERO }; 6];
+            for point in &piece.points {
+                let force = load_on(&self.model, &self.fields, *point);
+                for d in 0..D {
+                    sums[d].add(force[d]);
+                    sums[3 + d].add(force[d].abs());
+                    is_held[d] = 1.0 - pieces.is_free[d][*point];
+                }
+            }
+            self.comm.max(&mut is_held);
+            let sums = reduce(self.comm, &mut sums);
+            // The norm of forces with a given sum is smallest if they are equal.
+            let allowed = allowed * (piece.count as f64).sqrt();
+            let unbalanced = |d: &usize| {
+                let force = sums[*d].abs();
+                is_held[*d] == 0.0 && force > allowed && force > ROUND_OFF * sums[3 + d]
+            };
+            (0..D).find(unbalanced).map(|component| UnheldLoad {
+                force: sums[component],
+                piece,
+                component,
+            })
+        })
+    }
+
+    /// Norm of the unbalanced forces (N) that the tolerance of the present stage allows with the present
+    /// loads, if there are no reactions. Collective.
+    fn allowed_force(&self) -> f64 {
+        let tolerance = match self.time_rule().method {
+            Method::Relaxation(Relaxation { tolerance, .. })
+            | Method::Static(Static { tolerance, .. }) => tolerance,
+            Method::Explicit => 0.0,
+        };
+        let (model, fields) = (&self.model, &self.fields);
+        let squares = sums(model, fields, |point, _| {
+            let force = load_on(model, fields, point);
+            [force.iter().map(|force| force * force).sum()]
+        });
+        tolerance * reduce(self.comm, &mut { squares })[0].sqrt()
+    }
+
+    fn describe_unheld_load(&self, unheld: &UnheldLoad) -> String {
+        let (axis, force) = (AXES[unheld.component], unheld.force);
+        let [body, size] = self.describe_piece(&unheld.piece);
+        format!(
+            "loads of {force:.3e} N act along {axis} on a piece of body `{body}` that no support holds along {axis}. \
+             {size}. Prescribe its displacement along {axis} at some points, \
+             balance its loads, or use `method = \"explicit\"`"
+        )
+    }
+
+    /// Find the piece with the smallest point id that the present loads turn.
+    fn find_unheld_torque(&mut self) -> Option<UnheldTorque> {
+        const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+        let pieces = self.find_pieces();
+        let planes = || (0..3).filter(|axis| PLANES[*axis].iter().all(|d| *d < D));
+        let is_suspect = |point: usize, axis: usize| {
+            let plane = PLANES[axis];
+            plane.iter().all(|d| pieces.is_free[*d][point] == 1.0)
+                && plane.iter().any(|d| pieces.is_unloaded[*d][point] == 0.0)
+        };
+        let any = |point: usize| planes().any(|axis| is_suspect(point, axis));
+        self.first_of_pieces(&pieces, any, |piece| {
+            let mut flags = [0.0; 3];
+            let mut moments = [const { ExactSum::ZERO }; 4];
+            for point in &piece.points {
+                planes().for_each(|axis| flags[axis] = f64::from(is_suspect(*point, axis)));
+                let volume = self.model.volume[*point];
+                moments[3].add(volume);
+                let place = self.place(*point);
+                (0..D).for_each(|d| moments[d].add(volume * place[d]));
+            }
+            self.comm.max(&mut flags);
+            let moments = reduce(self.comm, &mut moments);
+            let centroid: [f64; D] = std::array::from_fn(|d| moments[d] / moments[3]);
+            let torque = |axis: usize, point: usize, force: [f64; D]| {
+                let [a, b] = PLANES[axis];
+                let place = self.place(point);
+                (place[a] - centroid[a]) * force[b] - (place[b] - centroid[b]) * force[a]
+            };
+            let mut sums = [const { ExactSum::ZERO }; 6];
+            for point in &piece.points {
+                let force = load_on(&self.model, &self.fields, *point);
+                let place = self.place(*point);
+                for axis in planes() {
+                    let plane = PLANES[axis];
+                    let norm = |of: [f64; D]| libm::hypot(of[plane[0]], of[plane[1]]);
+                    let arm = std::array::from_fn(|d| place[d] - centroid[d]);
+                    sums[axis].add(torque(axis, *point, force));
+                    sums[3 + axis].add(norm(arm) * norm(force));
+                }
+            }
+            let sums = reduce(self.comm, &mut sums);
+            let turns = |axis: &usize| {
+                flags[*axis] == 1.0 && sums[*axis].abs() > SMALL_TORQUE * sums[3 + axis]
+            };
+            let axis = planes().find(turns)?;
+            let about = |point: usize, force: [f64; D]| torque(axis, point, force);
+            let [body, size] = self.describe_piece(&piece);
+            let (name, torque) = (AXES[axis], sums[axis]);
+            Some(UnheldTorque {
+                condition: self.largest_load(&piece.points, about),
+                description: format!(
+                    "loads with a torque of {torque:.3e} N m about {name} act on a piece of body `{body}` that no \
+                     support holds across {name}; it turns until the loads are aligned. {size}"
+                ),
+            })
+        })
+    }
+
+    /// Present position of an owned point, m.
+    fn place(&self, point: usize) -> [f64; D] {
+        let displacement = &self.fields.displacement;
+        std::array::from_fn(|d| self.model.reference[d][point] + displacement[d][point])
+    }
+
+    /// Index of the condition whose load on these points has the largest sum of `weight`, a function of a
+    /// point and the force on it (N). `points` is sorted. Collective.
+    fn largest_load(&self, points: &[usize], weight: impl Fn(usize, [f64; D]) -> f64) -> usize {
+        let (conditions, mut sums) = self.conditions.load_sums(&self.model, points, weight);
+        let sums = reduce(self.comm, &mut sums).into_iter();
+        let all = conditions.into_iter().zip(sums.map(f64::abs));
+        let largest = all.reduce(|a, b| if b.1 > a.1 { b } else { a });
+        largest.expect("a loaded piece has loads").0
+    }
+}
+
+/// Sum of the loads on an owned point, N.
+fn load_on<const D: usize>(model: &Model<D>, fields: &Fields<D>, point: usize) -> [f64; D] {
+    let (force, volume) = (fields.external_force.as_ref(), model.volume[point]);
+    force.map_or([0.0; D], |force| {
+        force.each_ref().map(|force| volume * force[point])
+    })
+}
