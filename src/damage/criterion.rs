@@ -1,6 +1,7 @@
 //! When a bond breaks, decided by the same operations from both ends: stretches are compared by x of
-//! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states.
+//! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states, stresses by their mean.
 
+use super::{StressMeasure, StressRule};
 use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, Law};
@@ -23,6 +24,10 @@ pub enum Criterion {
     Work([f64; 2], WorkRule),
     /// As [`Self::Work`], from the work thresholds of the two points.
     WorkThresholds(HorizonRatios, WorkRule),
+    /// When the mean stress of the acting ends reaches this strength, Pa.
+    Stress(f64, StressRule),
+    /// As [`Self::Stress`], at the smaller strength of the two points.
+    StressThresholds(StressRule),
 }
 
 /// Factors that convert the work threshold of a point to the horizon of an end of the bond: entry `[e][k]` takes that of
@@ -84,13 +89,23 @@ pub enum WorkMeasure {
     Displacement,
 }
 
-/// Which bonds break by their work.
+/// Which bonds break by their work or by stress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
     /// Those that are longer than in the undeformed body.
     Pulled,
     /// Pressed ones as well.
     Either,
+}
+
+impl Sense {
+    /// The sense of bonds between points with this and another one: a pressed bond breaks where both say so.
+    pub fn of_both(self, other: Self) -> Self {
+        match self {
+            Self::Either => other,
+            Self::Pulled => self,
+        }
+    }
 }
 
 /// The own and the far ends of eight bonds: their laws and what they know.
@@ -109,10 +124,12 @@ pub struct Ends<'a, L, P> {
 /// What criteria read of eight points, where they read it.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// The stretches or works (J/m⁶) at which their bonds break.
+    /// The stretches, works (J/m⁶) or stresses (Pa) at which their bonds break.
     pub thresholds: Lanes,
     /// Their [`Law::truncation_factor`].
     pub truncation_factors: Lanes,
+    /// The measure of their stress that the criterion reads, Pa; −∞ for points that carry no stress.
+    pub stresses: Lanes,
 }
 
 impl Limits {
@@ -122,6 +139,7 @@ impl Limits {
         Self {
             thresholds: Lanes::splat(0.0),
             truncation_factors: Lanes::splat(1.0),
+            stresses: Lanes::splat(f64::NEG_INFINITY),
         }
     }
 }
@@ -132,7 +150,10 @@ impl Criterion {
     pub fn reads_thresholds(self) -> bool {
         matches!(
             self,
-            Self::Thresholds(_) | Self::ThresholdsBetween(..) | Self::WorkThresholds(..)
+            Self::Thresholds(_)
+                | Self::ThresholdsBetween(..)
+                | Self::WorkThresholds(..)
+                | Self::StressThresholds(_)
         )
     }
 
@@ -153,6 +174,15 @@ impl Criterion {
                 rule.measure == WorkMeasure::Objective
             }
             _ => false,
+        }
+    }
+
+    /// The measure of the stress of points that it reads, if it reads one.
+    #[inline(always)]
+    pub fn stress_measure(self) -> Option<StressMeasure> {
+        match self {
+            Self::Stress(_, rule) | Self::StressThresholds(rule) => Some(rule.measure),
+            _ => None,
         }
     }
 
@@ -212,6 +242,14 @@ impl Criterion {
                     Sense::Either => spent,
                 }
             }
+            Self::Stress(_, rule) | Self::StressThresholds(rule) => {
+                let (stress, acting) = mean_stress(simd, ends);
+                let reached = simd.at_least(stress, self.threshold(simd, bond, ends)) & acting;
+                match rule.sense {
+                    Sense::Pulled => reached & bond.relative_square_extension.above(0.0),
+                    Sense::Either => reached,
+                }
+            }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(_)
             | Self::Thresholds(_)
@@ -224,7 +262,7 @@ impl Criterion {
         }
     }
 
-    /// The stretch or work at which each bond breaks.
+    /// The stretch, work or stress at which each bond breaks.
     #[inline(always)]
     fn threshold<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -236,7 +274,8 @@ impl Criterion {
         match self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) => Lanes::splat(critical),
+            Self::Stretch(critical) | Self::Stress(critical, _) => Lanes::splat(critical),
+            Self::StressThresholds(_) => (ends.limits[0].thresholds).min(ends.limits[1].thresholds),
             Self::Work([i, j], rule) => {
                 rule.sum_of_acting(simd, [Lanes::splat(i), Lanes::splat(j)], ends)
             }
@@ -273,7 +312,7 @@ impl Criterion {
     }
 
     /// The share of the energy of each broken bond that it held above its criterion, because it was
-    /// seen late: 1 − (s_c/s)² or 1 − w_c/w. The bond must know its stretch.
+    /// seen late: 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)². The bond must know its stretch.
     #[inline(always)]
     pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -286,11 +325,30 @@ impl Criterion {
         let ratio = if self.reads_work() {
             threshold / work
         } else {
-            let ratio = threshold / bond.stretch;
+            let reached = match self {
+                Self::Stress(..) | Self::StressThresholds(_) => mean_stress(simd, ends).0,
+                _ => bond.stretch,
+            };
+            let ratio = threshold / reached;
             ratio * ratio
         };
         (Lanes::splat(1.0) - ratio).max(Lanes::splat(0.0))
     }
+}
+
+/// The mean stress (Pa) of the ends of each bond, and a bit for each bond that has one. An end takes part if the bond is
+/// within its horizon and its point carries stress. Both ends compute the same bits.
+#[inline(always)]
+fn mean_stress<S: Simd, L, P>(simd: S, ends: Ends<'_, L, P>) -> (Lanes, u8) {
+    let [i, j] = ends.limits.map(|end| end.stresses);
+    let [acts_i, acts_j] = ends.weights.acting();
+    let acts_i = acts_i & i.above(f64::NEG_INFINITY);
+    let acts_j = acts_j & j.above(f64::NEG_INFINITY);
+    let sum = simd.keep(i, acts_i) + simd.keep(j, acts_j);
+    (
+        simd.select(sum * 0.5, acts_i & acts_j, sum),
+        acts_i | acts_j,
+    )
 }
 
 impl WorkRule {
@@ -298,11 +356,7 @@ impl WorkRule {
     /// correction counts, and work is objective where either is.
     pub fn of_both(self, other: Self) -> Self {
         Self {
-            sense: if self.sense == Sense::Either {
-                other.sense
-            } else {
-                Sense::Pulled
-            },
+            sense: self.sense.of_both(other.sense),
             family_correction: self.family_correction.min(other.family_correction),
             measure: if self.measure == WorkMeasure::Objective {
                 self.measure

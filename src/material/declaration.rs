@@ -34,6 +34,8 @@ pub struct Declaration {
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
     /// Whether bonds can break by the work done on them.
     pub breaks_by_energy: bool,
+    /// Whether bonds can break by the stress of their points.
+    pub breaks_by_stress: bool,
     /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break by
     /// their stretch.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
@@ -65,6 +67,7 @@ impl Declaration {
             fault: None,
             elastic: None,
             breaks_by_energy: false,
+            breaks_by_stress: false,
             critical_stretch: None,
             own_critical_stretch: None,
             horizon_fault: None,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use super::{Calibration, Law, ThermalExpansion, WorkRule};
+use super::{Calibration, Law, StressRule, ThermalExpansion, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
@@ -248,9 +248,11 @@ pub enum DamageRule {
         /// How the work is looked at; for laws that are not bond-based.
         work: WorkRule,
     },
+    /// The stress of the points of the bond.
+    Stress(StressRule),
 }
 
-/// Toughness, in one of three measures.
+/// Toughness, in one of four measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Toughness {
     /// G0, J/m².
@@ -259,6 +261,8 @@ pub enum Toughness {
     FractureToughness(f64),
     /// s0 itself, for laws with a critical stretch.
     CriticalStretch(f64),
+    /// Strength, Pa, for damage by stress.
+    Strength(f64),
 }
 
 /// Source of a body's points.

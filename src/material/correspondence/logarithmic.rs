@@ -105,6 +105,11 @@ pub fn add(entries: &mut [f64; 6], change: &Matrix3<f64>) {
     }
 }
 
+/// Eigenvalues of a symmetric matrix, in no order.
+pub fn eigenvalues(m: &Matrix3<f64>) -> Vector3<f64> {
+    eigen(*m).0
+}
+
 /// Eigenvalues of a symmetric matrix and its eigenvectors, by columns. Jacobi's method takes sums, products, quotients and
 /// square roots alone, so that the bits are the same on every machine.
 fn eigen(mut m: Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
