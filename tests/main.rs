@@ -55,6 +55,7 @@ mod physics {
 mod fracture {
     mod adaptive;
     mod crack_paths;
+    mod failure_by_stress;
     mod fracture_energy;
     mod fronts;
     mod scatter;

@@ -242,8 +242,8 @@ pub struct Stress {
     pub measure: StressMeasure,
     /// Stress at which bonds break, in Pa.
     pub strength: Number,
-    /// Whether only bonds that are longer than initially can break; false if not given.
-    #[serde(default)]
+    /// Whether only bonds that are longer than initially can break.
+    #[serde(default = "yes")]
     pub tension_only: bool,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
