@@ -66,9 +66,13 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                 DamageLaw::BondEnergy(law) => {
                     report.line("critical energy", format_args!("{:.4e} J/m⁶", law.critical));
                 }
+                DamageLaw::Stress(law) => {
+                    report.line("breaks by", law.rule.measure.name());
+                    report.line("strength", si(law.strength, "Pa"));
+                }
             }
-            // A softening material has a damage law without a damage section, and no alpha.
-            if body.damage.is_some() {
+            // Bonds that soften are broken by their law, without a damage section. Damage by stress has no alpha.
+            if body.damage.is_some() && damage.stress_measure().is_none() {
                 report.line("alpha", damage.alpha());
             }
             if let Some(weibull) = laws.weibull {
@@ -223,6 +227,7 @@ fn pair_damage(laws: [DamageLaw; 2]) -> String {
     match laws[0] {
         DamageLaw::CriticalStretch(_) => format!("critical stretch {values}"),
         DamageLaw::BondEnergy(_) => format!("critical energy {values} J/m⁶"),
+        DamageLaw::Stress(law) => format!("{} {values} Pa", law.rule.measure.name()),
     }
 }
 

@@ -1,6 +1,8 @@
 //! Criteria that break bonds. Both ends of a bond decide with the same operations. Stretches are compared by
-//! x of [`crate::material::bond`], which needs no root; energies by the work of both force states.
+//! x of [`crate::material::bond`], which needs no root; energies by the work of both force states; stresses by
+//! the mean of both points.
 
+use super::{StressMeasure, StressRule};
 use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, Law};
@@ -25,6 +27,10 @@ pub enum Criterion {
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule),
+    /// When the mean stress of the acting ends reaches this strength, Pa.
+    Stress(f64, StressRule),
+    /// As [`Self::Stress`], at the smaller strength of the two points.
+    StressThresholds(StressRule),
 }
 
 /// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k
@@ -88,13 +94,23 @@ pub enum WorkMeasure {
     Displacement,
 }
 
-/// Bonds that the energy criterion can break.
+/// Bonds that the criteria of energy and stress can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
     /// Only bonds that are longer than in the undeformed body.
     Pulled,
     /// Compressed bonds as well.
     Either,
+}
+
+impl Sense {
+    /// Combine the settings of two blocks for the bonds between them. Compressed bonds break if both say so.
+    pub fn of_both(self, other: Self) -> Self {
+        match self {
+            Self::Either => other,
+            Self::Pulled => self,
+        }
+    }
 }
 
 /// Data of both ends of eight bonds.
@@ -113,10 +129,12 @@ pub struct Ends<'a, L, P> {
 /// Data of eight points that criteria read.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Stretches or works (J/m⁶) at which the bonds of the points break.
+    /// Stretches, works (J/m⁶) or stresses (Pa) at which the bonds of the points break.
     pub thresholds: Lanes,
     /// [`Law::truncation_factor`] of the points.
     pub truncation_factors: Lanes,
+    /// The measure of their stress that the criterion reads, Pa; −∞ for points that carry no stress.
+    pub stresses: Lanes,
 }
 
 impl Limits {
@@ -126,6 +144,7 @@ impl Limits {
         Self {
             thresholds: Lanes::splat(0.0),
             truncation_factors: Lanes::splat(1.0),
+            stresses: Lanes::splat(f64::NEG_INFINITY),
         }
     }
 }
@@ -136,7 +155,10 @@ impl Criterion {
     pub fn reads_thresholds(self) -> bool {
         matches!(
             self,
-            Self::Thresholds(_) | Self::ThresholdsBetween(..) | Self::WorkThresholds(..)
+            Self::Thresholds(_)
+                | Self::ThresholdsBetween(..)
+                | Self::WorkThresholds(..)
+                | Self::StressThresholds(_)
         )
     }
 
@@ -157,6 +179,15 @@ impl Criterion {
                 rule.measure == WorkMeasure::Objective
             }
             _ => false,
+        }
+    }
+
+    /// The measure of the stress of points that the criterion reads, if any.
+    #[inline(always)]
+    pub fn stress_measure(self) -> Option<StressMeasure> {
+        match self {
+            Self::Stress(_, rule) | Self::StressThresholds(rule) => Some(rule.measure),
+            _ => None,
         }
     }
 
@@ -217,6 +248,14 @@ impl Criterion {
                     Sense::Either => spent,
                 }
             }
+            Self::Stress(_, rule) | Self::StressThresholds(rule) => {
+                let (stress, acting) = mean_stress(simd, ends);
+                let reached = simd.at_least(stress, self.threshold(simd, bond, ends)) & acting;
+                match rule.sense {
+                    Sense::Pulled => reached & bond.relative_square_extension.above(0.0),
+                    Sense::Either => reached,
+                }
+            }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(_)
             | Self::Thresholds(_)
@@ -229,7 +268,7 @@ impl Criterion {
         }
     }
 
-    /// Return the stretch or work at which each bond breaks.
+    /// Return the stretch, work or stress at which each bond breaks.
     #[inline(always)]
     fn threshold<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -241,7 +280,8 @@ impl Criterion {
         match self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) => Lanes::splat(critical),
+            Self::Stretch(critical) | Self::Stress(critical, _) => Lanes::splat(critical),
+            Self::StressThresholds(_) => (ends.limits[0].thresholds).min(ends.limits[1].thresholds),
             Self::Work([i, j], rule) => {
                 rule.sum_of_acting(simd, [Lanes::splat(i), Lanes::splat(j)], ends)
             }
@@ -278,7 +318,7 @@ impl Criterion {
     }
 
     /// Fraction of the energy of each broken bond that exceeds its criterion, because breaking is checked
-    /// once per step: 1 − (s_c/s)² or 1 − w_c/w. The stretch of the bond must be set.
+    /// once per step: 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)². The stretch of the bond must be set.
     #[inline(always)]
     pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
         self,
@@ -291,11 +331,30 @@ impl Criterion {
         let ratio = if self.reads_work() {
             threshold / work
         } else {
-            let ratio = threshold / bond.stretch;
+            let reached = match self {
+                Self::Stress(..) | Self::StressThresholds(_) => mean_stress(simd, ends).0,
+                _ => bond.stretch,
+            };
+            let ratio = threshold / reached;
             ratio * ratio
         };
         (Lanes::splat(1.0) - ratio).max(Lanes::splat(0.0))
     }
+}
+
+/// The mean stress (Pa) of the ends of each bond, and a bit for each bond that has one. An end takes part if the bond is
+/// within its horizon and its point carries stress. Both ends compute the same bits.
+#[inline(always)]
+fn mean_stress<S: Simd, L, P>(simd: S, ends: Ends<'_, L, P>) -> (Lanes, u8) {
+    let [i, j] = ends.limits.map(|end| end.stresses);
+    let [acts_i, acts_j] = ends.weights.acting();
+    let acts_i = acts_i & i.above(f64::NEG_INFINITY);
+    let acts_j = acts_j & j.above(f64::NEG_INFINITY);
+    let sum = simd.keep(i, acts_i) + simd.keep(j, acts_j);
+    (
+        simd.select(sum * 0.5, acts_i & acts_j, sum),
+        acts_i | acts_j,
+    )
 }
 
 impl WorkRule {
@@ -303,11 +362,7 @@ impl WorkRule {
     /// so. The smaller correction holds. Work is objective if either rule says so.
     pub fn of_both(self, other: Self) -> Self {
         Self {
-            sense: if self.sense == Sense::Either {
-                other.sense
-            } else {
-                Sense::Pulled
-            },
+            sense: self.sense.of_both(other.sense),
             family_correction: self.family_correction.min(other.family_correction),
             measure: if self.measure == WorkMeasure::Objective {
                 self.measure

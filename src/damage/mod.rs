@@ -4,12 +4,14 @@ mod bond_energy;
 mod criterion;
 mod critical_stretch;
 mod pull_apart;
+mod stress;
 
 pub use bond_energy::{BondEnergy, Calibration};
 pub use criterion::{
     Criterion, Ends, HorizonRatios, Limits, Sense, StretchConversion, WorkMeasure, WorkRule,
 };
 pub use critical_stretch::CriticalStretch;
+pub use stress::{StressLimit, StressMeasure, StressRule};
 
 /// The damage law of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,14 +20,17 @@ pub enum DamageLaw {
     CriticalStretch(CriticalStretch),
     /// Bonds break by the work of their force states.
     BondEnergy(BondEnergy),
+    /// By the stress of points.
+    Stress(StressLimit),
 }
 
 impl DamageLaw {
-    /// Return the stretch or work (J/m⁶) at which bonds of the undeformed body break.
+    /// Return the stretch, work (J/m⁶) or stress (Pa) at which bonds of the undeformed body break.
     pub fn critical(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.critical,
             Self::BondEnergy(law) => law.critical,
+            Self::Stress(law) => law.strength,
         }
     }
 
@@ -34,13 +39,14 @@ impl DamageLaw {
         match self {
             Self::CriticalStretch(law) => law.alpha,
             Self::BondEnergy(law) => law.alpha,
+            Self::Stress(_) => 0.0,
         }
     }
 
     /// The factor [`WorkRule::family_correction`]; 0 for the stretch criterion.
     pub fn family_correction(&self) -> f64 {
         match self {
-            Self::CriticalStretch(_) => 0.0,
+            Self::CriticalStretch(_) | Self::Stress(_) => 0.0,
             Self::BondEnergy(law) => law.rule.family_correction,
         }
     }
@@ -48,8 +54,16 @@ impl DamageLaw {
     /// Whether bonds break by work without the part of rigid rotation ([`WorkMeasure::Objective`]).
     pub fn is_objective_work(&self) -> bool {
         match self {
-            Self::CriticalStretch(_) => false,
+            Self::CriticalStretch(_) | Self::Stress(_) => false,
             Self::BondEnergy(law) => law.rule.measure == WorkMeasure::Objective,
+        }
+    }
+
+    /// The measure of the stress that breaks bonds, if stress breaks them.
+    pub fn stress_measure(&self) -> Option<StressMeasure> {
+        match self {
+            Self::Stress(law) => Some(law.rule.measure),
+            Self::CriticalStretch(_) | Self::BondEnergy(_) => None,
         }
     }
 
@@ -60,6 +74,7 @@ impl DamageLaw {
         match self {
             Self::CriticalStretch(law) => law.threshold(strength, smallest),
             Self::BondEnergy(law) => law.threshold(strength, smallest),
+            Self::Stress(law) => strength * law.strength,
         }
     }
 }

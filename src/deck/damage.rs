@@ -6,7 +6,10 @@ use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
-use crate::problem::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
+use crate::problem::{
+    self, Calibration, DamageRule, Sense, StressMeasure, StressRule, Toughness, WorkMeasure,
+    WorkRule,
+};
 use crate::scatter::Weibull;
 
 /// A measure of toughness: its key, its value in the deck, and the constructor of [`Toughness`].
@@ -64,11 +67,7 @@ pub fn damage(
                 return Err(scope.error(law.calibration.span(), message));
             }
             let work = WorkRule {
-                sense: if law.tension_only {
-                    Sense::Pulled
-                } else {
-                    Sense::Either
-                },
+                sense: sense(law.tension_only),
                 family_correction: family_correction(scope, &law.family_correction, &key)?,
                 measure: match calibration {
                     Calibration::Willberg2022
@@ -85,6 +84,33 @@ pub fn damage(
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
             })
         }
+        grammar::Damage::Stress(spanned) => {
+            let law = spanned.get_ref();
+            let key = format!("[damage.{name}.stress]");
+            let rule = StressRule {
+                measure: match law.measure {
+                    grammar::StressMeasure::VonMises => StressMeasure::VonMises,
+                    grammar::StressMeasure::Principal => StressMeasure::Principal,
+                },
+                sense: sense(law.tension_only),
+            };
+            let strength = scope.positive(&law.strength, &format!("{key} strength"))?;
+            Ok(problem::Damage {
+                rule: DamageRule::Stress(rule),
+                toughness: Toughness::Strength(strength),
+                alpha: 0.0,
+                weibull: weibull(scope, &law.weibull_modulus, &law.seed, &key)?,
+                no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
+            })
+        }
+    }
+}
+
+fn sense(tension_only: bool) -> Sense {
+    if tension_only {
+        Sense::Pulled
+    } else {
+        Sense::Either
     }
 }
 

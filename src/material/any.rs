@@ -4,7 +4,8 @@
 use nalgebra::SMatrix;
 
 use super::{
-    AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Property, Rotation, with_law,
+    AnyLaw, Bond, COUNTS, Described, FamilyStress, ForceState, Law, PlasticState, Property,
+    Rotation, with_law,
 };
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
@@ -232,6 +233,15 @@ impl<const D: usize> Law<D> for AnyLaw {
 
     fn rotation(&self, sums: &[f64]) -> Rotation {
         with_law!(self, law => Law::<D>::rotation(law, sums))
+    }
+
+    fn family_stress(
+        &self,
+        sums: &[f64],
+        numbers: &[f64],
+        state: &PlasticState,
+    ) -> Option<FamilyStress<D>> {
+        with_law!(self, law => Law::<D>::family_stress(law, sums, numbers, state))
     }
 
     #[inline(never)]

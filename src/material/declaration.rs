@@ -34,6 +34,8 @@ pub struct Declaration {
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
     /// Whether the energy criterion can break bonds of this law.
     pub breaks_by_energy: bool,
+    /// Whether the stress criterion can break bonds of this law.
+    pub breaks_by_stress: bool,
     /// Return the critical stretch of a fracture energy (J/m²); `None` if no stretch criterion can break the
     /// bonds.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
@@ -65,6 +67,7 @@ impl Declaration {
             fault: None,
             elastic: None,
             breaks_by_energy: false,
+            breaks_by_stress: false,
             critical_stretch: None,
             own_critical_stretch: None,
             horizon_fault: None,

@@ -36,7 +36,7 @@ mod tensor_pmb;
 
 pub use any::{AnyHistory, AnyPoint, Counts, MOST};
 pub use bond::Bond;
-pub use correspondence::{FamilyShare, ShapeTensor, determinant, family_share};
+pub use correspondence::{FamilyShare, ShapeTensor, determinant, eigenvalues, family_share};
 pub use declaration::{
     Built, Declaration, Declared, Given, Invariants, Key, Kind, LawFault, OfLength, Value, Values,
     Word,
@@ -87,6 +87,17 @@ impl fmt::Display for Property {
             Self::Text(words) => formatter.write_str(words),
         }
     }
+}
+
+/// The stress of a point whose law has a deformation gradient per point.
+#[derive(Debug, Clone, Copy)]
+pub struct FamilyStress<const D: usize> {
+    /// Displacement gradient H = F − I.
+    pub gradient: SMatrix<f64, D, D>,
+    /// First Piola–Kirchhoff stress P, Pa.
+    pub piola: SMatrix<f64, D, D>,
+    /// Plastic state at this gradient.
+    pub plastic: PlasticState,
 }
 
 /// Description of a law for reports.
@@ -268,6 +279,17 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// bonds.
     fn rotation(&self, _sums: &[f64]) -> Rotation {
         rotation::IDENTITY
+    }
+
+    /// The stress of a point, from the sums of the first pass, its numbers and its plastic state before or after flow; for
+    /// laws with a deformation gradient per point. `None` where a point carries no stress.
+    fn family_stress(
+        &self,
+        _sums: &[f64],
+        _numbers: &[f64],
+        _state: &PlasticState,
+    ) -> Option<FamilyStress<D>> {
+        None
     }
 
     /// Contribution of a bond to the strain energy density of one end, J/m⁶.

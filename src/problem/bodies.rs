@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use super::{Calibration, Law, ThermalExpansion, WorkRule};
+use super::{Calibration, Law, StressRule, ThermalExpansion, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
@@ -249,9 +249,11 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
+    /// The stress of the points of the bond.
+    Stress(StressRule),
 }
 
-/// Toughness, as one of three quantities.
+/// Toughness, as one of four quantities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Toughness {
     /// G0, J/m².
@@ -260,6 +262,8 @@ pub enum Toughness {
     FractureToughness(f64),
     /// Critical stretch s0, for laws with a critical stretch.
     CriticalStretch(f64),
+    /// Strength, Pa, for damage by stress.
+    Strength(f64),
 }
 
 /// Source of a body's points.

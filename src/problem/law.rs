@@ -117,6 +117,7 @@ impl Law {
                 }
                 (|law| law.breaks_by_energy, "by energy")
             }
+            DamageRule::Stress(_) => (|law| law.breaks_by_stress, "by stress"),
         };
         let is_given = matches!(damage.toughness, super::Toughness::CriticalStretch(_));
         let scales = !is_given && (self.declaration.scales_thresholds)(&self.values);

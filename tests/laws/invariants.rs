@@ -69,7 +69,16 @@ impl Case {
         // all would break.
         let either = by_energy && self.law.any_poisson_ratio;
         let either = either.then(|| energy(0.02, ", tension_only = false, family_correction = 1"));
-        stretch.into_iter().chain(pulled).chain(either).collect()
+        let stress = |measure: &str, more: &str| {
+            format!("damage.brittle.stress = {{ measure = '{measure}', strength = 0.25{more} }}")
+        };
+        let stress = [
+            stress("principal", ", tension_only = false"),
+            stress("von_mises", ""),
+        ];
+        let by_stress = stress.into_iter().filter(|_| self.law.breaks_by_stress);
+        let by_energy = stretch.into_iter().chain(pulled).chain(either);
+        by_energy.chain(by_stress).collect()
     }
 
     fn invariants(&self) -> Invariants {

@@ -164,6 +164,8 @@ pub enum Damage {
     CriticalStretch(Spanned<CriticalStretch>),
     /// A bond breaks permanently when the work done on it reaches a critical value.
     Energy(Spanned<BondEnergy>),
+    /// A bond breaks permanently when the mean stress of its points reaches a strength.
+    Stress(Spanned<Stress>),
 }
 
 /// Critical stretch, given by exactly one of three measures of toughness.
@@ -230,6 +232,38 @@ pub struct BondEnergy {
     /// Sets of points whose bonds never break.
     #[serde(default)]
     pub no_failure: Vec<Text>,
+}
+
+/// Strength of the points, compared with a measure of their Cauchy stress.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stress {
+    /// The measure: "principal" is the largest principal stress, "von_mises" the von Mises stress.
+    pub measure: StressMeasure,
+    /// Stress at which bonds break, in Pa.
+    pub strength: Number,
+    /// Whether only bonds that are longer than initially can break.
+    #[serde(default = "yes")]
+    pub tension_only: bool,
+    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weibull_modulus: Option<Number>,
+    /// Seed of the random strengths of `weibull_modulus`; 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<Spanned<u64>>,
+    /// Sets of points whose bonds never break.
+    #[serde(default)]
+    pub no_failure: Vec<Text>,
+}
+
+/// Scalar measure of the Cauchy stress of a point.
+#[derive(Debug, Clone, Copy, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StressMeasure {
+    /// The von Mises stress.
+    VonMises,
+    /// The largest principal stress.
+    Principal,
 }
 
 /// How the critical work of bonds follows from the fracture energy.

@@ -109,6 +109,11 @@ pub fn add(entries: &mut [f64; 6], change: &Matrix3<f64>) {
     }
 }
 
+/// Return the eigenvalues of a symmetric matrix, in no particular order.
+pub fn eigenvalues(m: &Matrix3<f64>) -> Vector3<f64> {
+    eigen(*m).0
+}
+
 /// Return the eigenvalues of a symmetric matrix, and its eigenvectors by columns. Jacobi's method uses
 /// additions, multiplications, divisions and square roots only. The bits are therefore the same on every
 /// machine.

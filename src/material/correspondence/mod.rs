@@ -31,8 +31,8 @@ use nalgebra::SMatrix;
 use super::bond::Weights;
 use super::symmetric::{Symmetric, symmetric, to_entries};
 use super::{
-    Bond, Built, Counts, Declaration, Declared, Described, ForceState, Given, Influence,
-    Invariants, Key, Kind, Law, PlasticState, Property, Rotation, Values, Word,
+    Bond, Built, Counts, Declaration, Declared, Described, FamilyStress, ForceState, Given,
+    Influence, Invariants, Key, Kind, Law, PlasticState, Property, Rotation, Values, Word,
 };
 use crate::lanes::{LaneTuple, Lanes, Simd};
 pub use bond_associated::BondAssociated;
@@ -40,6 +40,7 @@ use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
 use family::{extremes, family_rotation, from_rows, shape_share, to_rows};
 use hooke::Hooke;
+pub use logarithmic::eigenvalues;
 use plastic::Plastic;
 use stress::Stress;
 
@@ -82,6 +83,7 @@ impl Declared for Correspondence {
         any_poisson_ratio: true,
         no_line: Some("`correspondence` has no 1-D form; `pmb` is the same there for ν = 0.25"),
         breaks_by_energy: true,
+        breaks_by_stress: true,
         examples: &[
             "poisson_ratio = 0.4",
             "poisson_ratio = 0.3, stress = 'neo-hooke', zero_energy = 'silling2017'",
@@ -205,7 +207,42 @@ fn row<S: Simd, const D: usize>(
     sum
 }
 
+/// What follows from the deformation gradient of a family.
+struct Family<const D: usize> {
+    /// K⁻¹, m⁻⁵.
+    inverse: SMatrix<f64, D, D>,
+    /// H.
+    gradient: SMatrix<f64, D, D>,
+    /// P, Pa.
+    stress: SMatrix<f64, D, D>,
+    /// W, J/m³.
+    energy: f64,
+}
+
 impl Correspondence {
+    /// The stress of a point from the sums of the first pass and the spring constant of the whole family (N/m⁷), after
+    /// flow, which changes the state; `None` where the family has too few bonds or the law has no stress.
+    fn family<const D: usize>(
+        &self,
+        sums: &[f64],
+        whole: f64,
+        state: &mut PlasticState,
+    ) -> Option<Family<D>> {
+        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
+        let inverse = shape.inverse_of_rest(self.modulus, whole)?;
+        let gradient = from_rows::<D>(&sums[2 * D..]) * inverse;
+        let (stress, energy) = match &self.plastic {
+            Some(plastic) => plastic.at(&gradient, state)?,
+            None => self.stress.at(&gradient)?,
+        };
+        Some(Family {
+            inverse,
+            gradient,
+            stress,
+            energy,
+        })
+    }
+
     /// Whether points have a control that decreases with plastic flow.
     fn control_yields(&self) -> bool {
         self.plastic.is_some() && self.control != Control::None
@@ -316,24 +353,19 @@ impl<const D: usize> Law<D> for Correspondence {
             state.control = energy;
             return;
         }
-        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let control_yields = self.control_yields();
         found[..own + if control_yields { OWN } else { OWN_OF_ELASTIC }].fill(0.0);
         let before = left(state);
-        let moved = from_rows::<D>(&sums[2 * D..]);
-        let inverse = shape.inverse_of_rest(self.modulus, constants[0]);
-        let stress = inverse.and_then(|inverse| {
-            let gradient = moved * inverse;
-            let (stress, energy) = match &self.plastic {
-                Some(plastic) => plastic.at(&gradient, state)?,
-                None => self.stress.at(&gradient)?,
-            };
-            Some((inverse, gradient, stress, energy))
-        });
-        let Some((inverse, gradient, stress, energy)) = stress else {
+        let Some(family) = self.family::<D>(sums, constants[0], state) else {
             found[own + 1] = 1.0;
             return;
         };
+        let Family {
+            inverse,
+            gradient,
+            stress,
+            energy,
+        } = family;
         let after = left(state);
         let control = self.control.matrix(&inverse, constants[1]) * after;
         let direct = stress * inverse - control * gradient;
@@ -341,6 +373,7 @@ impl<const D: usize> Law<D> for Correspondence {
         to_entries(&control, &mut found[D * D..]);
         found[own] = energy - 0.5 * stress.dot(&gradient);
         if control_yields {
+            let moved = from_rows::<D>(&sums[2 * D..]);
             found[own + 2] = 0.5 * (control * gradient).dot(&moved);
             found[own + 3] = before;
         }
@@ -387,6 +420,21 @@ impl<const D: usize> Law<D> for Correspondence {
 
     fn rotation(&self, sums: &[f64]) -> Rotation {
         family_rotation::<D>(sums)
+    }
+
+    fn family_stress(
+        &self,
+        sums: &[f64],
+        numbers: &[f64],
+        state: &PlasticState,
+    ) -> Option<FamilyStress<D>> {
+        let mut plastic = *state;
+        let family = self.family::<D>(sums, numbers[0], &mut plastic)?;
+        Some(FamilyStress {
+            gradient: family.gradient,
+            piola: family.stress,
+            plastic,
+        })
     }
 
     #[inline(always)]

@@ -3,7 +3,8 @@
 mod possible;
 
 use crate::damage::{
-    BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StretchConversion, WorkRule,
+    BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StressLimit, StressMeasure,
+    StressRule, StretchConversion, WorkRule,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -60,11 +61,23 @@ fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
     elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
 }
 
-/// Whether bonds of a body with this damage break by their work. In bond-based laws, the work follows from
-/// the stretch, so their bonds break at the equivalent critical stretch.
-fn breaks_by_work(body: &Body, damage: &problem::Damage) -> bool {
+/// Quantity that is compared with a threshold to break bonds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Breaks {
+    ByStretch,
+    ByWork,
+    ByStress(StressMeasure),
+}
+
+/// Quantity that breaks the bonds of a body with this damage. In bond-based laws, the work follows from the
+/// stretch, so their bonds break at the equivalent critical stretch.
+fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
-    damage.rule != DamageRule::CriticalStretch && !bond_based
+    match damage.rule {
+        DamageRule::Stress(rule) => Breaks::ByStress(rule.measure),
+        DamageRule::Energy { .. } if !bond_based => Breaks::ByWork,
+        DamageRule::Energy { .. } | DamageRule::CriticalStretch => Breaks::ByStretch,
+    }
 }
 
 /// Input from which the law of a body is created, if its bonds break by this damage.
@@ -145,6 +158,8 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
             .or_else(|| damage.map(|damage| damage_law(problem, body, damage, constants))),
         weibull: damage.and_then(|damage| damage.weibull),
         pairs: pair_reads(problem, body),
+        dimension: problem.dimension,
+        elastic: body.material.elastic,
     }
 }
 
@@ -204,14 +219,20 @@ fn damage_law(
             let alpha = damage.alpha;
             return DamageLaw::CriticalStretch(CriticalStretch { critical, alpha });
         }
+        Toughness::Strength(strength) => {
+            let DamageRule::Stress(rule) = damage.rule else {
+                unreachable!("only stress is compared with a strength");
+            };
+            return DamageLaw::Stress(StressLimit { strength, rule });
+        }
     };
     let energy = match damage.rule {
-        DamageRule::CriticalStretch => energy,
+        DamageRule::CriticalStretch | DamageRule::Stress(_) => energy,
         DamageRule::Energy { calibration, .. } => energy * calibration.share(dimension),
     };
     let (critical, alpha) = (stretch(energy), damage.alpha);
     match damage.rule {
-        DamageRule::Energy { work, .. } if breaks_by_work(body, damage) => {
+        DamageRule::Energy { work, .. } if breaks(body, damage) == Breaks::ByWork => {
             DamageLaw::BondEnergy(BondEnergy {
                 critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
                 alpha,
@@ -226,7 +247,7 @@ fn damage_law(
 /// Failure criterion of the bonds between two bodies that have a separate damage law for these bonds. Each
 /// end has the damage law for its constants; `stiffness` is the bond stiffness of each end.
 fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
-    use DamageLaw::{BondEnergy, CriticalStretch};
+    use DamageLaw::{BondEnergy, CriticalStretch, Stress};
     match laws {
         [CriticalStretch(i), CriticalStretch(j)] if i.critical == j.critical => {
             Criterion::Stretch(i.critical)
@@ -240,7 +261,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
         [BondEnergy(i), BondEnergy(j)] => {
             Criterion::Work([0.5 * i.critical, 0.5 * j.critical], i.rule)
         }
-        _ => unreachable!("a pair breaks by stretch or by work"),
+        [Stress(i), Stress(_)] => Criterion::Stress(i.strength, i.rule),
+        _ => unreachable!("a pair breaks by stretch, by work or by stress"),
     }
 }
 
@@ -266,8 +288,20 @@ fn criterion(
     };
     let rule = |law: DamageLaw| match law {
         DamageLaw::BondEnergy(law) => Some(law.rule),
-        DamageLaw::CriticalStretch(_) => None,
+        DamageLaw::CriticalStretch(_) | DamageLaw::Stress(_) => None,
     };
+    let stress_rule = |law: DamageLaw| match law {
+        DamageLaw::Stress(law) => Some(law.rule),
+        DamageLaw::CriticalStretch(_) | DamageLaw::BondEnergy(_) => None,
+    };
+    let stress_rules = laws.into_iter().flatten().filter_map(stress_rule);
+    if let Some(rule) = stress_rules.reduce(StressRule::of_both) {
+        return if per_point {
+            Criterion::StressThresholds(rule)
+        } else {
+            Criterion::Stress(smallest, rule)
+        };
+    }
     let rules = laws.into_iter().flatten().filter_map(rule);
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));

@@ -1,6 +1,6 @@
 //! Checks which laws and which damage the bodies of a problem can have.
 
-use super::{breaks_by_work, build, constants, given};
+use super::{Breaks, breaks, build, constants, given};
 use crate::error::{Error, Result};
 use crate::problem::{
     self, Block, Body, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Problem,
@@ -84,7 +84,7 @@ fn pair_damage_is_possible(
             return error(format!("[body.{}]: {fault}", body.name));
         }
     }
-    let mut by_work = bodies.map(|body| (breaks_by_work(body, damage), &body.name));
+    let mut by_work = bodies.map(|body| (breaks(body, damage) == Breaks::ByWork, &body.name));
     if let (Some((first, a)), Some((second, b))) = (by_work.next(), by_work.next())
         && first != second
     {
@@ -157,7 +157,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
     };
-    let by_work = breaks_by_work(body, damage);
+    let own = breaks(body, damage);
     let error = |message: String| {
         let message = format!("[body.{}] damage: {message}", body.name);
         Err(Error::input(message).at(&body.span))
@@ -168,18 +168,18 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
             && *interface.damage_between(body, other) == InterfaceDamage::OfBodies
     };
     let of_other_kind = problem.bodies.iter().find(|other| {
-        let other_by_work = match &other.damage {
-            Some(damage) => breaks_by_work(other, damage),
-            None if other.can_break() => false,
+        let of_other = match &other.damage {
+            Some(damage) => breaks(other, damage),
+            None if other.can_break() => Breaks::ByStretch,
             None => return false,
         };
-        other_by_work != by_work && meets(other)
+        of_other != own && meets(other)
     });
     if let Some(other) = of_other_kind {
         return error(format!(
             "its bonds break by another rule than those of body `{}`, to which it may be bonded (by work, as \
-             `energy` has it for laws that are not bond-based, or by stretch); give both the same rule, or set \
-             `[interface] rule = \"none\"`",
+             `energy` has it for laws that are not bond-based, by stretch, or by a measure of stress); give both the \
+             same rule, or set `[interface] rule = \"none\"`",
             other.name
         ));
     }
@@ -200,11 +200,16 @@ fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Opt
                        `solver::calibration::calibrated` returns";
         return Some(message.to_owned());
     }
-    let by_energy = damage.rule != DamageRule::CriticalStretch;
+    let by_stress = matches!(damage.rule, DamageRule::Stress(_));
+    if by_stress != matches!(damage.toughness, Toughness::Strength(_)) {
+        return Some("a strength is for damage by stress, and for this only".to_owned());
+    }
+    let by_energy = matches!(damage.rule, DamageRule::Energy { .. });
     if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {
         return Some("a critical stretch is no measure of energy".to_owned());
     }
-    if !breaks_by_work(body, damage) || problem.volume_correction == VolumeCorrection::None {
+    if breaks(body, damage) != Breaks::ByWork || problem.volume_correction == VolumeCorrection::None
+    {
         return None;
     }
     let block = Block::unrefined(body);

@@ -11,7 +11,7 @@ use crate::comm::{self, Communicator};
 use crate::families::Which;
 use crate::solver::model::Model;
 
-use super::evaluate::{Acting, ForceTimes, HaloContent};
+use super::evaluate::{Acting, AtPoints, ForceTimes, HaloContent};
 use super::force::BondUpdate;
 use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
@@ -120,7 +120,12 @@ impl<const D: usize> Forces<D> {
         acting: &mut Acting<'_, D>,
         bond_update: BondUpdate,
     ) {
-        let Acting { force, plastic, .. } = acting;
+        let Acting {
+            force,
+            plastic,
+            thermal_stretch,
+            ..
+        } = acting;
         let before = self.held(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
             if pass != Pass::PointSum(0) {
@@ -128,7 +133,11 @@ impl<const D: usize> Forces<D> {
             }
             self.clear(pass, points.clone());
             self.run(pass, points.clone(), force, BondUpdate::None);
-            self.finish(pass, points.clone(), model, bond_update, plastic);
+            let at_points = AtPoints {
+                plastic: &mut *plastic,
+                thermal_stretch: thermal_stretch.as_deref(),
+            };
+            self.finish(pass, points.clone(), model, bond_update, at_points);
         }
         // Lattice bonds read copies of the point numbers in the grids, so update these copies.
         self.update(HaloContent::OwnedOnly, Which::Owned);

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::comm::Communicator;
-use crate::damage::Criterion;
+use crate::damage::{Criterion, StressMeasure};
 use crate::families::{BlockBonds, Which};
 use crate::lanes::{Column, LaneTuple, Lanes};
 use crate::material::bond::stretch_of;
@@ -17,6 +17,7 @@ use super::broken::Broken;
 use super::force::{BondUpdate, Force};
 use super::list_points;
 use super::point_numbers::PlasticColumns;
+use super::point_stresses::StressInputs;
 use super::point_sums::{PassSum, SmallestStretch};
 use super::sweep::{PointData, sweep};
 use super::{Forces, Pass};
@@ -29,7 +30,7 @@ const CHUNK: usize = 4096;
 const PIECE: usize = 4096;
 
 /// Maximum number of columns of [`Forces::changing_columns`].
-const MOST_CHANGING: usize = MOST.point + 4;
+const MOST_CHANGING: usize = MOST.point + 4 + StressMeasure::ALL.len();
 
 /// Columns of [`Forces::halo_columns`] and their number. Some columns may be empty.
 type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
@@ -74,6 +75,14 @@ pub struct Acting<'a, const D: usize> {
     pub force: &'a mut [Vec<f64>; D],
     /// Plastic state of the owned points; changed only in a step.
     pub plastic: PlasticColumns<'a>,
+}
+
+/// Fields of the owned points that point values depend on.
+pub(super) struct AtPoints<'a, 'b> {
+    /// Plastic state; changed only in a step.
+    pub plastic: &'a mut PlasticColumns<'b>,
+    /// Thermal stretches, if there are any.
+    pub thermal_stretch: Option<&'a [f64]>,
 }
 
 impl<const D: usize> Forces<D> {
@@ -142,7 +151,11 @@ impl<const D: usize> Forces<D> {
             self.update(content, Which::Ghosts);
             let border = model.interior..owned;
             self.run(pass, border, force, bond_update);
-            self.finish(pass, 0..owned, model, bond_update, &mut plastic);
+            let at_points = AtPoints {
+                plastic: &mut plastic,
+                thermal_stretch: thermal_stretch.as_deref(),
+            };
+            self.finish(pass, 0..owned, model, bond_update, at_points);
             in_bonds += start.elapsed();
         }
         times.bonds += in_bonds;
@@ -166,13 +179,13 @@ impl<const D: usize> Forces<D> {
         if end == from { from } else { self.border(end) }
     }
 
-    /// Return the columns of point numbers and rotations that change before each force sum and that both
-    /// ends read, and the number of these columns.
+    /// Return the columns of point numbers, rotations and stresses that change before each force sum and
+    /// that both ends read, and the number of these columns.
     pub(super) fn changing_columns(&mut self) -> HaloColumns<'_> {
         let first = self.numbers.first_changing;
         let changing = first..self.numbers.read.max(first);
         let numbers = self.numbers.columns[changing].iter_mut();
-        let columns = numbers.chain(self.limits.kept_rotations());
+        let columns = numbers.chain(self.limits.kept_changing());
         let mut all = std::array::from_fn(|_| &mut [][..]);
         let mut count = 0;
         for column in columns {
@@ -254,6 +267,7 @@ impl<const D: usize> Forces<D> {
                     let first = self.numbers.first_changing;
                     grid.update_numbers(which, first, &self.numbers.columns);
                     grid.update_rotations(which, &self.limits.rotations);
+                    grid.update_stresses(which, &self.limits.stresses);
                 }
                 HaloContent::Motion | HaloContent::None => {}
             }
@@ -356,8 +370,12 @@ impl<const D: usize> Forces<D> {
         points: Range<usize>,
         model: &Model<D>,
         bond_update: BondUpdate,
-        plastic: &mut PlasticColumns<'_>,
+        at_points: AtPoints<'_, '_>,
     ) {
+        let AtPoints {
+            plastic,
+            thermal_stretch,
+        } = at_points;
         let blocks = &self.blocks;
         match pass {
             Pass::SmallestStretch => {
@@ -386,7 +404,17 @@ impl<const D: usize> Forces<D> {
                     (self.numbers).find_rotations(points.clone(), model, blocks, rotations);
                 }
                 self.numbers
-                    .finish(number, points, model, blocks, plastic, keeps);
+                    .finish(number, points.clone(), model, blocks, plastic, keeps);
+                if number == 0 {
+                    let stresses = &mut self.limits.stresses;
+                    let read = StressInputs {
+                        model,
+                        blocks,
+                        plastic,
+                        thermal_stretch,
+                    };
+                    (self.numbers).find_stresses(points, &read, stresses);
+                }
             }
             Pass::Force => {}
         }

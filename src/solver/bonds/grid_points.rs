@@ -90,6 +90,15 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
+    /// Copy the stresses of some of the local points.
+    pub fn update_stresses(&mut self, which: Which, stresses: &[Column]) {
+        for (places, values) in self.limits.stresses.iter_mut().zip(stresses) {
+            if !values.is_empty() {
+                self.grid.update(which, values, places);
+            }
+        }
+    }
+
     /// Copy the truncation factors of the local points.
     pub fn update_truncation_factors(&mut self, values: &[f64]) {
         let places = &mut self.limits.truncation_factors;

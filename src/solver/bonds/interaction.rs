@@ -1,6 +1,8 @@
 //! The bonds between two blocks, and their laws.
 
-use crate::damage::{Criterion, DamageLaw};
+use crate::damage::{Criterion, DamageLaw, StressMeasure};
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
 use crate::families::BlockBonds;
 use crate::material::{AnyLaw, PairLaw};
 use crate::scatter::Weibull;
@@ -28,6 +30,10 @@ pub struct BlockLaws {
     pub weibull: Option<Weibull>,
     /// Data that criteria read of these points, for bonds between bodies that have a separate damage law.
     pub pairs: PairReads,
+    /// Dimension, for the stress across plane bodies.
+    pub dimension: Dimension,
+    /// Elastic constants, on average over all directions.
+    pub elastic: Isotropic,
 }
 
 /// Data that the failure criteria read for bonds between two bodies that have a separate damage law.
@@ -39,6 +45,8 @@ pub struct PairReads {
     pub truncation_factors: bool,
     /// Whether these criteria read rotations.
     pub rotations: bool,
+    /// Whether these criteria read each measure of stress, in the order of [`StressMeasure::ALL`].
+    pub stresses: [bool; StressMeasure::ALL.len()],
 }
 
 impl PairReads {
@@ -47,6 +55,9 @@ impl PairReads {
         self.breaks = true;
         self.truncation_factors |= law.family_correction() > 0.0;
         self.rotations |= law.is_objective_work();
+        if let Some(measure) = law.stress_measure() {
+            self.stresses[measure.index()] = true;
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Point data that only failure criteria read, by column.
 
-use crate::damage::{Criterion, DamageLaw, Limits};
+use crate::damage::{Criterion, DamageLaw, Limits, StressMeasure};
 use crate::lanes::{Column, LaneTuple, Lanes};
 use crate::material::rotation::IDENTITY;
 
@@ -15,6 +15,8 @@ pub struct LimitsRead {
     pub truncation_factors: bool,
     /// Whether rotations are read.
     pub rotations: bool,
+    /// Whether each measure of stress is read, in the order of [`StressMeasure::ALL`].
+    pub stresses: [bool; StressMeasure::ALL.len()],
 }
 
 impl LimitsRead {
@@ -31,6 +33,13 @@ impl LimitsRead {
             rotations: (any(DamageLaw::is_objective_work)
                 || blocks.iter().any(|block| block.pairs.rotations))
                 && !blocks.iter().all(|block| block.law.counts::<D>().central),
+            stresses: StressMeasure::ALL.map(|measure| {
+                let reads = |block: &BlockLaws| {
+                    let own = block.damage.and_then(|law| law.stress_measure());
+                    own == Some(measure) || block.pairs.stresses[measure.index()]
+                };
+                blocks.iter().any(reads)
+            }),
         }
     }
 }
@@ -43,6 +52,8 @@ pub struct LimitColumns {
     pub truncation_factors: Column,
     /// Rotations by component; in 2-D only q_z and q₀ are stored.
     pub rotations: [Column; 4],
+    /// Measures of stress, Pa, in the order of [`StressMeasure::ALL`]; −∞ for points that carry no stress.
+    pub stresses: [Column; StressMeasure::ALL.len()],
 }
 
 impl LimitColumns {
@@ -55,31 +66,36 @@ impl LimitColumns {
                 let is_read = read.rotations && k >= first_component::<D>();
                 of(number + 2 + k, is_read, IDENTITY[k])
             }),
+            stresses: std::array::from_fn(|k| {
+                of(number + 6 + k, read.stresses[k], f64::NEG_INFINITY)
+            }),
             thresholds: of(number, read.thresholds, 0.0),
             truncation_factors: of(number + 1, read.truncation_factors, 1.0),
         }
     }
 
-    /// The columns of rotations that are stored.
-    pub fn kept_rotations(&mut self) -> impl Iterator<Item = &mut Column> {
-        let columns = self.rotations.iter_mut();
+    /// The columns of rotations and stresses that are stored.
+    pub fn kept_changing(&mut self) -> impl Iterator<Item = &mut Column> {
+        let columns = self.rotations.iter_mut().chain(&mut self.stresses);
         columns.filter(|column| !column.is_empty())
     }
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        let [x, y, z, q0] = &self.rotations;
-        let columns = [&self.thresholds, &self.truncation_factors, x, y, z, q0];
-        size_of::<f64>() * columns.map(|column| column.len()).iter().sum::<usize>()
+        let columns = [&self.thresholds, &self.truncation_factors].into_iter();
+        let columns = columns.chain(&self.rotations).chain(&self.stresses);
+        size_of::<f64>() * columns.map(|column| column.len()).sum::<usize>()
     }
 }
 
-/// Thresholds and truncation factors, prepared for a kernel with a certain criterion.
+/// Thresholds, truncation factors and stresses, prepared for a kernel with a certain criterion.
 #[derive(Clone, Copy)]
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    /// Whether the criterion reads thresholds or truncation factors. Otherwise, one branch skips both.
+    /// Measures of the stress of the points, Pa, if the criterion reads them.
+    stresses: Option<&'a [f64]>,
+    /// Whether the criterion reads thresholds, truncation factors or stresses. Otherwise, one branch skips them.
     any: bool,
 }
 
@@ -101,10 +117,13 @@ impl<'a> ReadLimits<'a> {
             criterion.reads_truncation_factors(),
             &columns.truncation_factors,
         );
+        let measure = criterion.stress_measure();
+        let stresses = measure.and_then(|measure| read(true, &columns.stresses[measure.index()]));
         Self {
             thresholds,
             truncation_factors,
-            any: thresholds.is_some() || truncation_factors.is_some(),
+            stresses,
+            any: thresholds.is_some() || truncation_factors.is_some() || stresses.is_some(),
         }
     }
 
@@ -118,6 +137,9 @@ impl<'a> ReadLimits<'a> {
             }
             if let Some(column) = self.truncation_factors {
                 limits.truncation_factors = take(column);
+            }
+            if let Some(column) = self.stresses {
+                limits.stresses = take(column);
             }
         }
         limits

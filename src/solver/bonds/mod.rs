@@ -21,6 +21,7 @@ mod list_points;
 mod measure;
 mod measures;
 mod point_numbers;
+mod point_stresses;
 mod point_sums;
 mod saved;
 mod sweep;

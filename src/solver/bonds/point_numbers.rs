@@ -212,7 +212,7 @@ impl PointNumbers {
 
 /// Split the points and their columns recursively, and call `work` with each piece on all threads. Columns
 /// may be empty.
-fn over_points<const N: usize>(
+pub(super) fn over_points<const N: usize>(
     points: Range<usize>,
     mut columns: [&mut [f64]; N],
     work: &(impl Fn(Range<usize>, &mut [&mut [f64]; N]) + Sync),

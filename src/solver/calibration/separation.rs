@@ -44,6 +44,7 @@ pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Op
     let first = match block_laws(&block, &Block::unrefined(&block.bodies[0])).damage? {
         DamageLaw::CriticalStretch(law) => law.critical,
         DamageLaw::BondEnergy(law) => law.stretch,
+        DamageLaw::Stress(_) => return None,
     };
     // The block is large enough for complete families of the middle points and of their neighbours.
     let cutoff = cutoffs(&block)[0];
@@ -95,7 +96,7 @@ fn fracture_energy(problem: &Problem, body: usize) -> Option<f64> {
             elastic,
             toughness,
         )),
-        Toughness::CriticalStretch(_) => None,
+        Toughness::CriticalStretch(_) | Toughness::Strength(_) => None,
     }
 }
 

@@ -252,6 +252,11 @@ impl<const D: usize> Conditions<D> {
         self.loads.push(load);
     }
 
+    /// Whether there are loads in the present stage; the same on all ranks.
+    pub fn have_loads(&self) -> bool {
+        !self.loads.is_empty()
+    }
+
     /// Prepare the positions of supported points at `time` (s). `step` is the length of the last step (s), 0
     /// at the start.
     pub fn set_places(&mut self, time: f64, step: f64) {

@@ -1,0 +1,459 @@
+//! Failure by stress: bonds break when the mean von Mises or largest principal stress of their points reaches the
+//! strength, and not before.
+
+use std::collections::BTreeSet;
+
+use crate::support::history::{column, row};
+use crate::support::{displace, simulate};
+use fissure::component::Component;
+use fissure::problem::Field;
+use fissure::scatter::Weibull;
+use fissure::solver::Simulation;
+use fissure::solver::observers::{HistoryObserver, Snapshot};
+
+const YOUNG: f64 = 5.0;
+const RATIO: f64 = 0.3;
+
+/// Stress at which the bodies of these tests break.
+const STRENGTH: f64 = 1e-3 * YOUNG;
+
+/// A block of one law, with a damage law `weak`.
+fn deck(dimension: &str, law: &str, keys: &str, damage: &str) -> String {
+    let upper = if dimension == "3d" {
+        "[6, 5, 5]"
+    } else {
+        "[9, 8]"
+    };
+    let lower = if dimension == "3d" {
+        "[0, 0, 0]"
+    } else {
+        "[0, 0]"
+    };
+    format!(
+        "dimension = '{dimension}'
+        grid = {{ spacing = 1, horizon = 2.5, volume_correction = 'exact' }}
+        material.m.{law} = {{ density = 2, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}{keys} }}
+        body.block = {{ material = 'm', damage = 'weak', shape.box = {{ lower = {lower}, upper = {upper} }} }}
+        damage.weak.stress = {{ {damage} }}
+        time = {{ end = 1 }}
+        "
+    )
+}
+
+/// Damage of bonds in tension and compression.
+fn by(measure: &str, strength: f64) -> String {
+    format!("measure = '{measure}', strength = {strength}, tension_only = false")
+}
+
+/// Broken bonds and all bonds after an affine motion.
+fn broken<const D: usize>(text: &str, gradient: [[f64; 3]; 3]) -> (usize, usize) {
+    simulate::<D, _>(text, |mut simulation| {
+        displace(&mut simulation, |x| {
+            std::array::from_fn(|a| x[a] + (0..3).map(|b| gradient[a][b] * x[b]).sum::<f64>())
+        });
+        let (mut broken, mut intact) = (0, 0);
+        simulation.forces.for_each_broken(|_, _| broken += 1);
+        simulation.forces.for_each_intact(|_, _| intact += 1);
+        (broken, broken + intact)
+    })
+}
+
+/// All bonds break at a stress of the strength, none below it. `at` has the motion for a stress.
+fn breaks_at_strength(dimension: &str, measure: &str, at: impl Fn(f64) -> [[f64; 3]; 3]) {
+    let laws = [
+        ("correspondence", ""),
+        ("correspondence", ", stress = 'neo-hooke'"),
+        (
+            "correspondence",
+            ", stress = 'willberg2022', zero_energy = 'none'",
+        ),
+        (
+            "correspondence",
+            ", zero_energy = 'wan2019', yield_stress = 0.02",
+        ),
+    ];
+    for (law, keys) in laws {
+        let text = deck(dimension, law, keys, &by(measure, STRENGTH));
+        let count = |share: f64| {
+            let gradient = at(share * STRENGTH);
+            match dimension {
+                "3d" => broken::<3>(&text, gradient),
+                _ => broken::<2>(&text, gradient),
+            }
+        };
+        let (below, all) = count(0.99);
+        assert_eq!(below, 0, "{dimension} {measure} {keys}");
+        assert_eq!(count(1.01), (all, all), "{dimension} {measure} {keys}");
+    }
+}
+
+fn diagonal(entries: [f64; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|a| std::array::from_fn(|b| if a == b { entries[a] } else { 0.0 }))
+}
+
+#[test]
+fn uniaxial_tension_breaks_at_the_strength_by_both_measures() {
+    for measure in ["von_mises", "principal"] {
+        breaks_at_strength("plane-stress", measure, |stress| {
+            let strain = stress / YOUNG;
+            diagonal([strain, -RATIO * strain, 0.0])
+        });
+        breaks_at_strength("3d", measure, |stress| {
+            let strain = stress / YOUNG;
+            diagonal([-RATIO * strain, strain, -RATIO * strain])
+        });
+    }
+}
+
+#[test]
+fn shear_breaks_by_principal_stress_at_the_strength_and_by_von_mises_at_its_root_of_a_third() {
+    for dimension in ["plane-stress", "plane-strain", "3d"] {
+        for (measure, share) in [("principal", 1.0), ("von_mises", 3_f64.sqrt().recip())] {
+            breaks_at_strength(dimension, measure, |stress| {
+                let strain = share * stress * (1.0 + RATIO) / YOUNG;
+                let mut gradient = diagonal([0.0; 3]);
+                gradient[0][1] = strain;
+                gradient[1][0] = strain;
+                gradient
+            });
+        }
+    }
+}
+
+#[test]
+fn von_mises_stress_counts_the_stress_across_in_plane_strain() {
+    // σ_xx − σ_yy = 2G ε and σ_yy = σ_zz = λ ε: the von Mises stress is 2G ε.
+    breaks_at_strength("plane-strain", "von_mises", |stress| {
+        diagonal([stress * (1.0 + RATIO) / YOUNG, 0.0, 0.0])
+    });
+    // σ_xx = σ_yy = 2 (λ + G) ε and σ_zz = 2 λ ε: it is 2G ε again.
+    breaks_at_strength("plane-strain", "von_mises", |stress| {
+        let strain = stress * (1.0 + RATIO) / YOUNG;
+        diagonal([strain, strain, 0.0])
+    });
+}
+
+#[test]
+fn hydrostatic_compression_breaks_nothing() {
+    for measure in ["von_mises", "principal"] {
+        let text = deck("3d", "correspondence", "", &by(measure, STRENGTH));
+        assert_eq!(broken::<3>(&text, diagonal([-0.02; 3])).0, 0);
+    }
+    for dimension in ["plane-stress", "plane-strain"] {
+        let text = deck(dimension, "correspondence", "", &by("principal", STRENGTH));
+        assert_eq!(broken::<2>(&text, diagonal([-0.02, -0.02, 0.0])).0, 0);
+    }
+}
+
+#[test]
+fn only_longer_bonds_break_with_tension_only() {
+    let shear = [[0.0, 3e-3, 0.0], [3e-3, 0.0, 0.0], [0.0; 3]];
+    let damage = format!("measure = 'von_mises', strength = {STRENGTH}");
+    let text = deck("plane-stress", "correspondence", "", &damage);
+    simulate::<2, _>(&text, |mut simulation| {
+        displace(&mut simulation, |x| {
+            std::array::from_fn(|a| x[a] + (0..3).map(|b| shear[a][b] * x[b]).sum::<f64>())
+        });
+        let model = &simulation.model;
+        let product = |a: usize, b: usize| {
+            let [i, j] = [a, b].map(|point| model.position(point));
+            (j[0] - i[0]) * (j[1] - i[1])
+        };
+        // The bonds along the axes are longer by the square of the shear.
+        (simulation.forces).for_each_broken(|a, b| assert!(product(a, b) > -1e-9));
+        (simulation.forces).for_each_intact(|a, b| assert!(product(a, b) < -1e-9));
+    });
+}
+
+/// A smooth motion with strains of some per cent.
+fn wave([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [
+        x + 0.03 * (0.7 * x + 0.3 * y).sin() + 0.002 * z * z,
+        y + 0.03 * (0.5 * y - 0.2 * x + 0.4 * z).cos(),
+        z + 0.02 * (0.9 * z + 0.1 * x).sin(),
+    ]
+}
+
+/// The bonds that break are those whose ends have a mean of the output field above the strength: in all settings,
+/// with plastic flow and temperature.
+#[test]
+fn the_stress_is_that_of_the_output_fields() {
+    fn check<const D: usize>(dimension: &str, keys: &str, measure: &str) {
+        let heat = "\ncondition.heat = { set = 'all', temperature = '20*sin(x + y)' }\n";
+        let text =
+            |strength: f64| deck(dimension, "correspondence", keys, &by(measure, strength)) + heat;
+        let bonds = |simulation: &Simulation<D>| {
+            let mut all = Vec::new();
+            simulation.forces.for_each_intact(|a, b| all.push((a, b)));
+            all
+        };
+        let means = simulate::<D, _>(&text(1e9), |mut simulation| {
+            displace(&mut simulation, wave);
+            let snapshot = Snapshot::new(&mut simulation);
+            let of_points: Vec<f64> = match measure {
+                "von_mises" => snapshot.field(&mut simulation, Field::VonMisesStress),
+                _ => {
+                    let stress = snapshot.field(&mut simulation, Field::CauchyStress);
+                    let largest = |stress: &[f64]| Component::Principal(0).of(stress);
+                    stress.chunks_exact(6).map(largest).collect()
+                }
+            };
+            let mean = |(a, b): &(usize, usize)| 0.5 * (of_points[*a] + of_points[*b]);
+            let bonds = bonds(&simulation);
+            bonds
+                .iter()
+                .map(|bond| (*bond, mean(bond)))
+                .collect::<Vec<_>>()
+        });
+        let mut sorted: Vec<f64> = means.iter().map(|(_, mean)| *mean).collect();
+        sorted.sort_by(f64::total_cmp);
+        let strength = sorted[sorted.len() / 2] * (1.0 + 1e-9);
+        let wanted = means.iter().filter(|(_, mean)| *mean < strength);
+        let wanted: BTreeSet<_> = wanted.map(|(bond, _)| *bond).collect();
+        let left = simulate::<D, _>(&text(strength), |mut simulation| {
+            displace(&mut simulation, wave);
+            bonds(&simulation).into_iter().collect::<BTreeSet<_>>()
+        });
+        let differing = left.symmetric_difference(&wanted).count();
+        assert_eq!(
+            differing,
+            0,
+            "{dimension} {keys} {measure}: of {}",
+            means.len()
+        );
+    }
+    // Without control, which adds the square of the motion that the family does not see to the fields.
+    let elastic = ", zero_energy = 'none', thermal_expansion = 1e-4";
+    for measure in ["von_mises", "principal"] {
+        check::<2>("plane-stress", elastic, measure);
+        check::<2>("plane-strain", elastic, measure);
+        check::<3>("3d", elastic, measure);
+        let neo_hooke = format!("{elastic}, stress = 'neo-hooke'");
+        check::<2>("plane-stress", &neo_hooke, measure);
+        check::<2>("plane-strain", &neo_hooke, measure);
+        let yields = format!("{elastic}, yield_stress = 0.1, hardening_modulus = 0.5");
+        check::<2>("plane-stress", &yields, measure);
+        check::<3>("3d", &yields, measure);
+        let large = format!("{yields}, strain_measure = 'logarithmic'");
+        check::<3>("3d", &large, measure);
+    }
+}
+
+#[test]
+fn a_bond_takes_the_smaller_strength_of_scattered_points() {
+    let damage = by("principal", STRENGTH) + ", weibull_modulus = 4, seed = 7";
+    let text = deck("plane-stress", "correspondence", "", &damage);
+    let strain = STRENGTH / YOUNG;
+    simulate::<2, _>(&text, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| {
+            [x * (1.0 + strain), y * (1.0 - RATIO * strain), z]
+        });
+        let weibull = Weibull {
+            modulus: 4.0,
+            seed: 7,
+        };
+        let weaker = |a: usize, b: usize| {
+            let strength = |point: usize| weibull.strength(simulation.model.ids[point]);
+            strength(a).min(strength(b))
+        };
+        let mut counts = [0, 0];
+        simulation.forces.for_each_broken(|a, b| {
+            counts[0] += 1;
+            assert!(weaker(a, b) < 1.01);
+        });
+        simulation.forces.for_each_intact(|a, b| {
+            counts[1] += 1;
+            assert!(weaker(a, b) > 0.99);
+        });
+        assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
+    });
+}
+
+/// Two blocks side by side in uniform strain; that on the right has half the stiffness and the shorter horizon.
+fn two_blocks(more: &str) -> String {
+    format!(
+        "dimension = 'plane-strain'
+        grid = {{ spacing = 1, horizon = 3.2 }}
+        interface.rule = 'own'
+        material.hard.correspondence = {{ density = 2, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO} }}
+        material.soft.correspondence = {{ density = 2, youngs_modulus = {}, poisson_ratio = {RATIO} }}
+        damage.weak.stress = {{ measure = 'principal', strength = {STRENGTH} }}
+        body.left = {{ material = 'hard', damage = 'weak', shape.box = {{ lower = [0, 0], upper = [6, 8] }} }}
+        body.right = {{ material = 'soft', damage = 'weak', horizon = 2.2, shape.box = {{ lower = [6, 0], upper = [12, 8] }} }}
+        time = {{ end = 1 }}
+        {more}
+        ",
+        0.5 * YOUNG
+    )
+}
+
+/// Bonds across the interface that are broken and intact after a strain along x, by whether they are longer than 2.2.
+fn across(text: &str, strain: f64) -> [[u32; 2]; 2] {
+    simulate::<2, _>(text, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| [x * (1.0 + strain), y, z]);
+        let model = &simulation.model;
+        let mut counts = [[0; 2]; 2];
+        let mut count = |state: usize, a: usize, b: usize| {
+            let [i, j] = [a, b].map(|point| model.position(point));
+            if (i[0] < 6.0) != (j[0] < 6.0) {
+                let is_long = fissure::points::distance_squared(i, j) > 2.2 * 2.2;
+                counts[state][usize::from(is_long)] += 1;
+            }
+        };
+        simulation.forces.for_each_broken(|a, b| count(0, a, b));
+        simulation.forces.for_each_intact(|a, b| count(1, a, b));
+        counts
+    })
+}
+
+#[test]
+fn an_end_whose_horizon_does_not_contain_the_bond_does_not_count() {
+    let stiffness = YOUNG * (1.0 - RATIO) / ((1.0 + RATIO) * (1.0 - 2.0 * RATIO));
+    let text = two_blocks("");
+    // Left the stress is 1.2 of the strength, right half of that; the mean is 0.9.
+    let [broken, intact] = across(&text, 1.2 * STRENGTH / stiffness);
+    assert!(broken[0] == 0 && intact[0] > 0, "{broken:?} {intact:?}");
+    assert!(broken[1] > 0 && intact[1] == 0, "{broken:?} {intact:?}");
+    let [broken, intact] = across(&text, 1.35 * STRENGTH / stiffness);
+    assert!(broken[0] > 0 && intact == [0, 0], "{broken:?} {intact:?}");
+}
+
+#[test]
+fn a_pair_of_bodies_breaks_by_its_own_strength() {
+    let pair = "interface.pair.glue = { bodies = ['left', 'right'], damage = 'glue' }
+        damage.glue.stress = { measure = 'von_mises', strength = 1e-4 }";
+    let strain = 1e-4;
+    // The von Mises stress is 2G ε: 3.8e-4 left and half of that right. Inside, nothing breaks.
+    simulate::<2, _>(&two_blocks(pair), |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| [x * (1.0 + strain), y, z]);
+        let is_left = |point: usize| simulation.model.position(point)[0] < 6.0;
+        let mut broken = 0;
+        simulation.forces.for_each_broken(|a, b| {
+            broken += 1;
+            assert_ne!(is_left(a), is_left(b));
+        });
+        simulation
+            .forces
+            .for_each_intact(|a, b| assert_eq!(is_left(a), is_left(b)));
+        assert!(broken > 0);
+    });
+}
+
+#[test]
+fn a_spinning_square_does_not_break() {
+    let spin = "\ninitial.spin.velocity = ['-4e-3*(y - 4)', '4e-3*(x - 4.5)']\n";
+    for measure in ["von_mises", "principal"] {
+        let text = deck("plane-stress", "correspondence", "", &by(measure, STRENGTH)) + spin;
+        let text = text.replace("end = 1", "end = 2000");
+        simulate::<2, _>(&text, |mut simulation| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            let mut broken = 0;
+            simulation.forces.for_each_broken(|_, _| broken += 1);
+            assert_eq!(broken, 0, "{measure}");
+            // It has made more than one turn.
+            let [x, y] = [0, 1].map(|d| simulation.fields.displacement[d][0]);
+            assert!(x.abs().max(y.abs()) > 1.0, "{x} {y}");
+        });
+    }
+}
+
+/// A bar in load steps, wide at its ends, carries the strength times its cross-section and no more.
+#[test]
+fn a_pulled_bar_carries_the_strength() {
+    for (measure, method) in [
+        ("von_mises", "static"),
+        ("principal", "static"),
+        ("principal", "relaxation"),
+    ] {
+        let text = format!(
+            "dimension = 'plane-stress'
+            thickness = 1
+            grid = {{ spacing = 1, horizon = 3, volume_correction = 'exact' }}
+            material.m.correspondence = {{ density = 2, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO} }}
+            damage.weak.stress = {{ measure = '{measure}', strength = {STRENGTH}, no_failure = ['grips'] }}
+            body.bar = {{ material = 'm', damage = 'weak', shape.box = {{ lower = [0, 0], upper = [30, 8] }} }}
+            set.grips.where = 'x < 6 || x > 24'
+            set.left.where = 'x < 3'
+            set.right.where = 'x > 27'
+            condition.hold = {{ set = 'left', displacement = [0, 'free'] }}
+            condition.pull = {{ set = 'right', displacement = ['t', 'free'] }}
+            time = {{ end = {}, method = '{method}', {method}.load_steps = 40 }}
+            history.reactions = ['right']
+            ",
+            1.15 * 27.0 * STRENGTH / YOUNG,
+        );
+        let (most, last) = simulate::<2, _>(&text, |mut simulation| {
+            let mut history = HistoryObserver::new(&simulation);
+            let place = column(&history, "reaction_right_x");
+            let (mut most, mut last) = (0.0_f64, 0.0);
+            while !simulation.is_over() {
+                simulation.advance();
+                simulation.check().unwrap_or_else(|error| panic!("{error}"));
+                last = row(&mut history, &mut simulation).values[place].abs();
+                most = most.max(last);
+            }
+            (most, last)
+        });
+        let wanted = 8.0 * STRENGTH;
+        assert!(
+            (most / wanted - 1.0).abs() < 0.01,
+            "{measure} {method}: {}",
+            most / wanted
+        );
+        assert!(
+            last < 1e-3 * wanted,
+            "{measure} {method}: {}",
+            last / wanted
+        );
+    }
+}
+
+/// A notched plate is torn: the crack runs from the notch, energy balances, and the fracture energy never falls.
+#[test]
+fn a_notched_plate_tears_and_its_energy_balances() {
+    let text = format!(
+        "dimension = 'plane-strain'
+        grid = {{ spacing = 1, horizon = 3, volume_correction = 'exact' }}
+        material.m.correspondence = {{ density = 2, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO} }}
+        damage.weak.stress = {{ measure = 'principal', strength = 0.1, no_failure = ['top', 'bottom'] }}
+        body.plate = {{ material = 'm', damage = 'weak', shape.box = {{ lower = [0, 0], upper = [40, 30] }} }}
+        crack.notch.segment = {{ from = [-1, 15], to = [12, 15] }}
+        set.top.where = 'y > 25'
+        set.bottom.where = 'y < 5'
+        condition.down = {{ set = 'bottom', velocity = [0, '-1e-3'] }}
+        condition.up = {{ set = 'top', velocity = [0, '1e-3'] }}
+        time = {{ end = 500, safety = 0.3 }}
+        "
+    );
+    simulate::<2, _>(&text, |mut simulation| {
+        let mut history = HistoryObserver::new(&simulation);
+        let [fracture, error] =
+            ["fracture_energy", "energy_error"].map(|name| column(&history, name));
+        let (mut spent, mut steps) = (0.0, 0_u32);
+        while !simulation.is_over() {
+            simulation.advance();
+            steps += 1;
+            if steps % 20 == 0 {
+                let values = row(&mut history, &mut simulation).values;
+                assert!(values[fracture] >= spent, "{} {spent}", values[fracture]);
+                spent = values[fracture];
+                assert!(
+                    values[error].abs() <= 0.02 * spent + 1e-6,
+                    "{} {spent}",
+                    values[error]
+                );
+            }
+        }
+        // The crack has crossed the plate, and what it broke lies in a zone of a few horizons.
+        let (mut furthest, mut widest) = (0.0_f64, 0.0_f64);
+        let model = &simulation.model;
+        simulation.forces.for_each_broken(|a, _| {
+            let [x, y, _] = model.position(a);
+            furthest = furthest.max(x);
+            widest = widest.max((y - 15.0).abs());
+        });
+        assert!(furthest > 38.0 && widest < 9.0, "{furthest} {widest}");
+    });
+}
