@@ -15,8 +15,8 @@ pub enum Criterion {
     /// Bonds break at this stretch.
     Stretch(f64),
     /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
-    /// of both blocks, the part of the thresholds that a law may scale; 0 for a block without critical
-    /// stretch.
+    /// of both blocks, 0 for a block without critical stretch. A law may scale only this part of the
+    /// thresholds.
     Thresholds([f64; 2]),
     /// Same as [`Self::Stretch`], for critical stretches that belong to different horizons; ∞ for a block
     /// without critical stretch.
@@ -39,11 +39,12 @@ pub type HorizonRatios = [[f64; 2]; 2];
 
 /// Critical stretch of a bond between points whose critical stretches belong to different horizons.
 ///
-/// An end e acts on the bond if the bond is within the horizon of e. Its energy is then ½ k_e s² |ξ|, with
-/// the stiffness k_e.
-/// By the fracture energy, end e alone would break the bond at m_e = min_k t_k √(δ_k/δ_e), with the critical
-/// stretch t_k and the horizon δ_k of point k.
-/// The bond breaks when the acting ends together have the energy of these stretches: s² = Σ k_e m_e²/Σ k_e.
+/// An end e acts on the bond if the bond is within the horizon of e. The energy of this end is then ½ k_e s²
+/// |ξ|, with the stiffness k_e.
+/// If only end e acted, the bond would break at m_e = min_k t_k √(δ_k/δ_e), with the critical stretch t_k and
+/// the horizon δ_k of point k.
+/// The bond breaks when the energies of the acting ends add up to the sum of their energies at these
+/// stretches: s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is √(δ_k/δ_e).
@@ -75,17 +76,17 @@ impl StretchConversion {
 /// Rule for the work of bonds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
-    /// Bonds that can break.
+    /// Whether the criterion breaks pulled bonds only, or compressed bonds too.
     pub sense: Sense,
-    /// c from 0 to 1: thresholds are multiplied by 1 + c (f − 1), with the
+    /// Factor c from 0 to 1: work thresholds are multiplied by 1 + c (f − 1), with the
     /// [truncation factor](Law::truncation_factor) f.
     pub family_correction: f64,
     /// Relative displacement on which the force states do work.
     pub measure: WorkMeasure,
 }
 
-/// Relative displacement on which the force state of a point does work. Forces along the bond always work on
-/// its extension.
+/// Relative displacement on which the force state of a point does work. Forces along the bond always do work
+/// on the extension of the bond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkMeasure {
     /// Y − R ξ with the rotation R of the point's family; rigid rotation does no work.
@@ -99,7 +100,7 @@ pub enum WorkMeasure {
 pub enum Sense {
     /// Only bonds that are longer than in the undeformed body.
     Pulled,
-    /// Compressed bonds as well.
+    /// Bonds that are longer, and compressed bonds too.
     Either,
 }
 
@@ -118,9 +119,9 @@ impl Sense {
 pub struct Ends<'a, L, P> {
     /// Laws of points i and j.
     pub laws: &'a [L; 2],
-    /// Numbers of the points.
+    /// Point numbers of points i and j.
     pub points: [&'a P; 2],
-    /// Data of the points that only criteria read.
+    /// Data of points i and j that only criteria read.
     pub limits: [&'a Limits; 2],
     /// Influence times volume correction of the bonds.
     pub weights: Weights,
@@ -197,14 +198,15 @@ impl Criterion {
         matches!(self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] above which bonds leave the series. Bonds below this limit do not
+    /// The |x| of [`crate::material::bond`] above which the series are not used. Bonds below this limit do not
     /// break by their stretch.
     #[inline(always)]
     pub fn limit(self) -> f64 {
         match self {
-            // A bond at exactly the limit is not beyond the series, but must break.
+            // `next_down` lowers the limit by one bit: only bonds above the limit are tested, and a bond at
+            // exactly the critical stretch must break.
             Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
-            // The round-off of this bound differs from that of a bond's threshold.
+            // The margin of 1e-12 covers the round-off by which this bound and the threshold of a bond differ.
             Self::StretchBetween(critical, conversion) => {
                 let smallest = conversion.smallest(critical) * (1.0 - 1e-12);
                 NEAR.min(relative_square_extension_of(smallest))
@@ -213,7 +215,8 @@ impl Criterion {
         }
     }
 
-    /// Whether all bonds that break are beyond the series; `scaled` for laws that scale thresholds.
+    /// Whether every bond that breaks has an |x| above [`Self::limit`]. `scaled` is true for laws that scale
+    /// thresholds.
     #[inline(always)]
     pub fn marks_all(self, scaled: bool) -> bool {
         match self {
@@ -234,7 +237,7 @@ impl Criterion {
     ) -> u8 {
         match self {
             Self::Never => 0,
-            // Bonds that break are beyond the series.
+            // Every bond that breaks has an |x| above the limit, so none of these bonds breaks.
             Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(critical) if !L::SCALED => simd.at_least(
                 bond.relative_square_extension,
@@ -359,7 +362,7 @@ fn mean_stress<S: Simd, L, P>(simd: S, ends: Ends<'_, L, P>) -> (Lanes, u8) {
 
 impl WorkRule {
     /// Combine the rules of two blocks for the bonds between them. Compressed bonds break if both rules say
-    /// so. The smaller correction holds. Work is objective if either rule says so.
+    /// so. The smaller family correction is used. The work is objective if at least one rule says so.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             sense: self.sense.of_both(other.sense),
@@ -378,8 +381,8 @@ impl WorkRule {
     }
 
     /// Return the critical work of bonds from the critical works of both ends in untruncated families; only
-    /// acting ends count. Written out: array methods are not always inlined, and then all data of a bond
-    /// would stay in memory.
+    /// acting ends count. The sum is written out, because array methods are not always inlined. If one is
+    /// not, all data of a bond stay in memory.
     #[inline(always)]
     fn sum_of_acting<S: Simd, L, P>(
         self,

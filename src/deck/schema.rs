@@ -19,8 +19,8 @@ pub fn schema() -> Value {
     schema
 }
 
-/// Rewrite constructs that editors handle badly, everywhere in a schema: the type `null`, which TOML lacks,
-/// and choices of tables.
+/// Rewrite two constructs that editors handle badly, everywhere in a schema: the type `null`, which TOML
+/// lacks, and choices of tables.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Array(entries) => entries.iter_mut().for_each(tidy),
@@ -45,7 +45,7 @@ fn remove_null(schema: &mut Value) {
         return;
     };
     choices.retain(|choice| *choice != json!({ "type": "null" }));
-    // Draft 7 ignores all keys beside `$ref`, so the reference moves to `allOf`.
+    // Draft 7 ignores all other keys of a table that has `$ref`, so the reference moves into `allOf`.
     if choices.len() == 1 {
         let all = schema
             .as_object_mut()
@@ -54,8 +54,8 @@ fn remove_null(schema: &mut Value) {
     }
 }
 
-/// Join a choice of tables with one key each into one table that allows one of the keys. Editors then
-/// complete the keys, and their messages name the wrong key.
+/// Join a choice of tables with one key each into one table that allows one of the keys. Editors can then
+/// complete the keys, and their messages point to the key that is wrong.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {
         let mut properties = serde_json::Map::new();

@@ -8,7 +8,7 @@
 //! - the *numbers* of point i, which the law stores per point, such as the dilatation of its family;
 //! - the *bond history*, which the law stores per bond and end, such as a plastic stretch.
 //!
-//! A law declares the count of the numbers and of the history, and computes both.
+//! A law declares how many point numbers and history values it has, and computes their values.
 //! An *end* of a bond is point i or point j.
 //! An *untruncated* family is a full ball of neighbours, without surfaces or cracks. The *initial* family of
 //! a point has all its bonds before any bond breaks.
@@ -140,7 +140,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Number of passes over the bonds before the force evaluation.
     const PASSES: usize = 0;
 
-    /// Count of numbers of a point that only its own law reads. These follow the numbers of [`Self::Point`].
+    /// Number of values of a point that only its own law reads. These values follow the numbers of
+    /// [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
     /// Whether [`Self::force`] or [`Self::bond_history`] reads [`Bond::stretch`].
@@ -149,7 +150,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::force`] reads [`Bond::extension_over_deformed`].
     const FORCE_READS_EXTENSION: bool = true;
 
-    /// Smallest dimension that the law supports.
+    /// Smallest dimension of space that the law supports.
     const LEAST_DIMENSION: usize = 1;
 
     /// Whether [`Self::pass_contribution`] reads [`Bond::stretch`].
@@ -184,8 +185,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Compute the constants of a point from the sums over its initial family.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
-    /// Contribution of an intact bond to the sums of pass `S`. It may read the numbers that earlier passes
-    /// computed.
+    /// Contribution of an intact bond to the sums of pass `S`. The contribution may read the numbers that
+    /// earlier passes computed.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -196,8 +197,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// Compute the numbers of a point from the sums of a pass: those of [`Self::Point`], then the law's own.
-    /// The plastic state that flow leaves is stored only at the end of a step.
+    /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the values
+    /// that only the law reads ([`Self::OWN_NUMBERS`]). A plastic state that plastic flow has changed is
+    /// stored only at the end of a step.
     fn update_point(
         &self,
         _pass: usize,
@@ -207,8 +209,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) {
     }
 
-    /// Count of the numbers of points and bonds. Some instances need fewer passes and own numbers than the
-    /// type declares.
+    /// Return the sizes of the data per point and per bond. An instance may need fewer passes and fewer own
+    /// values ([`Self::OWN_NUMBERS`]) than its type declares.
     fn counts(&self) -> Counts {
         Counts::of::<Self, D>()
     }
@@ -224,7 +226,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Return the bond history of one end after a step (s) that ends at this deformation.
+    /// Return the bond history of one end after a time step (s) that ends at the deformation of these bonds.
     #[inline(always)]
     fn bond_history(
         &self,
@@ -240,8 +242,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// N/m⁷.
     fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
-    /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. Both ends
-    /// compute the same bits, up to the sign. Laws may override this function to save operations.
+    /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. The results of
+    /// both ends are equal to the last bit, except for the sign. Laws may override this function to save
+    /// operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -346,8 +349,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Energy that a bond has dissipated at one end, without the energy of breaking, J/m⁶. Broken bonds
-    /// count, too.
+    /// Energy that a bond, intact or broken, has dissipated at one end, without the energy of breaking, J/m⁶.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
@@ -370,8 +372,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Energy per bond of a point, divided by that of an interior point at the same strain, from the sums of
-    /// [`Self::reference_contribution`].
+    /// Energy per bond of a point, divided by the energy per bond of an interior point at the same strain.
+    /// Computed from the sums of [`Self::reference_contribution`].
     ///
     /// The factor exceeds 1 in truncated families if the law keeps the energy of a point; otherwise it is 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {

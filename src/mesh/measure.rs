@@ -110,8 +110,8 @@ fn gauss(points: usize) -> Vec<(f64, f64)> {
 /// Return the Gauss rule of a type, exact for volume and first moments.
 fn rule(kind: Kind) -> Vec<GaussPoint> {
     let second_order = kind.nodes > kind.corners();
-    // n points are exact up to the degree 2n − 1 in each coordinate. Collapsed coordinates add up to 2 to the
-    // degree.
+    // n points are exact up to the degree 2n − 1 in each coordinate. Collapsing the coordinates raises the
+    // degree by up to 2.
     let points = match (kind.form, second_order) {
         (Form::Point, _) => return Vec::new(),
         (Form::Triangle | Form::Tetrahedron, false) => 1,
@@ -167,8 +167,8 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
             }
         }
     }
-    // det J of a quadrilateral is linear. If the nodes are crossed, det J is negative along an edge, which
-    // the Gauss points can miss. Add the middles of the edges with weight 0.
+    // det J of a quadrilateral is linear. If the edges cross one another, det J is negative along an edge,
+    // which the Gauss points can miss. The middles of the edges are therefore added with weight 0.
     if kind == Kind::new(Form::Quadrilateral, 4) {
         for at in [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]] {
             add([at[0], at[1], 0.0], 0.0);
@@ -217,7 +217,7 @@ fn shape_functions(kind: Kind, at: [f64; 3]) -> Vec<Dual> {
                 let product = along.map(|(x, node)| match (linear, serendipity, node == 0.0) {
                     (true, ..) | (_, true, false) => half(node, *x),
                     (_, _, true) => one - *x * *x,
-                    // Lagrange polynomial of an end node.
+                    // Lagrange polynomial of the node at an end of the line.
                     _ => 0.5 * (*x * (*x + Dual::constant(node))),
                 });
                 let product = product.fold(one, |a, b| a * b);
@@ -349,7 +349,7 @@ pub struct Measure {
 const ROUND_OFF: f64 = 1e-9;
 
 impl Measure {
-    /// Test whether det J has both signs. If so, nodes are crossed or a part of the element is inverted.
+    /// Test whether det J has both signs. If so, edges cross one another or a part of the element is inverted.
     pub fn is_folded(&self) -> bool {
         let [low, high] = self.determinants;
         let limit = ROUND_OFF * low.abs().max(high.abs());
@@ -357,7 +357,8 @@ impl Measure {
     }
 }
 
-/// Compute the measure of a line along x, of a face in the x-y plane, or of a solid. `nodes` in m.
+/// Compute the measure of a line along x, of a face in the x-y plane, or of a solid. `nodes` are the positions
+/// of the nodes, m.
 pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
     // Positions are relative to the first node, so that a mesh far from the origin loses no digits.
     let origin = nodes[0];
@@ -593,7 +594,7 @@ mod tests {
         assert!(!measure(quadrilateral, &triangle).is_folded());
         let tetrahedron = Kind::new(Form::Tetrahedron, 10);
         let mut nodes = reference_nodes(tetrahedron);
-        // Move the middle node of the edge from the origin to (1, 0, 0) far beyond the end of the edge.
+        // An edge runs from the origin to (1, 0, 0). Move its middle node far beyond the end of the edge.
         nodes[4][0] = 1.5;
         let folded = measure(tetrahedron, &nodes);
         assert!(folded.is_folded() && folded.size > 0.0, "{folded:?}");

@@ -1,7 +1,8 @@
-//! Separating a body along a plane dissipates the fracture energy: every damage law in every dimension.
+//! Separating a body along a plane dissipates the fracture energy, for every damage law in every dimension.
 //!
-//! The opening grows by a factor per step, so a bond breaks late by up to this factor. Its overshoot energy
-//! is not counted. The remaining error is the quadrature error of the lattice, which decreases with m.
+//! The opening is multiplied by a factor in each step, so the stretch at which a bond breaks is too large by
+//! up to this factor. The overshoot energy of the bond is not counted. The remaining error is the quadrature
+//! error of the lattice, which decreases with m.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -23,7 +24,8 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
         "uniaxial-stress" | "uniaxial-strain" => ("1d", format!("constraint = '{dimension}'")),
         _ => (dimension, String::new()),
     };
-    // Only the ends of bonds across the cut matter; for state-based laws also the families of these ends.
+    // Only the points at the ends of bonds across the cut matter; for state-based laws, the families of these
+    // points matter too.
     let reach = f64::from(ratio);
     let alone = ["pmb", "elastic_plastic_pmb", "softening_pmb"];
     let wide = if alone.iter().any(|name| law.starts_with(name)) {
@@ -80,9 +82,9 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
 enum Mode {
     /// Along the normal of the cut.
     Opening,
-    /// First this distance along the cut (m), then along the normal of the cut.
+    /// First by this distance (m) along the cut, then along the normal of the cut.
     SlideAndOpening(f64),
-    /// At this angle to the normal, degrees.
+    /// At this angle (degrees) to the normal of the cut.
     Slanted(f64),
 }
 
@@ -92,7 +94,7 @@ fn cost<const D: usize>(dimension: &str, ratio: u32, law: &str, rule: &str, grow
     cost_in::<D>(Mode::Opening, dimension, ratio, law, rule, growth)
 }
 
-/// As [`cost`], in any mode.
+/// Same as [`cost`], for any [`Mode`] of motion.
 fn cost_in<const D: usize>(
     mode: Mode,
     dimension: &str,
@@ -104,7 +106,7 @@ fn cost_in<const D: usize>(
     cost_of_deck::<D>(mode, &text(dimension, ratio, law, rule), growth)
 }
 
-/// As [`cost_in`], for the body or bodies of a deck in the form of [`text`].
+/// Same as [`cost_in`], for a deck with one or several bodies as in [`text`].
 fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
     let pulled_only = !deck.contains("tension_only = false");
     simulate::<D, _>(deck, |mut simulation| {
@@ -133,8 +135,8 @@ fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
                 grow(slide, &|size| [size, 0.0]);
                 grow(1.0, &|size| [slide, size]);
             }
-            // Bonds inclined against the motion become shorter at first, so they need a longer motion to
-            // break.
+            // Bonds that are inclined against the motion become shorter at first, so they break only after a
+            // longer motion.
             Mode::Slanted(angle) => {
                 let (sin, cos) = angle.to_radians().sin_cos();
                 let end = horizon * if pulled_only { 2.2 } else { 0.4 };
@@ -174,8 +176,8 @@ fn ordinary(ratio: f64, influence: &str) -> String {
     )
 }
 
-/// Assert that the costs at two values of m have at most these relative errors, and that the second error is
-/// smaller. `expected` is a fraction of G0.
+/// Assert that the costs at two values of m have at most these relative errors, and that the error at the
+/// second m is smaller. `expected` is the expected cost as a fraction of G0.
 fn compare(case: &str, costs: [f64; 2], expected: f64, [coarse, fine]: [f64; 2]) {
     let errors = costs.map(|cost| (cost / expected - 1.0).abs());
     assert!(errors[0] < coarse && errors[1] < fine, "{case}: {costs:?}");
@@ -256,7 +258,7 @@ fn of_the_normalised_law() {
 
 #[test]
 fn of_the_normalised_law_as_printed() {
-    // Its calibration in the plane (eq. 16) counts each bond's energy twice.
+    // In the plane, the calibration of this form of the law (eq. 16) counts the energy of each bond twice.
     in_the_plane(DIEHL, 0.5);
     in_space(DIEHL, [2, 3]);
 }
@@ -294,8 +296,8 @@ fn by_the_energy_of_bonds_of_bond_based_laws() {
     }
 }
 
-/// Assert that the costs of damage by work lie in these ranges: plane strain and plane stress with m = 3 and
-/// 6, 3-D with m = 2. The opening grows by `growth` per step.
+/// Assert that the costs of damage by energy lie in these ranges: in plane strain and plane stress with m = 3
+/// and m = 6, and in 3-D with m = 2. The opening grows by the fraction `growth` per step.
 fn by_energy(law: &str, growth: f64, [strain, stress, space]: [Range<f64>; 3]) {
     for (dimension, range) in [("plane-strain", strain), ("plane-stress", stress)] {
         for ratio in [3, 6] {
@@ -309,8 +311,8 @@ fn by_energy(law: &str, growth: f64, [strain, stress, space]: [Range<f64>; 3]) {
 
 #[test]
 fn by_the_energy_of_bonds_of_correspondence() {
-    // A broken bond changes the deformation gradient of both ends, and thus the energy of their other bonds.
-    // The total cost is less than the sum of the energies of the broken bonds.
+    // A broken bond changes the deformation gradients of both ends, and thus the energies of the other bonds
+    // of both ends. The total cost is therefore less than the sum of the energies of the broken bonds.
     by_energy(CORRESPONDENCE, 0.01, [0.93..1.02, 0.95..1.01, 0.85..0.9]);
     by_energy(WAN, 0.01, [0.78..0.85, 0.77..0.85, 0.66..0.71]);
 }
@@ -372,7 +374,7 @@ fn calibrated_by_opening() {
             assert!((cost - 1.0).abs() < bound, "{law} {dimension}: {cost}");
         }
     }
-    // A law without `calibration = 'opening'` needs no computation.
+    // Without `calibration = 'opening'`, nothing is computed.
     let plain = problem(&text("plane-strain", 3, PMB, ENERGY));
     assert!(matches!(calibrated(&plain), Ok(Cow::Borrowed(_))));
     let large = problem(&text("3d", 9, CORRESPONDENCE, rule));
@@ -402,14 +404,14 @@ fn of_mixed_modes_by_stretch_and_by_energy() {
     let near = |cost: f64, wanted: f64, bound: f64| {
         assert!((cost - wanted).abs() < bound, "{cost} for {wanted}");
     };
-    // With this law, the energy of a bond at its criterion does not depend on the path.
+    // With `pmb`, the energy of a bond when it breaks does not depend on the path to this stretch.
     for rule in [STRETCH, ENERGY] {
         for cost in of_mixed_modes(PMB, rule) {
             near(cost, 1.0, 0.03);
         }
     }
-    // The critical stretch of the ordinary law is calibrated for an opening, whose dilatation adds or
-    // releases energy.
+    // The critical stretch of the ordinary law is calibrated for an opening. In an opening, the dilatation
+    // adds or releases energy.
     let [slide, slanted] = of_mixed_modes(&ordinary(0.1, "constant"), STRETCH);
     assert!(slide > 1.1 && slanted > 1.06, "{slide} {slanted}");
     let [slide, slanted] = of_mixed_modes(&ordinary(0.4, "constant"), STRETCH);
@@ -439,7 +441,7 @@ fn of_mixed_modes_of_correspondence() {
         let either = of(law, "energy tension_only = false");
         assert!(both.contains(&either), "{law}: {either}");
     }
-    // The effect is smaller if each bond has its own deformation gradient.
+    // This effect is smaller if each bond has its own deformation gradient.
     let associated = of(&format!("bond_associated_{CORRESPONDENCE}"), ENERGY);
     assert!((0.85..0.98).contains(&associated), "{associated}");
 }
@@ -447,7 +449,7 @@ fn of_mixed_modes_of_correspondence() {
 #[test]
 fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     let associated = format!("bond_associated_{CORRESPONDENCE}");
-    // Figures of docs/src/theory/damage.md; the figures of correspondence scatter by some per cent.
+    // Numbers of docs/src/theory/damage.md. The numbers of correspondence scatter by some per cent.
     for (law, plane, space) in [
         (ordinary(0.1, "constant"), 0.94..1.01, 0.9..0.97),
         (ordinary(0.4, "constant"), 0.97..1.14, 0.95..1.09),
@@ -467,7 +469,7 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     }
 }
 
-/// Return the deck of [`text`] with two bodies that meet at the cut; the damage law applies to the pair only.
+/// Return the deck of [`text`] with two bodies that meet at the cut; `rule` applies to bonds between them only.
 /// `own` has the keys of `[damage.own.…]`, the damage law of the bodies; `None` for bodies without damage.
 fn pair_text(dimension: &str, ratio: u32, law: &str, rule: &str, own: Option<&str>) -> String {
     let whole = text(dimension, ratio, law, rule);
@@ -524,7 +526,7 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
         (PMB, STRETCH, vec![None, Some(&tough), Some(&weak)]),
         (NORMALISED, STRETCH, vec![Some(&tough)]),
         (&*soft, STRETCH, vec![None]),
-        // The pair breaks by work, and its bodies break by stretch.
+        // Bonds between the bodies break by energy, and bonds within a body break by stretch.
         (&*soft, ENERGY, vec![None, Some(&tough)]),
         (CORRESPONDENCE, ENERGY, vec![None, Some(&tough_by_work)]),
     ] {
@@ -547,15 +549,15 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
 
 #[test]
 fn in_the_bodies_of_a_pair_their_own_damage_counts() {
-    // The cut between the halves lies within the lower body, which has the same fracture energy as the whole
-    // block. The pair above the cut is weak.
+    // The cut between the halves lies within the lower body, which has the same fracture energy as the block
+    // of one body. The bonds between the bodies, above the cut, are weak.
     let within = |own: &str, pair: &str| {
         let deck = pair_text("plane-stress", 3, PMB, STRETCH, Some(own));
         let deck = deck.replace(
             &format!("fracture_energy = {FRACTURE_ENERGY}\n"),
             &format!("{pair}\n"),
         );
-        // Move only the border of the bodies.
+        // Move the border between the bodies, but not the cut.
         let deck = deck.replace("upper = [3.5, 0]", "upper = [3.5, 2]");
         let deck = deck.replace("lower = [-3.5, 0]", "lower = [-3.5, 2]");
         cost_of_deck::<2>(Mode::Opening, &deck, 0.02)
@@ -602,7 +604,8 @@ fn in_a_pair_that_never_breaks() {
 
 #[test]
 fn in_a_pair_of_unlike_bodies() {
-    // Bodies of different moduli and horizons. Within the bodies, the cost would be 100 times as large.
+    // The bodies have different moduli and horizons. Opening a crack within a body would cost 100 times as
+    // much.
     let cost = |law: [&str; 2], rule: &str, spacing: f64| {
         let text = format!(
             "dimension = 'plane-strain'
@@ -696,8 +699,9 @@ fn between_bodies_of_different_horizons_by_energy() {
         let inside = 0.5 * (coarse + fine);
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        // Across the border, the points are not those of the midpoint rule. With correspondence, the cost
-        // also varies by some per cent with the order in which bonds break.
+        // At the border, the spacings on both sides differ. A sum over bonds is then not a midpoint rule, so
+        // its error is larger than inside. With correspondence, the cost also varies by some per cent with the
+        // order in which bonds break.
         assert!((border / inside - 1.0).abs() < 0.12, "{case}");
     }
 }
@@ -719,15 +723,15 @@ fn between_bodies_of_different_horizons_by_stretch() {
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         println!("{case}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        // With spacings of 1 and 0.5 the border costs 12 % more than the inside: the coarse points are a poor
-        // quadrature of the small horizon.
+        // With spacings of 1 and 0.5, opening the border costs 12 % more than opening the inside: the spacing
+        // of 1 is too coarse for the sums over the small horizon of 1.5.
         assert!((border / inside - 1.0).abs() < 0.06, "{case}");
     }
 }
 
-/// Return the work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1
-/// % of its extension, so the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the
-/// plane.
+/// Return the work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. In each step,
+/// the extension of the bond grows by 0.1 %, so this work is up to 0.2 % below the threshold. The horizon is
+/// 1.5, and the thickness is 0.5 in the plane.
 fn work_at_breaking<const D: usize>(dimension: &str, calibration: &str) -> f64 {
     let thickness = if D == 2 { "thickness = 0.5" } else { "" };
     let corner = |at: f64| {

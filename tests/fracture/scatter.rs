@@ -33,9 +33,10 @@ fn bonds_break_as_weibull_says() {
                 }
             });
             let stretch = 1e-3 * simulation.clock.time();
-            // A bond is intact as long as the strength of both ends is not reached.
+            // A bond breaks when its stretch reaches the smaller strength of its two ends.
             let expected = 1.0 - libm::exp(-2.0 * libm::pow(stretch / 0.01, modulus));
-            // The difference that is exceeded once in a million samples (Dvoretzky, Kiefer & Wolfowitz).
+            // The difference from the distribution that one in a million samples exceeds (Dvoretzky, Kiefer &
+            // Wolfowitz).
             let bound = (libm::log(2e6) / (2.0 * bonds)).sqrt();
             let found = broken / bonds;
             assert!(
@@ -106,12 +107,12 @@ fn points_are_moved_by_up_to_the_jitter() {
             let farthest = shifts
                 .iter()
                 .fold(0.0_f64, |most, shift| most.max(shift.abs()));
-            // All 1000 points lie within 0.98 of it with a probability of 0.98¹⁰⁰⁰ = 2e-9.
+            // All 1000 shifts are below 0.98 `largest` with a probability of only 0.98¹⁰⁰⁰ = 2e-9.
             assert!(
                 farthest <= largest && farthest > 0.98 * largest,
                 "{farthest}"
             );
-            // The mean of 1000 points has a standard deviation of largest/√3000.
+            // The mean of 1000 shifts has a standard deviation of `largest`/√3000.
             let mean = shifts.iter().sum::<f64>() / 1000.0;
             assert!(mean.abs() < 5.0 * largest / 3000.0_f64.sqrt(), "{mean}");
         }

@@ -12,8 +12,8 @@ const HORIZON: f64 = 3.0;
 const END: f64 = 2.0;
 const STEPS: usize = 400;
 
-/// Return the deck of a plate of 8 × 4 cells with damping r (1/s) and the body force `push` sin(2t) along x
-/// (N/m³). Initial displacements and velocities are mainly translations.
+/// Return the deck of a plate of 8 × 4 cells with damping r = `damping` (1/s) and the body force `push` sin(2t)
+/// along x (N/m³). Initial displacements and velocities are mainly translations.
 fn deck(lambda: &str, damping: f64, push: f64) -> String {
     let step = END / STEPS as f64;
     format!(
@@ -109,7 +109,8 @@ fn response(count: usize, damping: f64, w: f64, values: impl Fn(usize) -> f64) -
 
 #[test]
 fn the_a_priori_estimate_holds() {
-    // The plate is so soft that the motion is mainly a translation, and the bound is close.
+    // The plate is so soft that the motion is mainly a translation. The displacement is then close to the
+    // bound.
     let (damping, push) = (0.6, 2e-3);
     let lambda = |length: f64| 2e-3 / length.powi(3);
     let text = "2e-3/r^3";
@@ -171,7 +172,8 @@ fn a_perturbed_kernel_changes_the_motion_as_much_as_allowed() {
 
 #[test]
 fn the_energy_inequality_holds() {
-    // Inequality after eq. 8 of the paper, for a force that varies in time; ν is arbitrary.
+    // Inequality after eq. 8 of the paper, for a force that varies in time. It holds for every ν > 0, a
+    // parameter of the inequality (not Poisson's ratio).
     let push = 2e-3;
     simulate::<2, _>(&deck("2e-2/r^3", 0.0, push), |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();

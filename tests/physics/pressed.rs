@@ -25,8 +25,8 @@ fn load_steps<const D: usize>(deck: &str, names: &[&str]) -> Vec<Vec<f64>> {
     })
 }
 
-/// Return a deck with a spacing of 1 m and bonds between nearest neighbours only, a chain of springs with E =
-/// 5 Pa; a relaxation with 4 load steps.
+/// Return a deck with a spacing of 1 m, E = 5 Pa and bonds between nearest neighbours only, which is a chain of
+/// springs. The method is a relaxation with 4 load steps.
 fn bars(bodies: &str) -> String {
     format!(
         "dimension = '1d'
@@ -38,11 +38,11 @@ fn bars(bodies: &str) -> String {
     )
 }
 
-/// Stiffnesses in [`bars`], N/m: a bond, 2E A ℓ/δ², and a contact layer of thickness δ, E A/δ.
+/// Stiffnesses in [`bars`], N/m: 2E A ℓ/δ² of a bond, and E A/δ of a contact layer with the thickness δ.
 const BOND: f64 = 2.0 * 5.0 / 2.25;
 const LAYER: f64 = 5.0 / 1.5;
 
-/// Assert that the energy error of each load step is small compared with a work (J).
+/// Assert that the energy error of each load step is small compared with `work`, J.
 fn assert_balance(rows: &[Vec<f64>], error: usize, work: f64) {
     for row in rows {
         assert!(row[error].abs() < 1e-6 * work, "{row:?} of {work}");
@@ -51,7 +51,7 @@ fn assert_balance(rows: &[Vec<f64>], error: usize, work: f64) {
 
 #[test]
 fn a_block_between_a_rigid_floor_and_a_rigid_plate() {
-    // Only the contact holds the block.
+    // The block has no support other than the contact.
     let deck = bars(
         "rigid.floor.half_space = { through = [0], normal = [1] }
         rigid.plate = { half_space = { through = [40], normal = [-1] }, motion = ['-0.1*t'] }
@@ -67,7 +67,7 @@ fn a_block_between_a_rigid_floor_and_a_rigid_plate() {
     ];
     let rows = load_steps::<1>(&deck, &names);
     assert_eq!(rows.len(), 4);
-    // Half a contact layer at each end and 39 bonds, in series.
+    // Half a contact layer at each end and 39 bonds act in series.
     let stiffness = 1.0 / (1.0 / LAYER + 39.0 / BOND);
     for row in &rows {
         let pressed = 0.1 * row[0];
@@ -103,15 +103,15 @@ fn two_blocks_pressed_together_and_pulled_apart() {
         "external_work",
     ];
     let rows = load_steps::<1>(&deck, &names);
-    // One whole contact layer between 19 and 29 bonds. The contact is open when the end has moved beyond its
-    // initial position.
+    // One whole contact layer acts in series with 19 bonds on one side and 29 bonds on the other side. The
+    // contact is open when the end has moved beyond its initial position.
     let stiffness = 1.0 / (1.0 / LAYER + 48.0 / BOND);
     for (row, moved) in rows.iter().zip([-0.35, -0.3, -0.05, 0.2]) {
         let force = stiffness * f64::max(-moved, 0.0);
         assert!((row[1] - force).abs() < 1e-6, "{row:?} for {force}");
         assert!((row[2] + force).abs() < 1e-6, "{row:?} for {force}");
     }
-    // The contact opens within the last load step, so the trapezoid rule of the work is inaccurate there.
+    // The contact opens within the last load step, so the work of the trapezoid rule is inaccurate in this step.
     assert_balance(&rows[..3], 3, rows[0][4].abs());
 }
 
@@ -144,8 +144,9 @@ fn a_closed_crack_carries_load_in_equilibrium() {
     let closed = force(&cracked_block("contact = {}"));
     let open = force(&cracked_block(""));
     assert!(open.abs() < 1e-4 * whole, "{open} of {whole}");
-    // The contact layer is in series with the 17 m between the supports: 17/(17 + 3.015/(1 − 1/16)) = 0.84.
-    // Softer surfaces at the crack faces reduce this value slightly.
+    // The contact layer is in series with the 17 m between the supports, which gives the ratio
+    // 17/(17 + 3.015/(1 − 1/16)) = 0.84. The crack faces are softer than the inside, which reduces this ratio
+    // slightly.
     assert!(
         (0.77..0.86).contains(&(closed / whole)),
         "{closed} of {whole}"

@@ -57,7 +57,8 @@ pub struct Deck {
     /// Cross-section of a 1-D body in m²; 1 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_section: Option<Number>,
-    /// Condition across a 1-D body: `"uniaxial-stress"` (if not given) or `"uniaxial-strain"`.
+    /// Whether a 1-D body is free of lateral stress, `"uniaxial-stress"` (if not given), or of lateral
+    /// strain, `"uniaxial-strain"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub constraint: Option<Spanned<ConstraintName>>,
     /// Named numbers for use in expressions; a parameter may refer to other parameters.
@@ -85,9 +86,9 @@ pub struct Deck {
     /// Damage laws by name.
     #[serde(default)]
     pub damage: Tables<Damage>,
-    /// Bodies by name; each is a block with its own material and damage.
+    /// Bodies by name; each body has its own material and damage.
     pub body: Tables<Body>,
-    /// Sets of points by name. `all` and the names of the bodies are sets as well.
+    /// Sets of points by name. `all` and the names of the bodies are names of sets too.
     #[serde(default)]
     pub set: Tables<Set>,
     /// Pre-cracks by name: bonds that cross one start broken.
@@ -127,7 +128,7 @@ pub enum DimensionName {
     /// A thin plate without stress across its thickness.
     #[serde(rename = "plane-stress")]
     PlaneStress,
-    /// A slice of a long body, without strain along it.
+    /// A slice of a long body, without strain along the body.
     #[serde(rename = "plane-strain")]
     PlaneStrain,
     /// A solid.
@@ -135,13 +136,13 @@ pub enum DimensionName {
     Space,
 }
 
-/// Condition across a bar.
+/// Which lateral condition a bar (1-D) has: no lateral stress or no lateral strain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum ConstraintName {
-    /// No stress across the bar.
+    /// No lateral stress: the sides of the bar are free.
     #[serde(rename = "uniaxial-stress")]
     UniaxialStress,
-    /// No strain across the bar.
+    /// No lateral strain: the sides of the bar cannot move.
     #[serde(rename = "uniaxial-strain")]
     UniaxialStrain,
 }

@@ -16,8 +16,8 @@
 //! Because F_ξ ξ = Y, W is 0 only for motions that keep the length of every bond.
 //! F is the gradient of the point, not the mean gradient of both ends. Therefore the force state depends on
 //! the point's own family only, and Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point.
-//! The gradients of Chen 2018 sum over the neighbours that both ends share. They would need enough shared
-//! neighbours and a shape tensor per bond.
+//! The gradients of Chen 2018 sum over the neighbours that both ends share. Such gradients would need enough
+//! shared neighbours and a shape tensor per bond, so they are not used.
 //!
 //! A bound on the stiffness follows from W ≤ ½ c Σ w |H_ξ|², with |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|² and
 //! |H|² ≤ Σ ω |η|² Ṽ/λ.
@@ -92,7 +92,8 @@ impl Described for BondAssociated {
     }
 }
 
-/// Constants c/λ and c/Σ ω Ṽ of the stiffness; then 1/Σ ω Ṽ of the intact bonds, H, and Z K⁻¹.
+/// Point numbers: the constants c/λ and c/Σ ω Ṽ of the stiffness; then 1/Σ ω Ṽ of the intact bonds, H, and
+/// Z K⁻¹.
 type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
 /// Indices of the numbers of a point.
@@ -157,7 +158,8 @@ impl<const D: usize> Law<D> for BondAssociated {
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_EXTENSION: bool = false;
     const HAS_BOND_STRESS_ACROSS: bool = true;
-    // Most of the time goes into the stresses, which have a separate loop.
+    // An AVX-512 version would gain little: most of the time goes into the stresses, which are computed in a
+    // separate loop.
     const ISA_SET: IsaSet = IsaSet::Avx2;
 
     #[inline(always)]

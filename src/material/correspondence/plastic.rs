@@ -71,12 +71,12 @@ pub const STRAIN_MEASURE: Key = Key {
     kind: Kind::Word(&[Word::new("green-lagrange"), Word::new("logarithmic")]),
 };
 
-/// Tolerance of the yield surface, relative to the yield stress. Without it, a returned stress could flow
-/// again because of round-off.
+/// Tolerance of the yield surface, relative to the yield stress. Without this tolerance, a stress that has
+/// been returned to the yield surface could flow again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// Tolerance of the yield surface for logarithmic strains. The round-off of b_e after a return is larger,
-/// because it scales with the square of the stretches.
+/// Tolerance of the yield surface for logarithmic strains. After a return to the yield surface, the round-off
+/// of b_e is larger, because it scales with the square of the stretches.
 const LOGARITHMIC_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys.
@@ -221,11 +221,12 @@ impl Plastic {
         stress
     }
 
-    /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))² with the current yield stress σ. It is
-    /// the square of the secant shear modulus over G. It is 1 before any flow and never grows.
+    /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))² with the current yield stress σ. This
+    /// factor is the square of the ratio of the secant shear modulus to G. It is 1 before any flow and never
+    /// grows.
     ///
-    /// z grows with ε̄. With the secant modulus itself, the energy of the control would grow with the plastic
-    /// work, and limit loads would contain a part of it.
+    /// The deviation z grows with ε̄. With the ratio instead of its square, the energy of the control would
+    /// grow with the plastic work, and limit loads would contain a part of this energy.
     /// With the square, this energy stays at its value at first yield.
     pub fn control_left(&self, state: &PlasticState) -> f64 {
         let limit = self.limit(state);
@@ -237,8 +238,8 @@ impl Plastic {
         self.yield_stress + self.hardening * state.equivalent
     }
 
-    /// Return the plastic strain that grows at a trial stress (Pa), and update ε̄ and the plastic work.
-    /// `None` if nothing flows.
+    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄ and the plastic work.
+    /// `None` if the stress is inside the yield surface.
     pub fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) -> Option<Matrix3<f64>> {
         let (limit, most) = (self.limit(state), equivalent(trial));
         let surface = if self.is_logarithmic {
@@ -246,7 +247,7 @@ impl Plastic {
         } else {
             SURFACE
         };
-        // NaN and infinity do not flow; the check for finite fields reports these.
+        // A stress of NaN or infinity is ignored here; the check for finite fields reports such values.
         let flows = most > limit * (1.0 + surface) && most.is_finite();
         if !flows {
             return None;
@@ -262,11 +263,11 @@ impl Plastic {
         Some(change)
     }
 
-    /// Return Δε̄ and ΔE_p in plane stress.
+    /// Return Δε̄ and ΔE_p = x S_d in plane stress.
     ///
-    /// C and the projection to the deviator have the same eigenvectors. Each part of the stress therefore
-    /// shrinks by 1/(1 + x c), with the eigenvalue c.
-    /// q decreases with x and is convex, so Newton's method converges to the root from one side.
+    /// C and the projection P to the deviator have the same eigenvectors. Each eigencomponent of the trial
+    /// stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of C P.
+    /// q then decreases with x and is convex, so Newton's method converges to the root from one side.
     fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64) -> (f64, Matrix3<f64>) {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
         let even = 2.0 * (self.lambda + self.shear) / 3.0;
@@ -380,12 +381,13 @@ mod tests {
             assert!(flow.trace().abs() < 1e-16);
             if state != before {
                 assert!(over > -1e-12, "{over}");
-                // The flow is along the deviator, with the length of the equivalent strain.
+                // The increment of the plastic strain is along the deviator; its length gives the increment of
+                // the equivalent strain.
                 let growth = state.equivalent - before.equivalent;
                 let wanted = deviator(&stress) * (1.5 * growth / equivalent(&stress));
                 assert!((flow - wanted).norm() < 1e-9 * growth);
             }
-            // A returned stress does not flow again.
+            // A stress that has been returned to the yield surface does not flow again.
             let after = state;
             law.at(&gradient, &mut state);
             assert_eq!(state, after);
@@ -409,7 +411,8 @@ mod tests {
             let (stress, energy) = sheet.at(&gradient, &mut of_sheet).unwrap();
             let mut whole = Matrix3::zeros();
             whole.fixed_view_mut::<2, 2>(0, 0).copy_from(&gradient);
-            // Find by bisection the gradient across the sheet at which the stress across is 0.
+            // Find by bisection the displacement gradient across the sheet at which the stress across the
+            // sheet is 0.
             let [mut low, mut high] = [-0.3, 0.3];
             for _ in 0..80 {
                 whole[(2, 2)] = 0.5 * (low + high);
