@@ -385,7 +385,7 @@ fn a_pulled_bar_carries_the_strength() {
             1.15 * 27.0 * STRENGTH / YOUNG,
         );
         let (most, last) = simulate::<2, _>(&text, |mut simulation| {
-            let mut history = HistoryObserver::new(&simulation);
+            let mut history = HistoryObserver::new(&simulation).unwrap();
             let place = column(&history, "reaction_right_x");
             let (mut most, mut last) = (0.0_f64, 0.0);
             while !simulation.is_over() {
@@ -428,7 +428,7 @@ fn a_notched_plate_tears_and_its_energy_balances() {
         "
     );
     simulate::<2, _>(&text, |mut simulation| {
-        let mut history = HistoryObserver::new(&simulation);
+        let mut history = HistoryObserver::new(&simulation).unwrap();
         let [fracture, error] =
             ["fracture_energy", "energy_error"].map(|name| column(&history, name));
         let (mut spent, mut steps) = (0.0, 0_u32);
