@@ -173,3 +173,58 @@ impl EnergyWatch {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(energies: Energies) -> HistoryRow {
+        HistoryRow {
+            values: Vec::new(),
+            number: 1,
+            energies,
+            first_energy: 0.0,
+            step_energy: 0.0,
+            broken: 0,
+        }
+    }
+
+    #[test]
+    fn a_balance_that_does_not_close_is_reported() {
+        let watch = EnergyWatch {
+            floor: 1e-3,
+            input: 0.0,
+            warned: false,
+            max_freed: 0.0,
+            warned_of_breaking: false,
+            suspected: false,
+            steps: String::new(),
+        };
+        let of = |work: f64, error: f64, is_quasi_static: bool| {
+            let energies = Energies {
+                work,
+                strain: work + error,
+                error,
+                ..Energies::default()
+            };
+            watch.check_end(&row(energies), is_quasi_static)
+        };
+        assert_eq!(of(2.0, 0.4, false), None);
+        assert_eq!(of(2.0, -0.4, true), None);
+        // Energies below the floor are round-off.
+        assert_eq!(of(1e-4, -1e-4, true), None);
+        for (error, is_quasi_static, words) in [
+            (
+                0.8,
+                false,
+                "grown by 8.000e-1 J, 29 % of the largest energy",
+            ),
+            (0.8, true, "twice as many load steps"),
+            (-0.8, false, "time steps have lost 8.000e-1 J, 40 %"),
+            (-0.8, true, "load steps have lost 8.000e-1 J, 40 %"),
+        ] {
+            let text = of(2.0, error, is_quasi_static).unwrap();
+            assert!(text.contains(words), "{text}");
+        }
+    }
+}
