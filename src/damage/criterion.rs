@@ -1,7 +1,7 @@
 //! When a bond breaks, decided by the same operations from both ends: stretches are compared by x of
 //! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states, stresses by their mean.
 
-use super::{StressMeasure, StressRule};
+use super::{StressMeasure, StressRule, ToughnessByDirection};
 use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, Law};
@@ -15,20 +15,24 @@ pub enum Criterion {
     Stretch(f64),
     /// At the smaller of the threshold stretches of the two points; the critical stretches of their
     /// blocks are the part of it that a law may scale, 0 where a block has none.
-    Thresholds([f64; 2]),
+    Thresholds([f64; 2], Directions),
     /// As [`Self::Stretch`], between points whose critical stretches belong to different horizons; ∞ where a block has none.
     StretchBetween([f64; 2], StretchConversion),
     /// As [`Self::Thresholds`], between points whose critical stretches belong to different horizons.
-    ThresholdsBetween([f64; 2], StretchConversion),
+    ThresholdsBetween([f64; 2], StretchConversion, Directions),
     /// When the work of the acting force states reaches the sum of what each of them takes, J/m⁶.
     Work([f64; 2], WorkRule),
     /// As [`Self::Work`], from the work thresholds of the two points.
-    WorkThresholds(HorizonRatios, WorkRule),
+    WorkThresholds(HorizonRatios, WorkRule, Directions),
     /// When the mean stress of the acting ends reaches this strength, Pa.
     Stress(f64, StressRule),
     /// As [`Self::Stress`], at the smaller strength of the two points.
     StressThresholds(StressRule),
 }
+
+/// The toughness by direction of the bodies of points i and j, unless that of both is the same in all directions. It multiplies
+/// the thresholds of these points.
+pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert the work threshold of a point to the horizon of an end of the bond: entry `[e][k]` takes that of
 /// point k to end e; all are 1 between equal horizons.
@@ -150,7 +154,7 @@ impl Criterion {
     pub fn reads_thresholds(self) -> bool {
         matches!(
             self,
-            Self::Thresholds(_)
+            Self::Thresholds(..)
                 | Self::ThresholdsBetween(..)
                 | Self::WorkThresholds(..)
                 | Self::StressThresholds(_)
@@ -161,7 +165,7 @@ impl Criterion {
     #[inline(always)]
     pub fn reads_truncation_factors(self) -> bool {
         match self {
-            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => rule.corrects(),
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => rule.corrects(),
             _ => false,
         }
     }
@@ -170,7 +174,7 @@ impl Criterion {
     #[inline(always)]
     pub fn reads_rotations(self) -> bool {
         match self {
-            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 rule.measure == WorkMeasure::Objective
             }
             _ => false,
@@ -234,7 +238,7 @@ impl Criterion {
                 bond.relative_square_extension,
                 Lanes::splat(relative_square_extension_of(critical)),
             ),
-            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 let [i, j] = ends.weights.acting();
                 let spent = simd.at_least(work, self.threshold(simd, bond, ends)) & (i | j);
                 match rule.sense {
@@ -252,7 +256,7 @@ impl Criterion {
             }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(_)
-            | Self::Thresholds(_)
+            | Self::Thresholds(..)
             | Self::StretchBetween(..)
             | Self::ThresholdsBetween(..) => {
                 let threshold = self.threshold(simd, bond, ends);
@@ -288,22 +292,31 @@ impl Criterion {
                     threshold
                 }
             }
-            Self::Thresholds(critical) | Self::ThresholdsBetween(critical, _) => {
+            Self::Thresholds(critical, directions)
+            | Self::ThresholdsBetween(critical, _, directions) => {
                 let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if L::SCALED {
                     let growth = scale() - Lanes::splat(1.0);
                     here += growth * critical[0];
                     there += growth * critical[1];
                 }
+                if let Some(directions) = directions {
+                    here = here * directions[0].factor(simd, bond).sqrt();
+                    there = there * directions[1].factor(simd, bond).sqrt();
+                }
                 match self {
-                    Self::ThresholdsBetween(_, conversion) => {
+                    Self::ThresholdsBetween(_, conversion, _) => {
                         conversion.convert(simd, [here, there], ends.weights.acting())
                     }
                     _ => here.min(there),
                 }
             }
-            Self::WorkThresholds([[ii, ij], [ji, jj]], rule) => {
-                let (i, j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
+            Self::WorkThresholds([[ii, ij], [ji, jj]], rule, directions) => {
+                let (mut i, mut j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
+                if let Some(directions) = directions {
+                    i = i * directions[0].factor(simd, bond);
+                    j = j * directions[1].factor(simd, bond);
+                }
                 let takes_i = (i * ii).min(j * ij) * 0.5;
                 let takes_j = (i * ji).min(j * jj) * 0.5;
                 rule.sum_of_acting(simd, [takes_i, takes_j], ends)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use super::{Calibration, Law, StressRule, ThermalExpansion, WorkRule};
+use super::{Calibration, Law, StressRule, ThermalExpansion, ToughnessByDirection, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
@@ -232,6 +232,9 @@ pub struct Damage {
     pub alpha: f64,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
+    /// Toughness by direction, if it is not the same in all directions. The fracture energy is then that of cracks along
+    /// its axis.
+    pub direction: Option<ToughnessByDirection>,
     /// Indices of sets whose bonds never break.
     pub no_failure: Vec<usize>,
 }
