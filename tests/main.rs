@@ -61,6 +61,7 @@ mod fracture {
     mod fronts;
     mod scatter;
     mod surfaces;
+    mod toughness_by_direction;
 }
 
 mod parallel {

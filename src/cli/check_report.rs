@@ -75,6 +75,10 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
             if body.damage.is_some() && damage.stress_measure().is_none() {
                 report.line("alpha", damage.alpha());
             }
+            if let Some(direction) = laws.direction {
+                let ratio = direction.ratio(problem.dimension.count());
+                report.line("energy across/along", format_args!("{ratio:.3}"));
+            }
             if let Some(weibull) = laws.weibull {
                 report.line("Weibull modulus", weibull.modulus);
             }

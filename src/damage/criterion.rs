@@ -2,7 +2,7 @@
 //! x of [`crate::material::bond`], which needs no root; energies by the work of both force states; stresses by
 //! the mean of both points.
 
-use super::{StressMeasure, StressRule};
+use super::{StressMeasure, StressRule, ToughnessByDirection};
 use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, Law};
@@ -17,21 +17,25 @@ pub enum Criterion {
     /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
     /// of both blocks, 0 for a block without critical stretch. A law may scale only this part of the
     /// thresholds.
-    Thresholds([f64; 2]),
+    Thresholds([f64; 2], Directions),
     /// Same as [`Self::Stretch`], for critical stretches that belong to different horizons; ∞ for a block
     /// without critical stretch.
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
-    ThresholdsBetween([f64; 2], StretchConversion),
+    ThresholdsBetween([f64; 2], StretchConversion, Directions),
     /// Bonds break when the work of the acting force states reaches the sum of their critical works, J/m⁶.
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the work thresholds of points i and j.
-    WorkThresholds(HorizonRatios, WorkRule),
+    WorkThresholds(HorizonRatios, WorkRule, Directions),
     /// When the mean stress of the acting ends reaches this strength, Pa.
     Stress(f64, StressRule),
     /// As [`Self::Stress`], at the smaller strength of the two points.
     StressThresholds(StressRule),
 }
+
+/// Toughness by direction of the bodies of points i and j; `None` if both are equally tough in all directions.
+/// It multiplies the thresholds of the points.
+pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k
 /// to end e; all are 1 if both horizons are equal.
@@ -156,7 +160,7 @@ impl Criterion {
     pub fn reads_thresholds(self) -> bool {
         matches!(
             self,
-            Self::Thresholds(_)
+            Self::Thresholds(..)
                 | Self::ThresholdsBetween(..)
                 | Self::WorkThresholds(..)
                 | Self::StressThresholds(_)
@@ -167,7 +171,7 @@ impl Criterion {
     #[inline(always)]
     pub fn reads_truncation_factors(self) -> bool {
         match self {
-            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => rule.corrects(),
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => rule.corrects(),
             _ => false,
         }
     }
@@ -176,7 +180,7 @@ impl Criterion {
     #[inline(always)]
     pub fn reads_rotations(self) -> bool {
         match self {
-            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 rule.measure == WorkMeasure::Objective
             }
             _ => false,
@@ -243,7 +247,7 @@ impl Criterion {
                 bond.relative_square_extension,
                 Lanes::splat(relative_square_extension_of(critical)),
             ),
-            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 let [i, j] = ends.weights.acting();
                 let spent = simd.at_least(work, self.threshold(simd, bond, ends)) & (i | j);
                 match rule.sense {
@@ -261,7 +265,7 @@ impl Criterion {
             }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(_)
-            | Self::Thresholds(_)
+            | Self::Thresholds(..)
             | Self::StretchBetween(..)
             | Self::ThresholdsBetween(..) => {
                 let threshold = self.threshold(simd, bond, ends);
@@ -297,22 +301,31 @@ impl Criterion {
                     threshold
                 }
             }
-            Self::Thresholds(critical) | Self::ThresholdsBetween(critical, _) => {
+            Self::Thresholds(critical, directions)
+            | Self::ThresholdsBetween(critical, _, directions) => {
                 let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if L::SCALED {
                     let growth = scale() - Lanes::splat(1.0);
                     here += growth * critical[0];
                     there += growth * critical[1];
                 }
+                if let Some(directions) = directions {
+                    here = here * directions[0].factor(simd, bond).sqrt();
+                    there = there * directions[1].factor(simd, bond).sqrt();
+                }
                 match self {
-                    Self::ThresholdsBetween(_, conversion) => {
+                    Self::ThresholdsBetween(_, conversion, _) => {
                         conversion.convert(simd, [here, there], ends.weights.acting())
                     }
                     _ => here.min(there),
                 }
             }
-            Self::WorkThresholds([[ii, ij], [ji, jj]], rule) => {
-                let (i, j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
+            Self::WorkThresholds([[ii, ij], [ji, jj]], rule, directions) => {
+                let (mut i, mut j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
+                if let Some(directions) = directions {
+                    i = i * directions[0].factor(simd, bond);
+                    j = j * directions[1].factor(simd, bond);
+                }
                 let takes_i = (i * ii).min(j * ij) * 0.5;
                 let takes_j = (i * ji).min(j * jj) * 0.5;
                 rule.sum_of_acting(simd, [takes_i, takes_j], ends)

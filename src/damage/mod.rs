@@ -3,14 +3,17 @@
 mod bond_energy;
 mod criterion;
 mod critical_stretch;
+mod direction;
 mod pull_apart;
 mod stress;
 
 pub use bond_energy::{BondEnergy, Calibration};
 pub use criterion::{
-    Criterion, Ends, HorizonRatios, Limits, Sense, StretchConversion, WorkMeasure, WorkRule,
+    Criterion, Directions, Ends, HorizonRatios, Limits, Sense, StretchConversion, WorkMeasure,
+    WorkRule,
 };
 pub use critical_stretch::CriticalStretch;
+pub use direction::ToughnessByDirection;
 pub use stress::{StressLimit, StressMeasure, StressRule};
 
 /// The damage law of a block.

@@ -1,14 +1,15 @@
 //! Damage laws of a deck, validated.
 
 use super::grammar::{self, Text};
-use super::number::Number;
+use super::number::{Number, Vector};
 use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
+use crate::message::format_number;
 use crate::problem::{
-    self, Calibration, DamageRule, Sense, StressMeasure, StressRule, Toughness, WorkMeasure,
-    WorkRule,
+    self, Calibration, DamageRule, Sense, StressMeasure, StressRule, Toughness,
+    ToughnessByDirection, WorkMeasure, WorkRule,
 };
 use crate::scatter::Weibull;
 
@@ -34,20 +35,32 @@ pub fn damage(
                 &law.critical_stretch,
                 Toughness::CriticalStretch,
             );
+            let directed = Directed {
+                along: &law.fracture_energy_along,
+                across: &law.fracture_energy_across,
+                direction: &law.direction,
+            };
             let [energy, toughness] = of_crack(&law.fracture_energy, &law.fracture_toughness);
-            let all = [energy, toughness, stretch];
+            let all = [energy, toughness, directed.measure(), stretch];
             Ok(problem::Damage {
                 rule: DamageRule::CriticalStretch,
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
                 weibull: weibull(scope, &law.weibull_modulus, &law.seed, &key)?,
+                direction: directed.toughness(scope, &key)?,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
             })
         }
         grammar::Damage::Energy(spanned) => {
             let law = spanned.get_ref();
             let key = format!("[damage.{name}.energy]");
-            let all = of_crack(&law.fracture_energy, &law.fracture_toughness);
+            let directed = Directed {
+                along: &law.fracture_energy_along,
+                across: &law.fracture_energy_across,
+                direction: &law.direction,
+            };
+            let [energy, toughness] = of_crack(&law.fracture_energy, &law.fracture_toughness);
+            let all = [energy, toughness, directed.measure()];
             let calibration = match law.calibration.get_ref() {
                 grammar::Calibration::Energy => Calibration::Energy,
                 grammar::Calibration::Opening => Calibration::Opening(None),
@@ -81,6 +94,7 @@ pub fn damage(
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
                 weibull: weibull(scope, &law.weibull_modulus, &law.seed, &key)?,
+                direction: directed.toughness(scope, &key)?,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
             })
         }
@@ -100,6 +114,7 @@ pub fn damage(
                 toughness: Toughness::Strength(strength),
                 alpha: 0.0,
                 weibull: weibull(scope, &law.weibull_modulus, &law.seed, &key)?,
+                direction: None,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
             })
         }
@@ -111,6 +126,74 @@ fn sense(tension_only: bool) -> Sense {
         Sense::Pulled
     } else {
         Sense::Either
+    }
+}
+
+/// Keys of a fracture energy that depends on the direction of a crack.
+struct Directed<'a> {
+    along: &'a Option<Number>,
+    across: &'a Option<Number>,
+    direction: &'a Option<Vector>,
+}
+
+impl<'a> Directed<'a> {
+    fn measure(&self) -> Measure<'a> {
+        (
+            "fracture_energy_along",
+            self.along,
+            Toughness::FractureEnergy,
+        )
+    }
+
+    /// The toughness by direction, if the keys are given.
+    fn toughness(&self, scope: &Scope, key: &str) -> Result<Option<ToughnessByDirection>> {
+        let across = self.across.as_ref();
+        let given = [
+            (
+                "fracture_energy_along",
+                self.along.as_ref().map(Spanned::span),
+            ),
+            ("fracture_energy_across", across.map(Spanned::span)),
+            ("direction", self.direction.as_ref().map(Spanned::span)),
+        ];
+        let first = given
+            .iter()
+            .find_map(|(name, span)| Some((*name, span.clone()?)));
+        let Some((name, span)) = first else {
+            return Ok(None);
+        };
+        let (Some(along), Some(across), Some(direction)) = (self.along, across, self.direction)
+        else {
+            let missing = given.iter().find(|(_, span)| span.is_none());
+            let missing = missing.map_or("", |(missing, _)| missing);
+            let message = format!("{key} {name}: needs `{missing}` too");
+            return Err(scope.error(span, message));
+        };
+        if scope.dimension == 1 {
+            let message =
+                format!("{key} {name}: cracks in a bar have one direction; give `fracture_energy`");
+            return Err(scope.error(span, message));
+        }
+        let axis = scope.direction(direction, &format!("{key} direction"))?;
+        let [along, across_value] = [
+            scope.positive(along, &format!("{key} fracture_energy_along"))?,
+            scope.positive(across, &format!("{key} fracture_energy_across"))?,
+        ];
+        let ratio = across_value / along;
+        let toughness = ToughnessByDirection::new(scope.dimension, axis, ratio);
+        if toughness.is_none() {
+            let [least, most] = ToughnessByDirection::limits(scope.dimension);
+            let round = |ratio: f64| format_number((100.0 * ratio).round() / 100.0);
+            let message = format!(
+                "{key} fracture_energy_across: must be {} to {} times `fracture_energy_along`, is {} times; beyond this, \
+                 bonds in the weak direction would break far from cracks",
+                round(least),
+                round(most),
+                round(ratio)
+            );
+            return Err(scope.error(across.span(), message));
+        }
+        Ok(toughness)
     }
 }
 

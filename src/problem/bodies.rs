@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use super::{Calibration, Law, StressRule, ThermalExpansion, WorkRule};
+use super::{Calibration, Law, StressRule, ThermalExpansion, ToughnessByDirection, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
@@ -233,6 +233,9 @@ pub struct Damage {
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
+    /// Toughness by direction; `None` if it is the same in all directions. The fracture energy is that of cracks
+    /// along its axis.
+    pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
 }

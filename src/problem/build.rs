@@ -201,6 +201,7 @@ impl Damage {
             toughness,
             alpha: 0.0,
             weibull: None,
+            direction: None,
             no_failure: Vec::new(),
         }
     }

@@ -24,7 +24,9 @@ use std::ops::Range;
 use crate::dimension::Dimension;
 use crate::error::Warning;
 
-pub use crate::damage::{Calibration, Sense, StressMeasure, StressRule, WorkMeasure, WorkRule};
+pub use crate::damage::{
+    Calibration, Sense, StressMeasure, StressRule, ToughnessByDirection, WorkMeasure, WorkRule,
+};
 pub use blocks::{Block, Kind};
 pub use bodies::*;
 pub use conditions::*;

@@ -70,7 +70,7 @@ impl Case {
         let either = by_energy && self.law.any_poisson_ratio;
         let either = either.then(|| energy(0.02, ", tension_only = false, family_correction = 1"));
         let stress = |measure: &str, more: &str| {
-            format!("damage.brittle.stress = {{ measure = '{measure}', strength = 0.25{more} }}")
+            format!("damage.brittle.stress = {{ measure = '{measure}', strength = 0.11{more} }}")
         };
         let stress = [
             stress("principal", ", tension_only = false"),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value, json};
 
 use super::Text;
-use crate::deck::number::{Number, default_number};
+use crate::deck::number::{Number, Vector, default_number};
 use crate::deck::spanned::Spanned;
 use crate::elastic::Constant;
 use crate::material::{Declaration, Kind, declarations};
@@ -168,7 +168,7 @@ pub enum Damage {
     Stress(Spanned<Stress>),
 }
 
-/// Critical stretch, given by exactly one of three measures of toughness.
+/// Critical stretch, given by exactly one of four measures of toughness.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CriticalStretch {
@@ -178,6 +178,15 @@ pub struct CriticalStretch {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
+    /// Fracture energy in J/m² of cracks along `direction`: their normal is perpendicular to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy_along: Option<Number>,
+    /// Fracture energy in J/m² of cracks across `direction`: their normal is parallel to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy_across: Option<Number>,
+    /// Fibres, or the normal of layers, in the undeformed body; a vector of any length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Vector>,
     /// The critical stretch s0 itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub critical_stretch: Option<Number>,
@@ -195,7 +204,7 @@ pub struct CriticalStretch {
     pub no_failure: Vec<Text>,
 }
 
-/// Critical work of bonds, given by exactly one of two measures of toughness.
+/// Critical work of bonds, given by exactly one of three measures of toughness.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BondEnergy {
@@ -205,6 +214,15 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
+    /// Fracture energy in J/m² of cracks along `direction`: their normal is perpendicular to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy_along: Option<Number>,
+    /// Fracture energy in J/m² of cracks across `direction`: their normal is parallel to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy_across: Option<Number>,
+    /// Fibres, or the normal of layers, in the undeformed body; a vector of any length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Vector>,
     /// How the critical work follows from the toughness. "energy": breaking all bonds across an area dissipates the
     /// fracture energy. "opening": separating a block of the body costs the fracture energy; this is computed before
     /// the run. "willberg2022": eq. 16 and 18 of Willberg et al. (2022). "perilab": as PeriLab computes it; 2-D and

@@ -4,7 +4,7 @@ mod possible;
 
 use crate::damage::{
     BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StressLimit, StressMeasure,
-    StressRule, StretchConversion, WorkRule,
+    StressRule, StretchConversion, ToughnessByDirection, WorkRule,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -157,6 +157,7 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
             .map(softened)
             .or_else(|| damage.map(|damage| damage_law(problem, body, damage, constants))),
         weibull: damage.and_then(|damage| damage.weibull),
+        direction: damage.and_then(|damage| damage.direction),
         pairs: pair_reads(problem, body),
         dimension: problem.dimension,
         elastic: body.material.elastic,
@@ -319,8 +320,12 @@ fn criterion(
         ratios: stretch_ratios,
         stiffness,
     });
+    let directions = ends.map(|block| blocks[block].direction);
+    let is_directed = directions.iter().any(Option::is_some);
+    let directions =
+        is_directed.then(|| directions.map(|one| one.unwrap_or(ToughnessByDirection::NONE)));
     match (rules.reduce(WorkRule::of_both), per_point) {
-        (Some(rule), true) => Criterion::WorkThresholds(ratios, rule),
+        (Some(rule), true) => Criterion::WorkThresholds(ratios, rule, directions),
         (Some(rule), false) => {
             let takes = ratios.map(|of_end| {
                 let all = of_end.into_iter().zip(critical);
@@ -332,8 +337,8 @@ fn criterion(
         (None, true) => {
             let critical = critical.map(|critical| critical.unwrap_or(0.0));
             match conversion {
-                None => Criterion::Thresholds(critical),
-                Some(conversion) => Criterion::ThresholdsBetween(critical, conversion),
+                None => Criterion::Thresholds(critical, directions),
+                Some(conversion) => Criterion::ThresholdsBetween(critical, conversion, directions),
             }
         }
         (None, false) => match conversion {

@@ -65,6 +65,7 @@ fn pair_damage_is_possible(
     let of_points = [
         (damage.alpha > 0.0, "alpha"),
         (damage.weibull.is_some(), "weibull_modulus"),
+        (damage.direction.is_some(), "direction"),
     ];
     if let Some((_, key)) = of_points.into_iter().find(|(is, _)| *is) {
         return error(format!(

@@ -1,6 +1,6 @@
 //! The bonds between two blocks, and their laws.
 
-use crate::damage::{Criterion, DamageLaw, StressMeasure};
+use crate::damage::{Criterion, DamageLaw, StressMeasure, ToughnessByDirection};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::families::BlockBonds;
@@ -28,6 +28,8 @@ pub struct BlockLaws {
     pub damage: Option<DamageLaw>,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
+    /// Toughness by direction; `None` if it is the same in all directions.
+    pub direction: Option<ToughnessByDirection>,
     /// Data that criteria read of these points, for bonds between bodies that have a separate damage law.
     pub pairs: PairReads,
     /// Dimension, for the stress across plane bodies.
@@ -69,7 +71,7 @@ impl BlockLaws {
 
     /// Whether thresholds differ between points and are stored per point.
     pub fn has_thresholds(&self) -> bool {
-        self.weibull.is_some() || self.follows_smallest_stretch()
+        self.weibull.is_some() || self.direction.is_some() || self.follows_smallest_stretch()
     }
 
     /// Whether the thresholds of the points change with the smallest stretches of their families.

@@ -261,10 +261,11 @@ impl<const D: usize> Forces<D> {
             grids,
             ..
         } = self;
-        for (point, strength) in strength.iter().enumerate() {
+        for point in 0..model.owned() {
             let damage = blocks[usize::from(model.block[point])].damage;
+            let strength = strength.get(point).copied().unwrap_or(1.0);
             limits.thresholds[point] =
-                damage.map_or(f64::INFINITY, |law| law.threshold(*strength, 0.0));
+                damage.map_or(f64::INFINITY, |law| law.threshold(strength, 0.0));
         }
         halo.update_ghosts(comm, &mut [&mut limits.thresholds[..]]);
         for grid in grids {

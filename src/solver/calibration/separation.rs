@@ -40,7 +40,7 @@ const CHECK_INTERVAL: u32 = 20;
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;
-    let fracture_energy = fracture_energy(problem, body)?;
+    let fracture_energy = fracture_energy(problem, body, unit(normal(problem.dimension.count())))?;
     let first = match block_laws(&block, &Block::unrefined(&block.bodies[0])).damage? {
         DamageLaw::CriticalStretch(law) => law.critical,
         DamageLaw::BondEnergy(law) => law.stretch,
@@ -85,19 +85,28 @@ fn normal(dimension: usize) -> usize {
     usize::from(dimension > 1)
 }
 
-/// Fracture energy G₀ of a body, J/m².
-fn fracture_energy(problem: &Problem, body: usize) -> Option<f64> {
+/// The unit vector of an axis.
+fn unit(axis: usize) -> [f64; 3] {
+    std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 })
+}
+
+/// Fracture energy of cracks with this normal in a body, J/m².
+fn fracture_energy(problem: &Problem, body: usize, normal: [f64; 3]) -> Option<f64> {
     let body = &problem.bodies[body];
     let elastic = body.material.elastic;
-    match body.damage.as_ref()?.toughness {
-        Toughness::FractureEnergy(energy) => Some(energy),
-        Toughness::FractureToughness(toughness) => Some(CriticalStretch::energy_from_toughness(
-            problem.dimension,
-            elastic,
-            toughness,
-        )),
-        Toughness::CriticalStretch(_) | Toughness::Strength(_) => None,
-    }
+    let damage = body.damage.as_ref()?;
+    let cost = damage.direction.map_or(1.0, |direction| {
+        direction.cost(problem.dimension.count(), normal)
+    });
+    let along =
+        match damage.toughness {
+            Toughness::FractureEnergy(energy) => Some(energy),
+            Toughness::FractureToughness(toughness) => Some(
+                CriticalStretch::energy_from_toughness(problem.dimension, elastic, toughness),
+            ),
+            Toughness::CriticalStretch(_) | Toughness::Strength(_) => None,
+        };
+    along.map(|along| along * cost)
 }
 
 /// The motion of the upper half.

@@ -1,0 +1,196 @@
+//! Toughness that depends on the direction of a crack, for laminates and wood.
+//!
+//! With a unit vector a of the undeformed body and the direction n of a bond, its critical work is
+//!
+//! w_c(n) = w (p + q c^k),
+//!
+//! where w is that of an isotropic body with the fracture energy of cracks along a. If cracks across a take more,
+//! c = (n·a)²; if they take less, c = 1 − (n·a)². A crack with the normal N takes all bonds across it, which is the mean of
+//! w_c(n) over all directions with the weight |n·N|. The means of c^k are products over j = 1 … k:
+//!
+//! | c | N | plane | space |
+//! |---|---|---|---|
+//! | (n·a)² | along a | 2j/(2j + 1) | j/(j + 1) |
+//! | (n·a)² | across a | (2j − 1)/(2j + 1) | (2j − 1)/(2j + 2) |
+//! | 1 − (n·a)² | along a | (2j − 1)/(2j + 1) | j/(j + 1) |
+//! | 1 − (n·a)² | across a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
+//!
+//! p and q follow from both fracture energies, with the smallest k = 1, 2, 4 for which p is at least 0.1. Smaller p are
+//! rejected: bonds in the weak direction would break at small strains, far from any crack. A critical stretch is multiplied
+//! by the root of w_c/w.
+
+use std::f64::consts::PI;
+
+use crate::lanes::{Lanes, Simd};
+use crate::material::Bond;
+
+/// Squarings of c: k is at most 2 to this power. With larger k, too few bonds of usual families take part.
+const MOST_SQUARINGS: u32 = 2;
+
+/// The smallest p.
+const LEAST_BASE: f64 = 0.1;
+
+/// Round-off of p.
+const ROUNDING: f64 = 1e-12;
+
+/// Directions in a quarter of a circle, for sums over all directions.
+const DIRECTIONS: u32 = 256;
+
+/// Factor w_c/w of the critical work by the direction of a bond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToughnessByDirection {
+    /// a.
+    axis: [f64; 3],
+    /// p.
+    base: f64,
+    /// q.
+    share: f64,
+    /// k = 2^squarings.
+    squarings: u32,
+    /// Whether c = (n·a)².
+    is_tough_across: bool,
+}
+
+impl ToughnessByDirection {
+    /// The same toughness in all directions.
+    pub const NONE: Self = Self {
+        axis: [0.0; 3],
+        base: 1.0,
+        share: 0.0,
+        squarings: 0,
+        is_tough_across: true,
+    };
+
+    /// Factor for a unit vector a and the fracture energy of cracks across a divided by that of cracks along a, in 2 or 3
+    /// dimensions; `None` beyond [`Self::limits`].
+    pub fn new(dimension: usize, axis: [f64; 3], ratio: f64) -> Option<Self> {
+        let is_tough_across = ratio >= 1.0;
+        (0..=MOST_SQUARINGS).find_map(|squarings| {
+            let [across, along] = means(dimension, is_tough_across, squarings);
+            let share = (ratio - 1.0) / (across - along);
+            let base = 1.0 - share * along;
+            (base >= LEAST_BASE - ROUNDING).then_some(Self {
+                axis,
+                base,
+                share,
+                squarings,
+                is_tough_across,
+            })
+        })
+    }
+
+    /// The smallest and the largest ratio of both fracture energies for which p is not too small.
+    pub fn limits(dimension: usize) -> [f64; 2] {
+        [false, true].map(|is_tough_across| {
+            let [across, along] = means(dimension, is_tough_across, MOST_SQUARINGS);
+            LEAST_BASE + (1.0 - LEAST_BASE) * across / along
+        })
+    }
+
+    /// w_c/w of eight bonds; the same bits from both ends.
+    #[inline(always)]
+    pub fn factor<S: Simd, const D: usize>(&self, simd: S, bond: &Bond<D>) -> Lanes {
+        let mut along = bond.reference[0] * self.axis[0];
+        for d in 1..D {
+            along = simd.multiply_add(bond.reference[d], Lanes::splat(self.axis[d]), along);
+        }
+        let cosine = along * bond.inverse;
+        let square = cosine * cosine;
+        let mut power = if self.is_tough_across {
+            square
+        } else {
+            (Lanes::splat(1.0) - square).max(Lanes::splat(0.0))
+        };
+        for _ in 0..self.squarings {
+            power = power * power;
+        }
+        power * self.share + Lanes::splat(self.base)
+    }
+
+    /// The fracture energy of cracks across a, divided by that of cracks along a.
+    pub fn ratio(&self, dimension: usize) -> f64 {
+        let [across, _] = means(dimension, self.is_tough_across, self.squarings);
+        self.base + self.share * across
+    }
+
+    /// Fracture energy of cracks with a unit normal, divided by that of cracks along a; a sum over directions.
+    pub fn cost(&self, dimension: usize, normal: [f64; 3]) -> f64 {
+        let quarter = f64::from(DIRECTIONS);
+        let mut sums = [0.0; 2];
+        let mut add = |n: [f64; 3], solid_angle: f64| {
+            let dot = |v: [f64; 3]| (0..3).map(|d| n[d] * v[d]).sum::<f64>();
+            let weight = dot(normal).abs() * solid_angle;
+            let square = dot(self.axis).powi(2);
+            let c = if self.is_tough_across {
+                square
+            } else {
+                1.0 - square
+            };
+            sums[0] += weight * (self.base + self.share * c.powi(1 << self.squarings));
+            sums[1] += weight;
+        };
+        for k in 0..2 * DIRECTIONS {
+            let azimuth = (f64::from(k) + 0.5) * 0.5 * PI / quarter;
+            let in_plane = [libm::cos(azimuth), libm::sin(azimuth)];
+            if dimension == 2 {
+                add([in_plane[0], in_plane[1], 0.0], 1.0);
+                continue;
+            }
+            for j in 0..2 * DIRECTIONS {
+                let height = (f64::from(j) + 0.5) / quarter - 1.0;
+                let radius = (1.0 - height * height).sqrt();
+                add([radius * in_plane[0], radius * in_plane[1], height], 1.0);
+            }
+        }
+        sums[0] / sums[1]
+    }
+}
+
+/// Means of c^k over the bonds across an area whose normal is along a and across it, k = 2^squarings.
+fn means(dimension: usize, is_tough_across: bool, squarings: u32) -> [f64; 2] {
+    let mut means = [1.0; 2];
+    for j in 1..=1_u32 << squarings {
+        let j = f64::from(j);
+        let factors = match (dimension, is_tough_across) {
+            (3, true) => [j / (j + 1.0), (2.0 * j - 1.0) / (2.0 * j + 2.0)],
+            (3, false) => [j / (j + 1.0), (2.0 * j + 1.0) / (2.0 * j + 2.0)],
+            (_, true) => [2.0 * j / (2.0 * j + 1.0), (2.0 * j - 1.0) / (2.0 * j + 1.0)],
+            (_, false) => [(2.0 * j - 1.0) / (2.0 * j + 1.0), 2.0 * j / (2.0 * j + 1.0)],
+        };
+        for (mean, factor) in means.iter_mut().zip(factors) {
+            *mean *= factor;
+        }
+    }
+    means
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_bonds_across_an_area_take_the_energy_of_its_direction() {
+        let axis = [0.6, 0.8, 0.0];
+        let normals_along: &[[f64; 3]] = &[[-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
+        for dimension in [2, 3] {
+            let [least, most] = ToughnessByDirection::limits(dimension);
+            for ratio in [least, 0.5 * (1.0 + least), 1.0, 1.4, 2.4, most] {
+                let toughness = ToughnessByDirection::new(dimension, axis, ratio).unwrap();
+                let across = toughness.cost(dimension, axis);
+                assert!(
+                    (across / ratio - 1.0).abs() < 1e-4,
+                    "{dimension} {ratio}: {across}"
+                );
+                for normal in &normals_along[..dimension - 1] {
+                    let along = toughness.cost(dimension, *normal);
+                    assert!((along - 1.0).abs() < 1e-4, "{dimension} {ratio}: {along}");
+                }
+                assert!(toughness.base > 0.099 && toughness.share >= 0.0);
+                assert!((toughness.ratio(dimension) / ratio - 1.0).abs() < 1e-12);
+            }
+            for beyond in [0.999 * least, 1.001 * most] {
+                assert_eq!(ToughnessByDirection::new(dimension, axis, beyond), None);
+            }
+        }
+    }
+}
