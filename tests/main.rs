@@ -55,6 +55,7 @@ mod physics {
 mod fracture {
     mod adaptive;
     mod crack_paths;
+    mod crack_surfaces;
     mod fracture_energy;
     mod fronts;
     mod scatter;
