@@ -1,5 +1,5 @@
 //! What it costs to part a body at any angle, by law and criterion, as a share of the fracture energy; a table for
-//! `scripts/parting`:
+//! `studies/parting/run.py`:
 //!
 //! ```sh
 //! cargo run --release --example parting

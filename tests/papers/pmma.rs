@@ -1,5 +1,5 @@
 //! The PMMA plate of Willberg, Hesse & Heinecke (2022) on a grid so coarse that it takes a second. The
-//! path needs a finer one: scripts/pmma and docs/src/verification/pmma.md.
+//! path needs a finer one: studies/pmma and docs/src/verification/pmma.md.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};
