@@ -1,5 +1,5 @@
 //! Print the energy per area that separates a body, divided by the fracture energy, for laws, criteria and
-//! angles of opening. `scripts/parting` plots this table:
+//! angles of opening. `studies/parting/run.py` plots this table:
 //!
 //! ```sh
 //! cargo run --release --example parting

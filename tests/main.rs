@@ -56,6 +56,7 @@ mod physics {
 mod fracture {
     mod adaptive;
     mod crack_paths;
+    mod crack_surfaces;
     mod failure_by_stress;
     mod fracture_energy;
     mod fronts;

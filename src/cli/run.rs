@@ -152,6 +152,11 @@ impl Observer for Log {
                 };
                 errln!("warning: {reason}: starting a new result{renamed}");
             }
+            Message::Removed(paths) if self.prints => {
+                let paths = paths.iter().map(|path| path.display().to_string());
+                let paths: Vec<String> = paths.collect();
+                outln!("removed of the earlier run: {}", paths.join(", "));
+            }
             Message::Decided(decisions) if self.prints && self.verbose => {
                 outln!("decided");
                 for (name, value) in decisions {

@@ -296,11 +296,9 @@ fn crack(
     damage_threshold: f64,
 ) -> Result<problem::CrackPath> {
     let key = column_name(scope, "crack", name, table)?;
-    if scope.dimension != 2 {
+    if scope.dimension == 1 {
         let message = format!(
-            "{key}: crack paths are found in 2-D only, this problem is {}-D; use `[history.tip.{name}]` with `from` \
-             and `direction`",
-            scope.dimension
+            "{key}: a bar has no crack path; use `[history.tip.{name}]` with `from` and `direction`"
         );
         return Err(scope.error(table.span(), message));
     }

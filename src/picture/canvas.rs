@@ -79,23 +79,8 @@ impl Image {
     /// Centres on a left or upper edge belong to the polygon, centres on a right or lower edge do not.
     /// Polygons that share an edge therefore share no pixel.
     pub fn fill_polygon(&mut self, corners: &[[f64; 2]], colour: Colour) {
-        let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
-        let first = first_centre(top).max(0);
-        let last = first_centre(bottom).min(i64::from(self.height));
-        for row in first..last {
-            let centre = row as f64 + 0.5;
-            let crossings = corners
-                .iter()
-                .zip(corners.iter().cycle().skip(1))
-                .filter(|(from, to)| (from[1] <= centre) != (to[1] <= centre))
-                .map(|(from, to)| {
-                    from[0] + (centre - from[1]) / (to[1] - from[1]) * (to[0] - from[0])
-                });
-            let (left, right) = extremes(crossings);
-            if left <= right {
-                let columns = [first_centre(left), first_centre(right)];
-                self.fill_rectangle(columns, [row, row + 1], colour);
-            }
+        for (row, columns) in spans(corners, i64::from(self.height)) {
+            self.fill_rectangle(columns, [row, row + 1], colour);
         }
     }
 
@@ -143,7 +128,24 @@ impl Image {
     }
 }
 
-/// Return the first row or column whose pixel centre is not before `edge`.
+/// The rows of a convex polygon in a picture of this height, each with its first column and the one after its last.
+/// Which pixels belong to it is said at [`Image::fill_polygon`].
+pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i64; 2])> + '_ {
+    let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
+    let rows = first_centre(top).max(0)..first_centre(bottom).min(height);
+    rows.filter_map(|row| {
+        let centre = row as f64 + 0.5;
+        let crossings = corners
+            .iter()
+            .zip(corners.iter().cycle().skip(1))
+            .filter(|(from, to)| (from[1] <= centre) != (to[1] <= centre))
+            .map(|(from, to)| from[0] + (centre - from[1]) / (to[1] - from[1]) * (to[0] - from[0]));
+        let (left, right) = extremes(crossings);
+        (left <= right).then(|| (row, [first_centre(left), first_centre(right)]))
+    })
+}
+
+/// The first row or column whose pixel centre is not before `edge`.
 fn first_centre(edge: f64) -> i64 {
     (edge - 0.5).ceil() as i64
 }

@@ -21,13 +21,14 @@ const REACH_INSIDE: f64 = 1.9;
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
 pub fn paint(
     image: &mut Image,
-    marks: &[&Mark],
+    marks: impl Iterator<Item = Mark>,
     depth: impl Fn(&Mark) -> f64,
     colouring: Colouring,
     layout: &Layout,
     projection: Projection,
 ) {
-    if marks.is_empty() {
+    let mut marks = marks.peekable();
+    if marks.peek().is_none() {
         return;
     }
     let ends = [layout.columns, layout.rows];
@@ -37,7 +38,7 @@ pub fn paint(
     for mark in marks {
         pixels.add(&Point {
             centre: layout.pixel(projection.project(mark.position)),
-            depth: depth(mark) * layout.scale,
+            depth: depth(&mark) * layout.scale,
             size: mark.size * layout.scale,
             colour: colouring.of(mark.value),
         });

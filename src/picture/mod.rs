@@ -38,7 +38,7 @@ mod scene;
 
 pub use canvas::Image;
 pub use projection::Bounds;
-pub use scene::{Axis, Scene, View};
+pub use scene::{Axis, Scene, View, is_in_slice};
 
 use axes::{Pen, Ruler};
 use canvas::{Colour, PALE_INK};
@@ -47,12 +47,13 @@ use lettering::{Lettering, Running};
 use points::Colouring;
 use projection::Projection;
 use scale::Scale;
+use scene::Mark;
 
 /// Render a scene.
 pub fn render(scene: &Scene) -> Image {
     let marks = scene.marks();
     let projection = Projection::of(scene);
-    let bounds = scene.bounds.unwrap_or_else(|| Bounds::of(&marks));
+    let bounds = scene.bounds.unwrap_or_else(|| Bounds::of(marks.iter()));
     let width = scene.width.clamp(200, 16_384);
     let layout = Layout::new(width, bounds.projected(projection), projection);
     let colouring = Colouring {
@@ -76,12 +77,14 @@ pub fn render(scene: &Scene) -> Image {
             hidden_edges(&mut pen, &layout, &bounds);
         }
         let are_flat = matches!(projection, Projection::Flat(_));
-        let (scattered, others): (Vec<_>, Vec<_>) =
-            marks.iter().partition(|mark| are_flat && mark.scattered);
-        points::paint(pen.image, &others, colouring, &layout, projection);
+        let [scattered, others] = [true, false].map(|scattered| {
+            let are_cells = move |mark: &Mark| (are_flat && mark.scattered) == scattered;
+            marks.iter().filter(are_cells)
+        });
+        points::paint(pen.image, others, colouring, &layout, projection);
         cells::paint(
             pen.image,
-            &scattered,
+            scattered,
             |mark| scene.depth(mark),
             colouring,
             &layout,

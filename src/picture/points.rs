@@ -1,6 +1,6 @@
 //! Painting the cells of the points.
 
-use super::canvas::{Colour, Image};
+use super::canvas::{Colour, Image, spans};
 use super::colours::{ColourMap, shaded};
 use super::layout::Layout;
 use super::projection::Projection;
@@ -33,7 +33,11 @@ const TOLERANCE: f64 = 0.01;
 /// Height of the strip that represents a bar, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Smallest edge of a cube with distinct faces, pixels.
+/// Edge of the larger cube behind each cube, relative to it. It fills the gaps that the stretch of a drawn deformation
+/// opens between cubes.
+const BACKING: f64 = 1.3;
+
+/// Least edge in pixels of a cube with distinct faces.
 const LEAST_CUBE: f64 = 2.0;
 
 /// Brightness of the top, the left and the right face of a cube.
@@ -42,21 +46,27 @@ const BRIGHTNESS: [f64; 3] = [1.0, 0.86, 0.7];
 /// Paint all points in the given order.
 pub fn paint(
     image: &mut Image,
-    marks: &[&Mark],
+    marks: impl Iterator<Item = Mark> + Clone,
     colouring: Colouring,
     layout: &Layout,
     projection: Projection,
 ) {
     if projection == Projection::Isometric {
+        let mut cubes = Cubes::new(image);
+        // The buffer has four-byte numbers, so depths are relative to the first point.
+        let mut first = None;
         for mark in marks {
+            let [x, y, z] = mark.position;
+            let depth = x - y + z;
+            let depth = layout.scale * (depth - *first.get_or_insert(depth));
             let centre = layout.pixel(projection.project(mark.position));
             let colour = colouring.of(mark.value);
-            paint_cube(image, centre, mark.size * layout.scale, colour);
+            cubes.paint((centre, depth), mark.size * layout.scale, colour);
         }
         return;
     }
     for enlargement in [OVERLAP, TOLERANCE] {
-        for mark in marks {
+        for mark in marks.clone() {
             let [column, row] = layout.pixel(projection.project(mark.position));
             let width = mark.size * layout.scale;
             let height = match projection {
@@ -83,27 +93,89 @@ fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     [first, ((centre + half).round() as i64).max(first + 1)]
 }
 
-/// Paint the three visible faces of a cube in the isometric view.
-fn paint_cube(image: &mut Image, centre: [f64; 2], edge: f64, colour: Colour) {
-    if edge < LEAST_CUBE {
-        let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
-        image.fill_rectangle(columns, rows, colour);
-        return;
+/// Cubes in the isometric view; of each pixel the nearest one is seen.
+struct Cubes<'a> {
+    image: &'a mut Image,
+    /// x − y + z of what each pixel shows, in pixels of a length along an axis.
+    depths: Vec<f32>,
+}
+
+impl<'a> Cubes<'a> {
+    fn new(image: &'a mut Image) -> Self {
+        let pixels = image.width as usize * image.height as usize;
+        Self {
+            image,
+            depths: vec![f32::NEG_INFINITY; pixels],
+        }
     }
-    // Vectors in the picture from the corner nearest to the eye, in the middle of the drawn cube, to the
-    // three neighbouring corners.
-    let enlarged = edge + 2.0 * OVERLAP;
-    let neighbours = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]].map(|direction| {
+
+    /// Paint a pixel, unless it shows something nearer.
+    fn paint_pixel(&mut self, [column, row]: [i64; 2], depth: f64, colour: Colour) {
+        let columns = i64::from(self.image.width);
+        if !(0..columns).contains(&column) || !(0..i64::from(self.image.height)).contains(&row) {
+            return;
+        }
+        let pixel = (row * columns + column) as usize;
+        if depth as f32 > self.depths[pixel] {
+            self.depths[pixel] = depth as f32;
+            self.image
+                .fill_rectangle([column, column + 1], [row, row + 1], colour);
+        }
+    }
+
+    /// Paint the three visible faces of a cube with its centre and the depth of this centre.
+    fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
+        if edge < LEAST_CUBE {
+            let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
+            for row in rows[0]..rows[1] {
+                for column in columns[0]..columns[1] {
+                    self.paint_pixel([column, row], depth, colour);
+                }
+            }
+            return;
+        }
+        let overlap = 2.0 * OVERLAP;
+        self.paint_faces((centre, depth), edge + overlap, colour);
+        // A face that is moved out by a length comes nearer by three lengths, here by 1.5 times the growth. Behind the
+        // own cube, it still hides the sides of other cubes in a gap.
+        let behind = depth - 2.0 * (BACKING - 1.0) * edge;
+        self.paint_faces((centre, behind), BACKING * edge + overlap, colour);
+    }
+
+    fn paint_faces(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
+        let [left, right, down] = neighbours(edge);
+        let nearest = depth + 1.5 * edge;
+        let faces = [(left, right), (left, down), (right, down)];
+        for ((one, other), brightness) in faces.into_iter().zip(BRIGHTNESS) {
+            let corners = [[0.0; 2], one, [one[0] + other[0], one[1] + other[1]], other];
+            let corners = corners.map(|[across, below]| [centre[0] + across, centre[1] + below]);
+            let colour = shaded(colour, brightness);
+            let area = one[0] * other[1] - one[1] * other[0];
+            let [width, height] = [self.image.width, self.image.height].map(i64::from);
+            for (row, [first, last]) in spans(&corners, height) {
+                for column in first.max(0)..last.min(width) {
+                    let offset = [
+                        column as f64 + 0.5 - centre[0],
+                        row as f64 + 0.5 - centre[1],
+                    ];
+                    // Shares of both edges: the depth falls by an edge along each of them.
+                    let along = (offset[0] * other[1] - offset[1] * other[0]) / area;
+                    let beside = (one[0] * offset[1] - one[1] * offset[0]) / area;
+                    let depth = nearest - edge * (along + beside);
+                    self.paint_pixel([column, row], depth, colour);
+                }
+            }
+        }
+    }
+}
+
+/// Vectors on the picture from the corner of a cube that is nearest to the eye, which is seen in the middle of the
+/// cube, to its three neighbours.
+fn neighbours(edge: f64) -> [[f64; 2]; 3] {
+    [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]].map(|direction| {
         let [across, up] = Projection::Isometric.project(direction);
-        [enlarged * across, -enlarged * up]
-    });
-    let [left, right, down] = neighbours;
-    let faces = [(left, right), (left, down), (right, down)];
-    for ((one, other), brightness) in faces.into_iter().zip(BRIGHTNESS) {
-        let corners = [[0.0; 2], one, [one[0] + other[0], one[1] + other[1]], other];
-        let corners = corners.map(|[across, below]| [centre[0] + across, centre[1] + below]);
-        image.fill_polygon(&corners, shaded(colour, brightness));
-    }
+        [edge * across, -edge * up]
+    })
 }
 
 #[cfg(test)]
@@ -134,6 +206,40 @@ mod tests {
         assert_eq!(edges(10.5, 3.0, TOLERANCE), [9, 12]);
     }
 
+    fn paint_cube(image: &mut Image, centre: [f64; 2], edge: f64, colour: Colour) {
+        Cubes::new(image).paint((centre, 0.0), edge, colour);
+    }
+
+    #[test]
+    fn the_nearest_cube_is_seen_in_any_order_and_size() {
+        // A small cube behind the upper face of a large one, whose centre is nearer, and one before it.
+        let place = |[x, y, z]: [f64; 3]| {
+            let [across, up] = Projection::Isometric.project([x, y, z]);
+            ([60.0 + across, 60.0 - up], x - y + z)
+        };
+        let large = (place([0.0; 3]), 40.0, RED);
+        let behind = (place([17.0, -17.0, 10.0]), 4.0, [0, 0, 200]);
+        let before = (place([17.0, -17.0, 25.0]), 4.0, [0, 200, 0]);
+        let mut pictures = Vec::new();
+        for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
+            let mut image = Image::new(120, 120);
+            let mut cubes = Cubes::new(&mut image);
+            for cube in order {
+                let (centre, edge, colour) = [large, behind, before][cube];
+                cubes.paint(centre, edge, colour);
+            }
+            assert!(
+                !image
+                    .rgb
+                    .chunks(3)
+                    .any(|pixel| pixel[2] > 100 && pixel[0] == 0)
+            );
+            assert!(image.rgb.chunks(3).any(|pixel| pixel[1] == 200));
+            pictures.push(image);
+        }
+        assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]));
+    }
+
     #[test]
     fn faces_of_a_cube_are_shaded_from_top_to_right() {
         let mut image = Image::new(60, 60);
@@ -147,12 +253,15 @@ mod tests {
     #[test]
     fn neighbouring_cubes_show_no_hairlines() {
         let mut image = Image::new(200, 200);
-        for index in (0..20).rev() {
-            let [across, up] = Projection::Isometric.project([0.0, 7.3 * f64::from(index), 0.0]);
-            paint_cube(&mut image, [20.0 + across, 120.0 - up], 7.3, RED);
+        let mut cubes = Cubes::new(&mut image);
+        for index in 0..20 {
+            // Stretched by a tenth.
+            let y = 1.1 * 7.3 * f64::from(index);
+            let [across, up] = Projection::Isometric.project([0.0, y, 0.0]);
+            cubes.paint(([20.0 + across, 120.0 - up], -y), 7.3, RED);
         }
         for index in 1..19 {
-            let place = [0.0, 7.3 * (f64::from(index) + 0.5), 0.0];
+            let place = [0.0, 1.1 * 7.3 * (f64::from(index) + 0.5), 0.0];
             let [across, up] = Projection::Isometric.project(place);
             let (column, row) = ((20.0 + across) as u32, (120.0 - up) as u32 - 2);
             assert_eq!(image.pixel(column, row), RED);

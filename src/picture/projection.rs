@@ -54,17 +54,19 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Return the box of all cells with a margin; a box at the origin without cells.
-    pub fn of(marks: &[Mark]) -> Self {
+    /// The box of all cells with a margin; a box at the origin for no cells.
+    pub fn of(marks: impl Iterator<Item = Mark>) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
+        let mut is_empty = true;
         for mark in marks {
+            is_empty = false;
             for axis in 0..3 {
                 low[axis] = low[axis].min(mark.position[axis] - mark.size / 2.0);
                 high[axis] = high[axis].max(mark.position[axis] + mark.size / 2.0);
             }
         }
-        if marks.is_empty() {
+        if is_empty {
             (low, high) = ([0.0; 3], [1.0, 0.4, 0.4]);
         }
         let largest = (0..3)
@@ -164,7 +166,8 @@ mod tests {
 
     #[test]
     fn bounds_hold_all_cells_with_a_margin() {
-        let bounds = Bounds::of(&[mark([0.0, 1.0, 2.0], 2.0), mark([8.0, 1.0, 2.0], 2.0)]);
+        let bounds =
+            Bounds::of([mark([0.0, 1.0, 2.0], 2.0), mark([8.0, 1.0, 2.0], 2.0)].into_iter());
         assert!((bounds.low[0] + 1.25).abs() < 1e-12);
         assert!((bounds.high[0] - 9.25).abs() < 1e-12);
         assert!((bounds.high[2] - 3.25).abs() < 1e-12);
@@ -174,7 +177,7 @@ mod tests {
     fn bounds_are_never_flat() {
         let places = [vec![], vec![mark([0.0; 3], 0.0)], vec![mark([1e9; 3], 0.0)]];
         for marks in places {
-            let bounds = Bounds::of(&marks);
+            let bounds = Bounds::of(marks.into_iter());
             assert!((0..3).all(|axis| bounds.high[axis] > bounds.low[axis]));
         }
     }

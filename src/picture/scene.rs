@@ -117,50 +117,59 @@ impl Scene<'_> {
         }
     }
 
-    /// Return the points to draw, in painting order.
-    pub fn marks(&self) -> Vec<Mark> {
-        let scattered = self.scattered.iter().copied();
-        let mut marks: Vec<Mark> = self
-            .positions
-            .iter()
-            .zip(self.sizes)
-            .zip(self.values)
-            .zip(scattered.chain(std::iter::repeat(false)))
-            .map(|(((position, size), value), scattered)| Mark {
-                scattered,
-                position: self.without_unused(*position),
-                size: if (0.0..LARGEST_COORDINATE).contains(size) {
-                    *size
-                } else {
-                    0.0
-                },
-                value: *value,
-            })
-            .filter(|mark| {
-                let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
-                mark.position.iter().all(usable)
-                    && self.bounds.is_none_or(|bounds| bounds.holds(mark.position))
-            })
-            .collect();
+    /// The points to draw, in the order in which they are painted.
+    pub fn marks(&self) -> Marks<'_> {
+        let points = self.positions.len().min(self.sizes.len());
+        let points = points.min(self.values.len()) as u32;
+        let is_drawn = |point: &u32| {
+            let mark = self.mark(*point);
+            let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
+            mark.position.iter().all(usable)
+                && self.bounds.is_none_or(|bounds| bounds.holds(mark.position))
+                && self.view_holds(&mark)
+        };
+        let mut order: Vec<u32> = (0..points).filter(is_drawn).collect();
+        let mut sort_by_key = |key: &dyn Fn(&Mark) -> f64| {
+            let key = |point: &u32| key(&self.mark(*point));
+            order.sort_by(|one, other| key(one).total_cmp(&key(other)));
+        };
         match self.effective_view() {
-            View::Plane if self.dimension == 3 => sort_by_key(&mut marks, |mark| mark.position[2]),
-            // Paint the largest damage last, because cells can overlap or share a pixel.
+            View::Plane if self.dimension == 3 => sort_by_key(&|mark| mark.position[2]),
+            // Where cells overlap or share a pixel, damage must stay visible.
             View::Plane if self.colours() == ColourMap::Damage => {
-                sort_by_key(&mut marks, |mark| mark.value.max(0.0));
+                sort_by_key(&|mark| mark.value.max(0.0));
             }
             View::Plane => {}
-            View::Slice { axis, position } => {
-                // Deformed layers can have gaps, so the layer includes points farther than half a cell away.
-                // The nearest points are painted last.
-                let distance = |mark: &Mark| (mark.position[axis.index()] - position).abs();
-                marks.retain(|mark| distance(mark) <= 0.75 * mark.size);
-                sort_by_key(&mut marks, |mark| -distance(mark));
-            }
-            View::Orthographic => sort_by_key(&mut marks, |mark| {
-                mark.position[0] - mark.position[1] + mark.position[2]
-            }),
+            // The nearest points are painted last.
+            View::Slice { .. } => sort_by_key(&|mark| -self.depth(mark).abs()),
+            // The picture compares depths.
+            View::Orthographic => {}
         }
-        marks
+        Marks { scene: self, order }
+    }
+
+    /// The point with a number.
+    fn mark(&self, point: u32) -> Mark {
+        let point = point as usize;
+        let size = self.sizes[point];
+        Mark {
+            scattered: self.scattered.get(point).copied().unwrap_or(false),
+            position: self.without_unused(self.positions[point]),
+            size: if (0.0..LARGEST_COORDINATE).contains(&size) {
+                size
+            } else {
+                0.0
+            },
+            value: self.values[point],
+        }
+    }
+
+    /// Whether a point is in the layer of a slice; true in other views.
+    fn view_holds(&self, mark: &Mark) -> bool {
+        match self.effective_view() {
+            View::Slice { axis, position } => is_in_slice(axis, position, mark.position, mark.size),
+            View::Plane | View::Orthographic => true,
+        }
     }
 
     /// Return the distance of a point from the drawn plane, m; 0 without a slice.
@@ -173,12 +182,13 @@ impl Scene<'_> {
 
     /// Return the box of the drawn points, with a margin.
     pub fn extent(&self) -> Bounds {
-        Bounds::of(&self.marks())
+        Bounds::of(self.marks().iter())
     }
 
     /// Return the finite values of the drawn points.
     pub fn drawn_values(&self) -> Vec<f64> {
-        let values = self.marks().into_iter().map(|mark| mark.value);
+        let marks = self.marks();
+        let values = marks.iter().map(|mark| mark.value);
         values.filter(|value| value.is_finite()).collect()
     }
 
@@ -195,8 +205,8 @@ impl Scene<'_> {
         ColourMap::for_field(self.field)
     }
 
-    /// Return the values at the ends of the colour bar; the first is less than the second.
-    pub fn colour_range(&self, marks: &[Mark]) -> (f64, f64) {
+    /// The values at the ends of the colour bar, the first less than the second.
+    pub fn colour_range(&self, marks: &Marks) -> (f64, f64) {
         let given = self
             .range
             .filter(|(low, high)| low.is_finite() && high.is_finite())
@@ -219,9 +229,29 @@ impl Scene<'_> {
     }
 }
 
-/// Sort stably by a number.
-fn sort_by_key(marks: &mut [Mark], key: impl Fn(&Mark) -> f64) {
-    marks.sort_by(|one, other| key(one).total_cmp(&key(other)));
+/// The points of a scene that are drawn, in the order in which they are painted.
+pub struct Marks<'a> {
+    scene: &'a Scene<'a>,
+    /// Numbers of the points. Copies of the points would need ten times the memory.
+    order: Vec<u32>,
+}
+
+impl Marks<'_> {
+    /// Whether no point is drawn.
+    pub fn is_empty(&self) -> bool {
+        self.order.is_empty()
+    }
+
+    /// The points in their order.
+    pub fn iter(&self) -> impl Iterator<Item = Mark> + Clone {
+        self.order.iter().map(|point| self.scene.mark(*point))
+    }
+}
+
+/// Whether a slice shows a point with a position and an edge of its cell (m). Deformed layers can have gaps, so the
+/// reach exceeds half a cell.
+pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> bool {
+    (place[axis.index()] - position).abs() <= 0.75 * edge
 }
 
 /// Return the range, or a wider range if the ends are equal up to round-off.
@@ -271,17 +301,9 @@ mod tests {
             axis: Axis::Z,
             position: 0.0,
         };
-        let marks = scene(&positions, &[1.0, 2.0, 3.0], view).marks();
-        let values: Vec<f64> = marks.iter().map(|mark| mark.value).collect();
+        let scene = scene(&positions, &[1.0, 2.0, 3.0], view);
+        let values: Vec<f64> = scene.marks().iter().map(|mark| mark.value).collect();
         assert_eq!(values, [3.0, 1.0]);
-    }
-
-    #[test]
-    fn isometric_view_paints_from_back_to_front() {
-        let positions = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 1.0]];
-        let marks = scene(&positions, &[1.0, 2.0, 3.0], View::Orthographic).marks();
-        let values: Vec<f64> = marks.iter().map(|mark| mark.value).collect();
-        assert_eq!(values, [2.0, 1.0, 3.0]);
     }
 
     #[test]
@@ -302,9 +324,9 @@ mod tests {
     #[test]
     fn unusable_positions_are_left_out() {
         let positions = [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0; 3]];
-        let marks = scene(&positions, &[1.0, 2.0, 3.0], View::Plane).marks();
-        assert_eq!(marks.len(), 1);
-        assert_eq!(marks[0].value, 3.0);
+        let scene = scene(&positions, &[1.0, 2.0, 3.0], View::Plane);
+        let values: Vec<f64> = scene.marks().iter().map(|mark| mark.value).collect();
+        assert_eq!(values, [3.0]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Crack paths at the latest output as CSV files, one per crack.
+//! Crack paths, and in 3-D crack fronts, at the latest output as CSV files, one per crack.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -6,25 +6,33 @@ use std::path::Path;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
-use crate::solver::observers::Branch;
+use crate::points::distance_squared;
+use crate::solver::observers::{Branch, Surface};
+
+/// First lines of the tables of paths and of fronts.
+const HEADS: [&str; 2] = [
+    "branch,x [m],y [m],length [m]",
+    "x [m],y [m],z [m],distance [m]",
+];
+
+/// Name and table of a crack.
+type Table = (String, String);
 
 /// Write `crack_NAME.csv` for each crack, and replace the file of an earlier output. Collective.
 ///
-/// Each row is a vertex of a branch, with the length of the crack up to it.
-///
 /// # Errors
 /// If the disk is full.
-pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[(&str, Vec<Branch>)]) -> Result<()> {
+pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[Table]) -> Result<()> {
     let write_all = || {
-        for (name, branches) in cracks {
+        for (name, table) in cracks {
             let path = folder.join(format!("crack_{name}.csv"));
             // The file is renamed when complete, so readers never see a partial file.
             let part = folder.join(format!("crack_{name}.csv.part"));
-            let written = fs::write(&part, table(branches)).and_then(|()| fs::rename(&part, &path));
+            let written = fs::write(&part, table).and_then(|()| fs::rename(&part, &path));
             written.map_err(|error| {
                 let path = path.display();
                 Error::run(format!(
-                    "{path}: cannot write the path of the crack: {error}"
+                    "{path}: cannot write the table of the crack: {error}"
                 ))
             })?;
         }
@@ -37,8 +45,36 @@ pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[(&str, Vec<Branch
     agree(comm, written)
 }
 
-fn table(branches: &[Branch]) -> String {
-    let mut text = "branch,x [m],y [m],length [m]\n".to_owned();
+/// Whether a file is such a table.
+pub fn is_table(path: &Path) -> bool {
+    let text = fs::read_to_string(path).unwrap_or_default();
+    text.lines()
+        .next()
+        .is_some_and(|head| HEADS.contains(&head))
+}
+
+/// Tables of paths. Each row is a vertex of a branch, with the length of the crack up to it.
+pub fn of_paths(cracks: Vec<(&str, Vec<Branch>)>) -> Vec<Table> {
+    let table = |(name, branches): (&str, Vec<Branch>)| (name.to_owned(), of_branches(&branches));
+    cracks.into_iter().map(table).collect()
+}
+
+/// Tables of fronts. Each row is a position of the front, with its distance from the start of the crack.
+pub fn of_surfaces(cracks: Vec<(&str, [f64; 3], Surface)>) -> Vec<Table> {
+    let table = |(name, from, surface): (&str, [f64; 3], Surface)| {
+        let mut text = format!("{}\n", HEADS[1]);
+        for place in surface.front {
+            let [x, y, z] = place;
+            let distance = distance_squared(from, place).sqrt();
+            let _ = writeln!(text, "{x:?},{y:?},{z:?},{distance:?}");
+        }
+        (name.to_owned(), text)
+    };
+    cracks.into_iter().map(table).collect()
+}
+
+fn of_branches(branches: &[Branch]) -> String {
+    let mut text = format!("{}\n", HEADS[0]);
     for (number, branch) in branches.iter().enumerate() {
         for vertex in branch {
             let [x, y, _] = vertex.place;

@@ -31,6 +31,7 @@ mod recorder;
 mod restart;
 mod restart_compatibility;
 mod signals;
+mod stale_files;
 mod summary;
 mod warnings;
 mod watch;
@@ -408,6 +409,9 @@ impl<'a> Job<'a> {
         let metadata = self.metadata(simulation);
         let starts = vec![Start::New(creation); self.files.results().count()];
         let mut recorder = Recorder::new(simulation, &self.files, (&starts, 0), &metadata)?;
+        if creation == Creation::Truncate {
+            self.remove_stale_files()?;
+        }
         recorder.record(stepper, self.observer)?;
         Ok((checkpoints, recorder))
     }
@@ -506,19 +510,37 @@ impl<'a> Job<'a> {
                 0 => Files::set_aside(&files, simulation.clock.number()),
                 _ => Ok(Vec::new()),
             };
-            let renamed: Vec<String> = agree(self.comm, renamed)?
-                .iter()
-                .map(|path| path.to_string_lossy().into_owned())
-                .collect();
-            let renamed = self.text_of_rank_0(&renamed.join("\n"));
-            let renamed = renamed.lines().map(PathBuf::from).collect();
+            let renamed = self.paths_of_rank_0(&agree(self.comm, renamed)?);
             self.observer
                 .message(&Message::SetAside { reason, renamed });
         }
         Ok(())
     }
 
-    /// Return the text of rank 0 on all ranks.
+    /// Remove the files of an earlier run that this one does not replace, and report them.
+    fn remove_stale_files(&mut self) -> Result<()> {
+        let removed = match self.comm.rank() {
+            0 => stale_files::remove(self.problem, &self.files.folder),
+            _ => Ok(Vec::new()),
+        };
+        let removed = self.paths_of_rank_0(&agree(self.comm, removed)?);
+        if !removed.is_empty() {
+            self.observer.message(&Message::Removed(removed));
+        }
+        Ok(())
+    }
+
+    /// Broadcast the paths of rank 0.
+    fn paths_of_rank_0(&self, paths: &[PathBuf]) -> Vec<PathBuf> {
+        let paths: Vec<String> = paths
+            .iter()
+            .map(|path| path.to_string_lossy().into_owned())
+            .collect();
+        let text = self.text_of_rank_0(&paths.join("\n"));
+        text.lines().map(PathBuf::from).collect()
+    }
+
+    /// Broadcast the text of rank 0.
     fn text_of_rank_0(&self, text: &str) -> String {
         let mut bytes = text.as_bytes().to_vec();
         self.comm.broadcast(0, &mut bytes);

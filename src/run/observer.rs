@@ -64,6 +64,9 @@ pub enum Message {
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
     },
+    /// A new result replaces an existing one, and files of the earlier run that it does not replace were
+    /// removed.
+    Removed(Vec<PathBuf>),
     /// The grid was refined or coarsened.
     Refined {
         /// Number of the last step before the refinement.

@@ -222,8 +222,11 @@ impl<'a> Recorder<'a> {
             file.write(simulation, &snapshot, &self.order)?;
         }
         if is_main {
-            let cracks = self.observer.crack_paths(simulation, &snapshot);
-            crack_files::write(simulation.comm, &self.folder, &cracks)?;
+            let paths = self.observer.crack_paths(simulation, &snapshot);
+            let mut tables = crack_files::of_paths(paths);
+            let surfaces = self.observer.crack_surfaces(simulation, &snapshot);
+            tables.extend(crack_files::of_surfaces(surfaces));
+            crack_files::write(simulation.comm, &self.folder, &tables)?;
         }
         self.spent += start.elapsed() - row_time;
         Ok(())

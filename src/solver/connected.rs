@@ -8,12 +8,15 @@ impl<const D: usize> Simulation<'_, D> {
     /// Replace each entry of columns over the local points by the minimum over all points that intact bonds
     /// connect to its point. Collective.
     pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
+        let mut pieces = Pieces::new(self.model.volume.len());
+        self.forces.for_each_intact(|i, j| pieces.join(i, j));
+        self.spread_least_over(pieces, columns);
+    }
+
+    /// Set each column over the local points to its minimum over the points of a piece; pieces of different
+    /// ranks are connected if they contain the same point. Collective.
+    pub(super) fn spread_least_over(&mut self, mut pieces: Pieces, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
-        let mut roots: Vec<usize> = (0..local).collect();
-        self.forces.for_each_intact(|i, j| {
-            let (i, j) = (root(&mut roots, i), root(&mut roots, j));
-            roots[i.max(j)] = i.min(j);
-        });
         loop {
             // First find the minimum over connected points on this rank, then include the points of other
             // ranks.
@@ -21,11 +24,11 @@ impl<const D: usize> Simulation<'_, D> {
             let mut changed = 0;
             for column in columns.iter_mut() {
                 for point in 0..local {
-                    let root = root(&mut roots, point);
+                    let root = pieces.root(point);
                     column[root] = column[root].min(column[point]);
                 }
                 for point in 0..local {
-                    let least = column[root(&mut roots, point)];
+                    let least = column[pieces.root(point)];
                     changed += u64::from(column[point] > least);
                     column[point] = least;
                 }
@@ -46,11 +49,28 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Find the root of a point's tree, and shorten the path to the root.
-fn root(parents: &mut [usize], mut point: usize) -> usize {
-    while parents[point] != point {
-        parents[point] = parents[parents[point]];
-        point = parents[point];
+/// Connected local points, as trees.
+pub(super) struct Pieces(Vec<usize>);
+
+impl Pieces {
+    /// Create pieces of one point each.
+    pub fn new(points: usize) -> Self {
+        Self((0..points).collect())
     }
-    point
+
+    /// Connect the pieces of two points.
+    pub fn join(&mut self, i: usize, j: usize) {
+        let (i, j) = (self.root(i), self.root(j));
+        self.0[i.max(j)] = i.min(j);
+    }
+
+    /// Find the root of a point's tree, and shorten the path to it.
+    fn root(&mut self, mut point: usize) -> usize {
+        let Self(parents) = self;
+        while parents[point] != point {
+            parents[point] = parents[parents[point]];
+            point = parents[point];
+        }
+        point
+    }
 }

@@ -106,7 +106,7 @@ fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
 
 #[test]
 fn in_the_tile_a_wave_runs_ahead_of_damage() {
-    // Speeds of long waves of this lattice between free faces, from `long_waves` of scripts/eoi_study.py.
+    // Speeds of long waves of this lattice between free faces, from `long_waves` of studies/eoi/run.py.
     // That function minimises the energy of the tile's layers.
     for (law, long_wave) in [
         ("pmb]", 8925.0),

@@ -249,3 +249,57 @@ fn a_restart_may_change_the_further_results() {
         once_before
     );
 }
+
+#[test]
+fn an_overwritten_run_leaves_no_results_of_outputs_that_the_deck_no_longer_has() {
+    let folder = Folder::new("further-stale");
+    let crack = "history.crack.main = { from = [0, 0.016] }\n";
+    let first = deck(&folder, "deck.toml", &[FURTHER, crack]);
+    let out = folder.join("out");
+    succeed(&mut run(1, &first, &out, &["--set", "end=4e-7"]));
+    // A renamed result and files of the user.
+    let copy = |name: &str| std::fs::copy(out.join("result_once.vtkhdf"), out.join(name)).unwrap();
+    copy("result_once_until_step_20.vtkhdf");
+    folder.write("out/result_mine.vtkhdf", "not a result");
+    folder.write("out/crack_mine.csv", "x,y\n");
+
+    let second = FURTHER.replace("output.once", "output.other");
+    let second = deck(&folder, "second.toml", &[&second]);
+    let refused = finish(&mut run(1, &second, &out, &[]));
+    assert_eq!(refused.status.code(), Some(2), "{}", text(&refused));
+    assert!(out.join("result_once.vtkhdf").exists());
+
+    let printed = printed_by(&mut run(
+        2,
+        &second,
+        &out,
+        &["--set", "end=4e-7", "--overwrite"],
+    ));
+    let line = printed.lines().find(|line| line.starts_with("removed of"));
+    let names = ["crack_main.csv", "result_once.vtkhdf"];
+    let names = names.map(|name| out.join(name).display().to_string());
+    let expected = format!("removed of the earlier run: {}", names.join(", "));
+    assert_eq!(line, Some(&expected[..]), "{printed}");
+    let mut files: Vec<String> = std::fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with("result") || name.starts_with("crack"))
+        .collect();
+    files.sort();
+    assert_eq!(
+        files,
+        [
+            "crack_mine.csv",
+            "result.vtkhdf",
+            "result.xdmf",
+            "result_mine.vtkhdf",
+            "result_often.vtkhdf",
+            "result_often.xdmf",
+            "result_once_until_step_20.vtkhdf",
+            "result_other.vtkhdf",
+            "result_other.xdmf",
+            "result_slow.vtkhdf",
+            "result_slow.xdmf",
+        ]
+    );
+}

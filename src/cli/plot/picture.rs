@@ -1,12 +1,13 @@
 //! Pictures of a field at points.
 
+use std::ops;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use fissure::error::{Error, Result};
 use fissure::message::suggestion;
 use fissure::output::{ResultReader, StoredField};
-use fissure::picture::{Axis, Bounds, Image, Scene, View, render};
+use fissure::picture::{Axis, Bounds, Image, Scene, View, is_in_slice, render};
 
 use super::paths::{self, Line};
 use super::quantity::Quantity;
@@ -288,7 +289,8 @@ pub struct Painter<'a> {
     paths: Vec<Vec<Line>>,
 }
 
-/// Drawn data of the points of an output.
+/// The points of an output as they are drawn.
+#[derive(Default)]
 struct Points {
     positions: Vec<[f64; 3]>,
     sizes: Vec<f64>,
@@ -329,9 +331,8 @@ impl<'a> Painter<'a> {
         if arguments.field.is_none() && field.name == "velocity" {
             // Quasi-static results have a velocity of zero, so draw the displacement instead.
             let displacement = fields.iter().find(|field| field.name == "displacement");
-            let is_zero = |values: Vec<f64>| values.iter().all(|value| *value == 0.0);
             if let Some(displacement) = displacement
-                && is_zero(result.field("velocity", reference)?)
+                && is_zero(result, "velocity", reference)?
             {
                 field = displacement;
             }
@@ -373,28 +374,30 @@ impl<'a> Painter<'a> {
         }
     }
 
-    fn displacements(&self, index: usize) -> Result<Vec<f64>> {
+    fn displacements(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<f64>> {
         if self.has_displacement {
-            self.result.field("displacement", index)
+            self.result.field_of("displacement", index, points)
         } else {
-            Ok(vec![0.0; 3 * self.result.points(index)])
+            Ok(vec![0.0; 3 * points.len()])
         }
     }
 
     /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible.
     fn automatic_factor(&self, index: usize) -> Result<f64> {
-        let positions = self.result.positions(index)?;
-        let values = self.displacements(index)?;
-        let largest = values
-            .iter()
-            .filter(|u| u.is_finite())
-            .fold(0.0_f64, |a, u| a.max(u.abs()));
-        let extent = (0..3)
-            .map(|d| {
-                let along = || positions.iter().map(|position| position[d]);
-                along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
-            })
-            .fold(0.0, f64::max);
+        let mut largest = 0.0_f64;
+        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+        for points in blocks(self.result.points(index)) {
+            let values = self.displacements(index, points.clone())?;
+            let finite = values.iter().filter(|u| u.is_finite());
+            largest = finite.fold(largest, |a, u| a.max(u.abs()));
+            for position in self.result.positions_of(index, points)? {
+                for d in 0..3 {
+                    low[d] = low[d].min(position[d]);
+                    high[d] = high[d].max(position[d]);
+                }
+            }
+        }
+        let extent = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
         let wanted = AUTOMATIC_DISPLACEMENT * extent / largest;
         if !wanted.is_finite() || wanted <= 1.0 {
             return Ok(1.0);
@@ -406,25 +409,54 @@ impl<'a> Painter<'a> {
         Ok(step.unwrap_or(1.0) * power)
     }
 
+    /// Read the points of an output in blocks; of a slice only those that it shows.
     fn points(&self, index: usize) -> Result<Points> {
-        let values = self
-            .quantity
-            .of(self.result.field(&self.quantity.field, index)?);
-        let displacements = self.displacements(index)?;
+        let mut found = Points::default();
+        let count = self.result.points(index);
+        if !matches!(self.view, View::Slice { .. }) {
+            found.positions.reserve_exact(count);
+            found.sizes.reserve_exact(count);
+            found.values.reserve_exact(count);
+        }
+        let mut paths = NearestPoints::new(&self.paths);
         let power = 1.0 / self.dimension as f64;
-        let volumes = self.result.field("volume", index)?;
-        let edge = |volume: &f64| (volume / self.section).powf(power);
-        let places = self.result.positions(index)?;
-        let moved =
-            |(x, u): (&[f64; 3], &[f64])| std::array::from_fn(|d| x[d] + self.factor * u[d]);
+        for points in blocks(count) {
+            let values = self
+                .result
+                .field_of(&self.quantity.field, index, points.clone())?;
+            let values = self.quantity.of(values);
+            let volumes = self.result.field_of("volume", index, points.clone())?;
+            let scattered = self.are_scattered(index, points.clone())?;
+            let places = self.result.positions_of(index, points.clone())?;
+            let displacements = self.displacements(index, points)?;
+            paths.look(&places, &displacements);
+            for (k, position) in self.moved(&places, &displacements).enumerate() {
+                let size = (volumes[k] / self.section).powf(power);
+                if let View::Slice { axis, position: at } = self.view
+                    && !is_in_slice(axis, at, position, size)
+                {
+                    continue;
+                }
+                found.positions.push(position);
+                found.sizes.push(size);
+                found.values.push(values[k]);
+                if let Some(scattered) = scattered.get(k) {
+                    found.scattered.push(*scattered);
+                }
+            }
+        }
+        found.lines = paths.moved(self.factor);
+        Ok(found)
+    }
+
+    /// Positions as they are drawn, m.
+    fn moved<'b>(
+        &'b self,
+        places: &'b [[f64; 3]],
+        displacements: &'b [f64],
+    ) -> impl Iterator<Item = [f64; 3]> + 'b {
         let both = places.iter().zip(displacements.chunks_exact(3));
-        Ok(Points {
-            positions: both.map(moved).collect(),
-            sizes: volumes.iter().map(edge).collect(),
-            scattered: self.are_scattered(index)?,
-            values,
-            lines: self.moved_paths(&places, &displacements),
-        })
+        both.map(|(x, u)| std::array::from_fn(|d| x[d] + self.factor * u[d]))
     }
 
     fn scene<'b>(&'b self, points: &'b Points) -> Scene<'b> {
@@ -446,15 +478,15 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return for each point whether its body has scattered points; empty if no body has.
-    fn are_scattered(&self, index: usize) -> Result<Vec<bool>> {
+    /// For each of some points whether it belongs to a body with scattered points; empty if there is no such body.
+    fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
         if !self.scattered.contains(&true) {
             return Ok(Vec::new());
         }
         if !self.scattered.contains(&false) {
-            return Ok(vec![true; self.result.points(index)]);
+            return Ok(vec![true; points.len()]);
         }
-        let bodies = self.result.field("block", index)?;
+        let bodies = self.result.field_of("block", index, points)?;
         let is_scattered = |body: &f64| self.scattered.get(*body as usize) == Some(&true);
         Ok(bodies.iter().map(is_scattered).collect())
     }
@@ -530,25 +562,26 @@ impl<'a> Painter<'a> {
         let View::Slice { axis, position } = self.view else {
             return Ok(());
         };
-        let points = self.points(index)?;
-        if points.positions.is_empty() || !self.scene(&points).marks().is_empty() {
+        let count = self.result.points(index);
+        if count == 0 || !self.scene(&self.points(index)?).marks().is_empty() {
             return Ok(());
         }
         let name = axis.letter();
-        let along = points
-            .positions
-            .iter()
-            .map(|position| position[axis.index()]);
-        let along: Vec<f64> = along.filter(|coordinate| coordinate.is_finite()).collect();
-        let ends = along
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
-                [low.min(*at), high.max(*at)]
-            });
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut nearest: Option<f64> = None;
         let distance = |at: &f64| (at - position).abs();
-        let nearest = along
-            .iter()
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        for points in blocks(count) {
+            let places = self.result.positions_of(index, points.clone())?;
+            let displacements = self.displacements(index, points)?;
+            let along = self.moved(&places, &displacements);
+            let along = along.map(|place| place[axis.index()]);
+            for at in along.filter(|coordinate| coordinate.is_finite()) {
+                ends = [ends[0].min(at), ends[1].max(at)];
+                if nearest.is_none_or(|nearest| distance(&at) < distance(&nearest)) {
+                    nearest = Some(at);
+                }
+            }
+        }
         let nearest = nearest.map_or(String::new(), |at| {
             format!("; the nearest ones are at --slice {name}={at:.4e}")
         });
@@ -557,29 +590,76 @@ impl<'a> Painter<'a> {
             ends[0], ends[1]
         )))
     }
+}
 
-    /// Return the lines to draw, with the index of the file. Each vertex is displaced with its nearest point.
-    fn moved_paths(
-        &self,
-        positions: &[[f64; 3]],
-        displacements: &[f64],
-    ) -> Vec<(usize, Vec<[f64; 3]>)> {
-        let moved = |place: &[f64; 2]| {
-            let distance = |point: &[f64; 3]| (point[0] - place[0]).hypot(point[1] - place[1]);
-            let points = positions.iter().zip(displacements.chunks_exact(3));
-            let nearest = points.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
-            let [x, y] = nearest.map_or([0.0; 2], |(_, u)| [u[0], u[1]]);
-            [place[0] + self.factor * x, place[1] + self.factor * y, 0.0]
+/// The points that are nearest to the vertices of lines, and their displacements.
+struct NearestPoints<'a> {
+    /// Each line with the number of its file.
+    lines: Vec<(usize, &'a Line)>,
+    /// Distance of the nearest point so far from each vertex of all lines, and its displacement, m.
+    nearest: Vec<(f64, [f64; 2])>,
+}
+
+impl<'a> NearestPoints<'a> {
+    fn new(files: &'a [Vec<Line>]) -> Self {
+        let files = files.iter().enumerate();
+        let lines = files.flat_map(|(number, lines)| lines.iter().map(move |line| (number, line)));
+        let lines: Vec<_> = lines.collect();
+        let vertices = lines.iter().map(|(_, line)| line.len()).sum();
+        Self {
+            lines,
+            nearest: vec![(f64::INFINITY, [0.0; 2]); vertices],
+        }
+    }
+
+    /// Compare with further points.
+    fn look(&mut self, positions: &[[f64; 3]], displacements: &[f64]) {
+        let vertices = self.lines.iter().flat_map(|(_, line)| line.iter());
+        for (place, nearest) in vertices.zip(&mut self.nearest) {
+            for (point, u) in positions.iter().zip(displacements.chunks_exact(3)) {
+                let distance = (point[0] - place[0]).hypot(point[1] - place[1]);
+                if distance < nearest.0 {
+                    *nearest = (distance, [u[0], u[1]]);
+                }
+            }
+        }
+    }
+
+    /// The lines to draw, with the numbers of their files. Each vertex is displaced with its nearest point.
+    fn moved(&self, factor: f64) -> Vec<(usize, Vec<[f64; 3]>)> {
+        let mut nearest = self.nearest.iter();
+        let mut moved = |place: &[f64; 2]| {
+            let (_, [x, y]) = nearest.next().expect("one for each vertex");
+            [place[0] + factor * x, place[1] + factor * y, 0.0]
         };
-        let line = |number: usize, line: &Line| (number, line.iter().map(moved).collect());
-        let files = self.paths.iter().enumerate();
-        files
-            .flat_map(|(number, lines)| lines.iter().map(move |own| line(number, own)))
+        let lines = self.lines.iter();
+        lines
+            .map(|(number, line)| (*number, line.iter().map(&mut moved).collect()))
             .collect()
     }
 }
 
-/// Return for each body whether its points are scattered at an output.
+/// Number of points that are read at once.
+const BLOCK: usize = 1 << 18;
+
+/// The ranges of points that are read at once.
+fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
+    let block = move |first: usize| first..(first + BLOCK).min(points);
+    (0..points).step_by(BLOCK).map(block)
+}
+
+/// Whether all values of a field are 0 at an output.
+fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool> {
+    for points in blocks(result.points(index)) {
+        let values = result.field_of(field, index, points)?;
+        if values.iter().any(|value| *value != 0.0) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Which bodies have scattered points at an output, by number.
 ///
 /// The n points of a lattice share coordinates, with about n combinations of different coordinates. Scattered
 /// points have n² combinations in the plane. Bodies with few points do not count as scattered.
@@ -587,33 +667,42 @@ fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Re
     if dimension < 2 || result.times()?.is_empty() {
         return Ok(Vec::new());
     }
-    let (positions, bodies) = (result.positions(index)?, result.field("block", index)?);
-    let count = bodies
-        .iter()
-        .fold(0.0, |most: f64, body| most.max(body + 1.0)) as usize;
-    let mut of_bodies = vec![Vec::new(); count];
-    for (position, body) in positions.iter().zip(&bodies) {
-        of_bodies[*body as usize].push(*position);
+    // Number of points of each body, and of combinations of their coordinates.
+    let mut points_of: Vec<usize> = Vec::new();
+    for points in blocks(result.points(index)) {
+        for body in result.field_of("block", index, points)? {
+            let body = body as usize;
+            points_of.resize(points_of.len().max(body + 1), 0);
+            points_of[body] += 1;
+        }
     }
-    let is_scattered = |own: Vec<[f64; 3]>| {
-        let mut combinations = 1.0;
-        let mut points = 0;
-        for d in 0..dimension {
-            let mut along: Vec<f64> = own.iter().map(|position| position[d]).collect();
+    let mut combinations = vec![1.0; points_of.len()];
+    for d in 0..dimension {
+        // One direction after the other, for the memory.
+        let of_body = points_of.iter().map(|points| Vec::with_capacity(*points));
+        let mut along: Vec<Vec<f64>> = of_body.collect();
+        for points in blocks(result.points(index)) {
+            let bodies = result.field_of("block", index, points.clone())?;
+            let positions = result.positions_of(index, points)?;
+            for (position, body) in positions.iter().zip(&bodies) {
+                along[*body as usize].push(position[d]);
+            }
+        }
+        for (along, combinations) in along.iter_mut().zip(&mut combinations) {
             along.sort_unstable_by(f64::total_cmp);
-            points = along.len();
-            let (Some(first), Some(last)) = (along.first(), along.last()) else {
-                return false;
-            };
-            let tolerance = SAME_COORDINATE * (last - first);
+            let ends = along.first().zip(along.last());
+            let tolerance = ends.map_or(0.0, |(first, last)| SAME_COORDINATE * (last - first));
             let steps = along
                 .windows(2)
                 .filter(|pair| pair[1] - pair[0] > tolerance);
-            combinations *= 1.0 + steps.count() as f64;
+            *combinations *= 1.0 + steps.count() as f64;
         }
-        combinations > MOST_COMBINATIONS * (points as f64).powf(1.5)
+    }
+    let both = combinations.into_iter().zip(points_of);
+    let is_scattered = |(combinations, points): (f64, usize)| {
+        points > 0 && combinations > MOST_COMBINATIONS * (points as f64).powf(1.5)
     };
-    Ok(of_bodies.into_iter().map(is_scattered).collect())
+    Ok(both.map(is_scattered).collect())
 }
 
 /// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else a field

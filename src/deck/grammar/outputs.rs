@@ -170,7 +170,7 @@ pub struct History {
     /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks whose path and length are computed, by name; plane problems only.
+    /// Cracks whose path and length are computed, by name; in 3-D area and front.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
     /// Crack tips that are tracked, by name.
@@ -226,7 +226,7 @@ pub struct SupportForce {
 }
 
 /// A crack path: the centre lines of the damaged region that is connected to a start position, one line for each
-/// branch.
+/// branch. In 3-D the area and the front of this region.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {

@@ -117,6 +117,16 @@ impl<const D: usize> Forces<D> {
         columns.swap_remove(0)
     }
 
+    /// Moments of the family and of the broken bonds of each owned point: the sums of
+    /// [`measures::BrokenMoments`]. In 3-D only.
+    pub fn broken_moments(&mut self, model: &Model<D>) -> [Vec<f64>; 14] {
+        let columns = self.measure(model.owned(), 14, |interaction, sums, source| {
+            let kernel = &measures::BrokenMoments;
+            sweep_all(&mut interaction.bonds, sums, kernel, source);
+        });
+        columns.try_into().expect("fourteen columns")
+    }
+
     /// Sum D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.
     pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {

@@ -275,6 +275,43 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     }
 }
 
+/// Kernel that sums the moments of the family of a point and of its broken bonds, with ω as in
+/// [`FamilyTensors`]: Σ ω Ṽ (m³), Σ ω ξ Ṽ (m⁴) and Σ ω ξ⊗ξ Ṽ (m⁵: xx, yy, zz, xy, yz, xz) over all bonds, then
+/// Σ ω Ṽ and Σ ω ξ Ṽ over the broken ones.
+#[derive(Clone, Copy)]
+pub struct BrokenMoments;
+
+impl<const D: usize> Kernel<D> for BrokenMoments {
+    type Sums = [Lanes; 14];
+    type Broken = [Lanes; 0];
+    type Point = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
+    type Rotation = [Lanes; 0];
+    const EXISTS: bool = D == 3;
+    const READS_BROKEN: bool = true;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const WANTED: Wanted = wanted(true);
+
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 14]) {
+        let xi = &group.bond.reference;
+        let volume = group.weighted_by_volume(Lanes::splat(1.0));
+        let whole = simd.keep(volume, group.whole);
+        let broken = simd.keep(volume, group.whole & !group.intact);
+        sums[0] += whole;
+        sums[10] += broken;
+        for d in 0..D {
+            sums[1 + d] += whole * xi[d];
+            sums[11 + d] += broken * xi[d];
+        }
+        for (k, (a, b)) in PAIRS.into_iter().enumerate() {
+            if a < D && b < D {
+                sums[4 + k] += whole * xi[a] * xi[b];
+            }
+        }
+    }
+}
+
 /// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of
 /// the whole family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]

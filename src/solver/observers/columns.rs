@@ -52,8 +52,8 @@ pub struct GlobalState {
     pub statistics: Vec<Vec<f64>>,
     /// Position of each front, m.
     pub fronts: Vec<f64>,
-    /// Length (m) and number of branches of each crack.
-    pub cracks: Vec<(f64, usize)>,
+    /// Length (m) and number of branches of each crack; in 3-D area (m²) and reach (m).
+    pub cracks: Vec<[f64; 2]>,
     /// State of each crack tip.
     pub tips: Vec<TipNow>,
     /// Quantities of contact.

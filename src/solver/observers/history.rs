@@ -17,6 +17,7 @@ use crate::solver::contact::contact_now;
 use super::centre_line::{self, Branch};
 use super::columns::{Columns, GlobalState};
 use super::crack_path::CrackPath;
+use super::crack_surface::{CrackSurface, Surface};
 use super::cracked::Cracked;
 use super::fragments::Fragments;
 use super::front::Front;
@@ -46,7 +47,10 @@ pub struct HistoryObserver {
     statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
     fronts: Vec<Front>,
+    /// Cracks in the plane.
     cracks: Vec<CrackPath>,
+    /// Cracks in 3-D.
+    surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     /// Energy (J) in the first row, and number of bonds that were intact before any bond could break.
     start: Option<(f64, u64)>,
@@ -123,9 +127,17 @@ impl HistoryObserver {
         let fronts = history.fronts.iter();
         let fronts = fronts.map(|front| Front::new(simulation, front));
         let fronts = fronts.collect::<Result<_>>()?;
-        let cracks = history.cracks.iter();
+        let (in_plane, in_space) = if D == 3 {
+            (&[][..], &history.cracks[..])
+        } else {
+            (&history.cracks[..], &[][..])
+        };
+        let cracks = in_plane.iter();
         let cracks = cracks.map(|rule| CrackPath::new(simulation, rule));
         let cracks = cracks.collect::<Result<_>>()?;
+        let surfaces = in_space.iter();
+        let surfaces = surfaces.map(|rule| CrackSurface::new(simulation, rule));
+        let surfaces = surfaces.collect::<Result<_>>()?;
         let tips = history.tips.iter();
         let tips = tips.map(|tip| Tip::new(simulation, tip));
         let tips = tips.collect::<Result<_>>()?;
@@ -137,6 +149,7 @@ impl HistoryObserver {
             probes,
             fronts,
             cracks,
+            surfaces,
             tips,
             start: None,
         })
@@ -194,6 +207,21 @@ impl HistoryObserver {
         self.cracks
             .iter()
             .map(|crack| (crack.name(), crack.branches(simulation, damage)))
+            .collect()
+    }
+
+    /// Name, start position (m) and present surface of each tracked crack in 3-D; the same on all ranks.
+    /// Collective.
+    pub fn crack_surfaces<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) -> Vec<(&str, [f64; 3], Surface)> {
+        let now = |crack: &'_ CrackSurface| crack.now(simulation, snapshot);
+        let surfaces: Vec<Surface> = self.surfaces.iter().map(now).collect();
+        let cracks = self.surfaces.iter().zip(surfaces);
+        cracks
+            .map(|(crack, surface)| (crack.name(), crack.from(), surface))
             .collect()
     }
 
@@ -284,12 +312,17 @@ impl HistoryObserver {
         let fronts = fronts
             .map(|front| front.position(simulation, &mut fields))
             .collect();
+        let surfaces = self.surfaces.iter().map(|crack| {
+            let surface = crack.now(simulation, snapshot);
+            [surface.area, surface.reach]
+        });
+        let surfaces: Vec<[f64; 2]> = surfaces.collect();
         let damage = |point| snapshot.damage(&simulation.family_volume, point);
         let cracks = self.cracks.iter().map(|crack| {
             let branches = crack.branches(simulation, damage);
-            (centre_line::length(&branches), branches.len())
+            [centre_line::length(&branches), branches.len() as f64]
         });
-        let cracks = cracks.collect();
+        let cracks = cracks.chain(surfaces).collect();
         let tips = self.tips.iter_mut();
         let tips = tips.map(|tip| tip.row(simulation, damage)).collect();
         let values = self.columns.row(&GlobalState {
@@ -508,8 +541,13 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
     }
     for (k, rule) in problem.history.cracks.iter().enumerate() {
         let of = |quantity: &str| format!("crack_{}_{quantity}", rule.name);
-        columns.add(of("length"), "m", move |now| now.cracks[k].0);
-        columns.add(of("branches"), "1", move |now| now.cracks[k].1 as f64);
+        let names = match D {
+            3 => [("area", "m^2"), ("reach", "m")],
+            _ => [("length", "m"), ("branches", "1")],
+        };
+        for (column, (quantity, unit)) in names.into_iter().enumerate() {
+            columns.add(of(quantity), unit, move |now| now.cracks[k][column]);
+        }
     }
     for (k, tip) in problem.history.tips.iter().enumerate() {
         let name = format!("tip_{}", tip.name);

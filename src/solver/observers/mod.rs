@@ -5,6 +5,7 @@ mod centre_line;
 mod columns;
 mod contact;
 mod crack_path;
+mod crack_surface;
 mod cracked;
 mod fragments;
 mod front;
@@ -19,6 +20,7 @@ mod tip;
 
 pub use centre_line::{Branch, Vertex};
 pub use contact::{Contact, ContactWatch};
+pub use crack_surface::Surface;
 pub use history::{Energies, HistoryObserver, HistoryRow, column_names, state_energies};
 pub use nearest::{Nearest, nearest};
 pub use schedule::Schedule;

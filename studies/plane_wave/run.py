@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """The effect of a refined patch on a plane wave, beside table 3 of Dipasquale et al. (2014).
 
 Runs inputs/plane_wave_refined.toml without refinement and with levels 1 to 3 for both rules of convergence. Compares
@@ -11,14 +12,15 @@ Four interpretations of the paper are run:
 - the second one without the enlarged horizon at interfaces (figure 5b).
 """
 
-import argparse
 import pathlib
 import re
+import sys
 
-import fissure
-import numpy as np
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import common  # noqa: E402  (the folder above has it)
+from common import ROOT, fissure  # noqa: E402
+from common import numpy as np  # noqa: E402
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 DECK = ROOT / "inputs" / "plane_wave_refined.toml"
 
 # Table 3: largest loss and gain of energy density and reflected displacement, in percent.
@@ -34,7 +36,7 @@ PAPER = {
 PAPER_UNCORRECTED = 37.4
 
 AMPLITUDE = 0.1  # of each half of the wave, m
-CENTRE = np.array([0.2005, 0.0405])
+CENTRE = (0.2005, 0.0405)
 DX = 1e-3
 SPEED = 1.125**0.5  # with blocked transverse motion, m/s
 
@@ -74,12 +76,12 @@ def deck(rule, levels, margin, factor, bonds, seen, end):
 
 
 def run(arguments, name, text):
-    """Run a deck and return its result."""
-    folder = arguments.folder / name
+    """The result of a deck."""
+    folder = arguments.output / name
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "deck.toml"
     path.write_text(text)
-    return fissure.run(path, output=folder / "out", overwrite=True, binary=arguments.fissure)
+    return fissure.run(path, output=folder / "out", overwrite=True, binary=arguments.binary)
 
 
 class Energy:
@@ -107,10 +109,7 @@ def columns(result, *names):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
-    parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/plane_wave")
-    arguments = parser.parse_args()
+    arguments = common.start(common.parser(__file__, __doc__))
 
     # The energy is largest at the largest velocity, beside the centre of the displacement pulse.
     crest = CENTRE[0] - 0.03 / 2**0.5
@@ -133,7 +132,7 @@ def main():
         # The output times of the two runs differ slightly, because their time steps differ.
         shift = SPEED * (energy.time - uniform.time)
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
-        near = np.abs(energy.places - CENTRE).max(axis=1) < 5 * DX
+        near = np.abs(energy.places - np.array(CENTRE)).max(axis=1) < 5 * DX
         counted = energy.is_refined if nodes == "refined" else near
         change = 100 * (energy.density[counted] / wanted[counted] - 1)
         found = np.interp(times, *columns(result, "time", "probe_reflected_displacement_x"))

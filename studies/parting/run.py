@@ -1,19 +1,18 @@
+#!/usr/bin/env python3
 """Draws the separation energy of a body by angle, from opening to sliding, for each law and criterion.
 
 Runs examples/parting.rs, which separates the halves of a small block, and draws its table.
 """
 
-import argparse
 import csv
 import pathlib
 import subprocess
+import sys
 
-import matplotlib
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import common  # noqa: E402  (the folder above has it)
+from common import ROOT, pyplot  # noqa: E402
 
-matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
-
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 PANELS = [("ordinary", "0.1"), ("ordinary", "0.4"), ("correspondence", "0.3"), ("bond_associated_correspondence", "0.3")]
 STYLES = {"stretch": "C0o--", "work of pulled bonds": "C1s:", "work": "C2D-"}
 LABELS = {
@@ -33,13 +32,11 @@ def table(program):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--picture", type=pathlib.Path, default=ROOT / "docs/src/theory/parting.png")
-    parser.add_argument("--program", type=pathlib.Path, default=ROOT / "target/release/examples/parting")
-    arguments = parser.parse_args()
+    arguments = common.start(common.parser(__file__, __doc__), "--example parting")
+    arguments.output.mkdir(parents=True, exist_ok=True)
     figure, axes = pyplot.subplots(2, 2, figsize=(9, 6.5), sharex=True, sharey=True, constrained_layout=True)
     panels = dict(zip(PANELS, axes.flat))
-    for law, ratio, criterion, costs in table(arguments.program):
+    for law, ratio, criterion, costs in table(ROOT / "target/release/examples/parting"):
         shown = ", ".join(f"{cost:.3f}" for _, cost in costs)
         print(f"{law}, ν = {ratio}, {LABELS[criterion]}: {shown}")
         panels[law, ratio].plot(*zip(*costs), STYLES[criterion], label=LABELS[criterion])
@@ -53,7 +50,9 @@ def main():
     for panel in axes[:, 0]:
         panel.set_ylabel("cost / fracture energy")
     axes[0, 0].legend(fontsize=8, loc="lower left")
-    figure.savefig(arguments.picture, dpi=110)
+    picture = arguments.output / "parting.png"
+    figure.savefig(picture, dpi=110)
+    print(picture)
 
 
 if __name__ == "__main__":

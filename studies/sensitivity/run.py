@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Runs a deck for many values of its parameters: a table, or a Morris design.
 
 Each row of the design is a separate run; the runs are executed in parallel on this machine or as a Slurm
@@ -22,20 +23,17 @@ import threading
 import time
 import tomllib
 
-import fissure
-import matplotlib
-import numpy
-
-matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import common  # noqa: E402  (the folder above has it)
+from common import ROOT, branches, numpy, pyplot  # noqa: E402
 
 EXAMPLES = """\
 examples:
-  scripts/study inputs/studies/pmma_morris.toml              here, a run a core
-  scripts/study study.toml --jobs 2 --threads 4              two runs at a time, four threads each
-  scripts/study study.toml --rows 1-10,13                    some rows only
-  scripts/study study.toml --slurm --time=02:00:00           as a job array; options after it are sbatch's
-  scripts/study study.toml --collect                         table and pictures of what is there
+  studies/sensitivity/run.py studies/pmma/morris.toml             here, a run a core
+  studies/sensitivity/run.py study.toml --jobs 2 --threads 4      two runs at a time, four threads each
+  studies/sensitivity/run.py study.toml --rows 1-10,13            some rows only
+  studies/sensitivity/run.py study.toml --slurm --time=02:00:00   as a job array; options after it are sbatch's
+  studies/sensitivity/run.py study.toml --collect                 table and pictures of what is there
 
 A study is a TOML file:
 
@@ -70,7 +68,6 @@ output folder. Exit codes: 0 done, 1 runs failed, 2 the study or the arguments a
 signal; the same command continues.
 """
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 STOPPED = 75
 
 KEYS = {
@@ -290,36 +287,33 @@ class Study:
 PICKS = {
     "last": lambda values: values[-1],
     "first": lambda values: values[0],
-    "max": numpy.nanmax,
-    "min": numpy.nanmin,
+    "max": lambda values: numpy.nanmax(values),
+    "min": lambda values: numpy.nanmin(values),
 }
 
 
 def arguments():
-    parser = argparse.ArgumentParser(
-        prog="scripts/study",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = common.parser(__file__, __doc__, EXAMPLES, output="out/ and the study's name")
     cores = len(os.sched_getaffinity(0))
-    binary = os.environ.get("FISSURE", ROOT / "target/release/fissure")
     add = parser.add_argument
     add("study", type=pathlib.Path, help="the study file")
-    add("--output", type=pathlib.Path, metavar="DIR", help="[out/ and the study's name]")
     add("--jobs", type=int, metavar="N", help="runs at a time [cores / threads]")
     add("--threads", type=int, default=1, metavar="N", help="threads of each run [1]")
     add("--rows", metavar="LIST", help="only these rows, such as 1-10,13")
     add("--overwrite", action="store_true", help="replace another study in the output folder")
     add("--collect", action="store_true", help="run nothing; make table and pictures of existing results")
-    add("--binary", type=pathlib.Path, default=binary, metavar="PATH", help=argparse.SUPPRESS)
     add("--slurm", nargs=argparse.REMAINDER, metavar="OPTION", help="submit an array; further options are sbatch's")
-    options = parser.parse_args()
-    options.jobs = options.jobs or max(1, cores // max(1, options.threads))
-    if options.threads < 1 or options.jobs < 1:
-        parser.error("--jobs and --threads must be at least 1")
+    options = common.start(parser, check=are_positive)
+    options.jobs = options.jobs or max(1, cores // options.threads)
     options.output = (options.output or ROOT / "out" / options.study.stem).resolve()
     return options
+
+
+def are_positive(options):
+    """What is wrong with the numbers of the arguments, if anything."""
+    if options.threads < 1 or (options.jobs is not None and options.jobs < 1):
+        return "--jobs and --threads must be at least 1"
+    return None
 
 
 def chosen_rows(text, count):
@@ -440,10 +434,9 @@ def submit(study, options, rows):
 def history(folder):
     """Return the columns of a run's history by name; None without a history."""
     try:
-        table = fissure.read_history(folder)
+        columns = common.history(folder)
     except (OSError, ValueError):
         return None
-    columns = {name: numpy.array(table[name]) for name in table}
     return columns if len(next(iter(columns.values()))) else None
 
 
@@ -547,14 +540,6 @@ def write_sensitivities(study, options, found):
     figure.savefig(options.output / "morris.png", dpi=110)
     pyplot.close(figure)
     print(options.output / "morris.png")
-
-
-def branches(path):
-    """Read the branches of a table of crack paths as arrays of positions (m)."""
-    with open(path) as file:
-        rows = list(csv.reader(file))[1:]
-    numbers = sorted({int(row[0]) for row in rows})
-    return [numpy.array([[float(row[1]), float(row[2])] for row in rows if int(row[0]) == k]) for k in numbers]
 
 
 def covered(lines, centres, reach):

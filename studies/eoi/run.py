@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Edge-on impact on ALON in the three limits of Diehl & Schweitzer (2016), figures 8 to 10.
 
 Runs `inputs/eoi_alon.toml` with several laws, prints a table of the speeds of the wave front and of the damage
@@ -5,24 +6,19 @@ front, and draws them beside the measured ones. The table also has the speeds of
 in the bulk and in a tile of this thickness with free faces.
 """
 
-import argparse
 import json
 import pathlib
-import subprocess
 import sys
 
-import fissure
-import matplotlib
-import numpy
-
-matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import common  # noqa: E402  (the folder above has it)
+from common import ROOT, numpy, pyplot, replace_once  # noqa: E402
 
 EXAMPLES = """\
 examples:
-  scripts/eoi_study --small              spacings down to 1.25 mm; some minutes on 2 cores
-  scripts/eoi_study                      down to 0.5 mm, the paper's finest; half an hour on 2 cores
-  scripts/eoi_study --limits local --laws pmb,energy
+  studies/eoi/run.py --small             spacings down to 1.25 mm; some minutes on 2 cores
+  studies/eoi/run.py                     down to 0.5 mm, the paper's finest; half an hour on 2 cores
+  studies/eoi/run.py --limits local --laws pmb,energy
 
 limits: `local`, horizon of three spacings, both to 0; `continuum`, horizon of 7.5 mm, spacing to 0;
 `discrete`, the spacing fixed, the horizon to two spacings.
@@ -38,7 +34,6 @@ The speed of a front is the slope of its position over time, by least squares, w
 Writes eoi_alon.md (the table), eoi_alon.png and eoi_alon.json into the output folder.
 """
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 DECK = ROOT / "inputs/eoi_alon.toml"
 
 BULK_MODULUS = 210e9  # Pa
@@ -62,31 +57,14 @@ FIXED_HORIZON = 7.5e-3  # m
 
 
 def arguments():
-    parser = argparse.ArgumentParser(
-        prog="scripts/eoi_study",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-
-    def several_of(known):
-        def parse(text):
-            names = text.split(",")
-            if wrong := [name for name in names if name not in known]:
-                raise argparse.ArgumentTypeError(f"`{wrong[0]}` is none of {', '.join(known)}")
-            return names
-
-        return parse
-
+    parser = common.parser(__file__, __doc__, EXAMPLES)
     add = parser.add_argument
     add("--small", action="store_true", help="coarse lattices only")
-    add("--laws", type=several_of(LAWS), default=LAWS, metavar="LIST", help="[all]")
-    add("--limits", type=several_of(LIMITS), default=list(LIMITS), metavar="LIST", help="[all]")
+    add("--laws", type=common.several_of(LAWS), default=LAWS, metavar="LIST", help="[all]")
+    add("--limits", type=common.several_of(LIMITS), default=list(LIMITS), metavar="LIST", help="[all]")
     add("--reuse", action="store_true", help="reuse the histories of earlier runs")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
-    add("--binary", type=pathlib.Path, default=ROOT / "target/release/fissure", metavar="PATH")
-    add("--output", type=pathlib.Path, default=ROOT / "out/eoi_study", metavar="DIR")
-    return parser.parse_args()
+    return common.start(parser)
 
 
 def grids(limit, small):
@@ -104,9 +82,7 @@ def deck(law, dx):
 
     def replace(old, new):
         nonlocal text
-        if text.count(old) != 1:
-            sys.exit(f"error: {DECK} has no single line `{old}`")
-        text = text.replace(old, new)
+        text = replace_once(text, old, new, DECK)
 
     table = "[material.alon.pmb]"
     if law in ("energy", "diehl2016"):
@@ -227,32 +203,15 @@ def slope(times, places, start, end):
 def run(options, limit, law, dx, ratio):
     """Run the deck; return the columns of its history."""
     folder = options.output / f"{limit}-{law}-{dx * 1e3:g}-{ratio:.3g}"
-    folder.mkdir(parents=True, exist_ok=True)
-    history = folder / "history.csv"
-    if options.reuse and history.exists():
-        earlier = columns(history)
+    if options.reuse and (folder / "history.csv").exists():
+        earlier = common.history(folder)
         if len(earlier["time"]) and earlier["time"][-1] > 0.999 * DURATION:
             return earlier
-    written = folder / "deck.toml"
-    written.write_text(deck(law, dx))
-    values = {"dx": dx, "m": ratio, "outputs": 1}
-    command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
-    for name, value in values.items():
-        command += ["--set", f"{name}={value!r}"]
-    if options.threads:
-        command += ["--threads", str(options.threads)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
-    # Only the history is needed.
+    common.run(options, folder, deck(law, dx), [f"dx={dx!r}", f"m={ratio!r}", "outputs=1"])
+    # Fields are not needed.
     for name in ("result.vtkhdf", "result.xdmf", "checkpoint_0.h5", "checkpoint_1.h5"):
         (folder / name).unlink(missing_ok=True)
-    return columns(history)
-
-
-def columns(history):
-    table = fissure.read_history(history)
-    return {name: numpy.array(table[name]) for name in table}
+    return common.history(folder)
 
 
 def evaluate(history, limit, law, dx, ratio):

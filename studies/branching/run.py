@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Crack branching on adaptively refined and on uniform grids (Dipasquale et al. 2014, §4).
 
 Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 finer spacings (with --twice, also with two levels).
@@ -13,17 +14,16 @@ deviation of the branching point and of the heights of the outermost branches at
 for the difference of the means; an absolute value above 2.1 is significant at 5 % for 12 shifts.
 """
 
-import argparse
-import csv
 import pathlib
 import re
 import subprocess
+import sys
 import time
 
-import fissure
-import numpy
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import common  # noqa: E402  (the folder above has it)
+from common import ROOT, fissure, numpy, replace_once  # noqa: E402
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 DECK = ROOT / "inputs" / "crack_branching_adaptive.toml"
 BEYOND_THE_NOTCH = 0.055  # m
 NEAR_THE_SIDE = 0.095  # m
@@ -67,9 +67,7 @@ def same_places(coarse, ratio):
         'where = "y < -height/2 + dx"': 'where = "y < -height/2 + 1.5*dx"',
     }
     for old, new in changes.items():
-        if text.count(old) != 1:
-            raise SystemExit(f"error: {DECK} should have `{old.strip()}` once")
-        text = text.replace(old, new)
+        text = replace_once(text, old, new, DECK)
     return text
 
 
@@ -106,12 +104,12 @@ def cases(arguments):
 
 
 def run(arguments, name, text):
-    """Run a deck; return the folder of the result and the run time, s."""
-    folder = arguments.folder / re.sub(r"\W+", "_", name)
+    """The folder of the result, and the run time, s."""
+    folder = arguments.output / re.sub(r"\W+", "_", name)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.toml").write_text(text)
     out = folder / "out"
-    command = [arguments.fissure, "run", folder / "deck.toml", "--output", out, "--overwrite", "--quiet"]
+    command = [arguments.binary, "run", folder / "deck.toml", "--output", out, "--overwrite", "--quiet"]
     seconds = []
     for _ in range(arguments.repeat):
         begin = time.monotonic()
@@ -121,12 +119,8 @@ def run(arguments, name, text):
 
 
 def lines(out):
-    """Read the branches of the final crack, each an array of positions, m."""
-    branches = {}
-    with open(out / "crack_notch.csv", newline="") as file:
-        for row in csv.DictReader(file):
-            branches.setdefault(row["branch"], []).append([float(row["x [m]"]), float(row["y [m]"])])
-    return [numpy.array(branch) for branch in branches.values()]
+    """The branches of the final crack, each an array of positions, m."""
+    return common.branches(out / "crack_notch.csv")
 
 
 def distance(places, branches):
@@ -164,9 +158,7 @@ def shifted(text, coarse, number):
     The shifts are a low-discrepancy sequence (Roberts 2018) in the unit square.
     """
     shift = [coarse * ((0.5 + number * step) % 1) for step in (0.7548776662, 0.5698402910)]
-    if text.count("[grid]\n") != 1:
-        raise SystemExit(f"error: {DECK} should have `[grid]` once")
-    return text.replace("[grid]\n", f"[grid]\norigin = {shift}\n")
+    return replace_once(text, "[grid]\n", f"[grid]\norigin = {shift}\n", DECK)
 
 
 def figures(branches):
@@ -210,9 +202,7 @@ def statistics(arguments):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
-    parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/branching")
+    parser = common.parser(__file__, __doc__)
     parser.add_argument("--dx", type=float, default=value(DECK.read_text(), "dx"), help="spacing of the coarse grid, m [the deck's]")
     parser.add_argument("--m", type=int, nargs="+", default=[3, 4, 5, 6], help="finer spacings in a horizon [3 4 5 6]")
     parser.add_argument("--energy", type=float, help="share of the largest energy density that is refined [the deck's]")
@@ -220,7 +210,7 @@ def main():
     parser.add_argument("--twice", action="store_true", help="also a grid that is refined twice, beside a uniform one")
     parser.add_argument("--repeat", type=int, default=1, help="runs of each case, of which the fastest counts [1]")
     parser.add_argument("--shifts", type=int, help="number of shifted lattices of the refined and of the fine grid")
-    arguments = parser.parse_args()
+    arguments = common.start(parser)
     if arguments.shifts:
         statistics(arguments)
         return
@@ -247,8 +237,8 @@ def main():
         if references and "refined" in name:
             points, time_of_fine = taken[references[0]]
             print(f"    {100 * counts[-1] / points:.0f} % of the points of `{references[0]}`, {100 * seconds / time_of_fine:.0f} % of its time")
-        picture = arguments.folder / f"{re.sub(r'[^0-9a-z]+', '_', name)}.png"
-        plot = [arguments.fissure, "plot", out / "result.vtkhdf", "--field", "damage", "--output", picture]
+        picture = arguments.output / f"{re.sub(r'[^0-9a-z]+', '_', name)}.png"
+        plot = [arguments.binary, "plot", out / "result.vtkhdf", "--field", "damage", "--output", picture]
         subprocess.run([str(part) for part in [*plot, "--path", out / "crack_notch.csv"]], check=True)
 
 

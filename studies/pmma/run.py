@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Mixed-mode fracture of a PMMA plate: the experiment of Réthoré (2018) and the computation of Willberg,
 Hesse & Heinecke (2022).
 
@@ -6,33 +7,27 @@ measured path, and force and crack length over the displacement of the plate's r
 """
 
 import argparse
-import csv
 import json
 import math
-import os
 import pathlib
 import re
-import subprocess
 import sys
 
-import fissure
-import matplotlib
-import numpy
-
-matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (the backend must be set before this import)
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import common  # noqa: E402  (the folder above has it)
+from common import ROOT, fissure, history, numpy, pyplot  # noqa: E402
 
 EXAMPLES = """\
 examples:
-  scripts/pmma --small                       2 mm, to see that it runs; seconds
-  scripts/pmma --dx 1e-3                     a coarse grid
-  scripts/pmma --laws correspondence --dx 0.31e-3
+  studies/pmma/run.py --small                       2 mm, to see that it runs; seconds
+  studies/pmma/run.py --dx 1e-3                     a coarse grid
+  studies/pmma/run.py --laws correspondence --dx 0.31e-3
                                              the paper's grid; eight minutes of two cores
-  scripts/pmma --set fracture_energy=100 --set family_correction=0 --set damage.brittle.energy.calibration=energy
+  studies/pmma/run.py --set fracture_energy=100 --set family_correction=0 --set damage.brittle.energy.calibration=energy
                                              as in the paper, see docs/src/verification/pmma.md
-  scripts/pmma --relaxation 60               from equilibrium to equilibrium, in 60 load steps
-  scripts/pmma --set speed=0.01              another parameter of the deck; may be repeated
-  scripts/pmma --reuse                       tables and pictures of runs that are there
+  studies/pmma/run.py --relaxation 60               from equilibrium to equilibrium, in 60 load steps
+  studies/pmma/run.py --set speed=0.01              another parameter of the deck; may be repeated
+  studies/pmma/run.py --reuse                       tables and pictures of runs that are there
 
 Initiation is the displacement at which the crack has become one horizon long. The deviation of a path is
 the largest distance, up or down, of its main branch from the measured path, between the first measured
@@ -42,32 +37,29 @@ of the hole's centre.
 Writes pmma.md (the table), pmma.json, pmma_path.png and pmma_curves.png into the output folder.
 """
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 DECK = ROOT / "inputs/pmma_mixed_mode.toml"
 
-# Willberg et al. (2022), table 1, m.
-NOTCH = 1e-3 * numpy.array([[92.5, 35.0], [71.7, 21.0], [65.1, 18.0]])
-MEASURED = 1e-3 * numpy.array(
-    [
-        [65.1, 18.0],
-        [63.1, 20.0],
-        [61.1, 21.9],
-        [59.1, 23.3],
-        [57.1, 24.7],
-        [55.1, 25.8],
-        [53.1, 26.9],
-        [51.1, 27.7],
-        [49.1, 28.5],
-        [47.1, 29.1],
-        [45.1, 29.4],
-        [43.1, 29.7],
-        [41.1, 30.0],
-        [39.1, 30.3],
-        [37.1, 30.6],
-        [35.1, 31.0],
-        [15.0, 31.0],
-    ]
-)
+# Willberg et al. (2022), table 1, mm.
+NOTCH = [[92.5, 35.0], [71.7, 21.0], [65.1, 18.0]]
+MEASURED = [
+    [65.1, 18.0],
+    [63.1, 20.0],
+    [61.1, 21.9],
+    [59.1, 23.3],
+    [57.1, 24.7],
+    [55.1, 25.8],
+    [53.1, 26.9],
+    [51.1, 27.7],
+    [49.1, 28.5],
+    [47.1, 29.1],
+    [45.1, 29.4],
+    [43.1, 29.7],
+    [41.1, 30.0],
+    [39.1, 30.3],
+    [37.1, 30.6],
+    [35.1, 31.0],
+    [15.0, 31.0],
+]
 INITIATION = 0.43e-3  # m, the paper's section 6.3
 HOLE = (0.095, 0.035, 0.015)  # centre and radius, m
 CRACKED = 0.35  # the deck's damage_threshold
@@ -110,18 +102,7 @@ MEASURED_LENGTHS = (8.9e-3, 13.6e-3, 17.2e-3, 23.6e-3)
 
 
 def arguments():
-    parser = argparse.ArgumentParser(
-        prog="scripts/pmma",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-
-    def several_laws(text):
-        names = text.split(",")
-        if wrong := [name for name in names if name not in LAWS]:
-            raise argparse.ArgumentTypeError(f"`{wrong[0]}` is none of {', '.join(LAWS)}")
-        return names
+    parser = common.parser(__file__, __doc__, EXAMPLES)
 
     def spacing(text):
         try:
@@ -137,18 +118,15 @@ def arguments():
             raise argparse.ArgumentTypeError(f"must be a number of load steps, 1 or more, is `{text}`")
         return int(text)
 
-    binary = os.environ.get("FISSURE", ROOT / "target/release/fissure")
     add = parser.add_argument
-    add("--laws", type=several_laws, default=list(LAWS), metavar="LIST", help="[all]")
+    add("--laws", type=common.several_of(LAWS), default=list(LAWS), metavar="LIST", help="[all]")
     add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
     add("--small", action="store_true", help="2 mm and a fast press")
     add("--relaxation", type=load_steps, metavar="STEPS", help="relaxation with this number of load steps [explicit]")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
     add("--reuse", action="store_true", help="reuse existing runs")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
-    add("--binary", type=pathlib.Path, default=binary, metavar="PATH", help=argparse.SUPPRESS)
-    add("--output", type=pathlib.Path, default=ROOT / "out/pmma", metavar="DIR")
-    options = parser.parse_args()
+    options = common.start(parser)
     if options.small:
         options.dx = 2e-3
         options.set = ["speed=0.2", *options.set]
@@ -178,45 +156,34 @@ def run(options, law):
     """Run the deck with a law; return its folder."""
     way = "-relaxed" if options.relaxation else ""
     folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
-    folder.mkdir(parents=True, exist_ok=True)
     if options.reuse and (folder / "crack_main.csv").exists():
         return folder
-    written = folder / "deck.toml"
-    written.write_text(deck(law, options.relaxation))
-    command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
-    for assignment in [f"dx={options.dx!r}", *options.set]:
-        if LAWS[law] is None or not assignment.startswith(f"{OF_WORK}="):
-            command += ["--set", assignment]
-    if options.threads:
-        command += ["--threads", str(options.threads)]
-    done = subprocess.run(command)
-    if done.returncode != 0:
-        sys.exit(done.returncode)
+    assignments = [f"dx={options.dx!r}", *options.set]
+    if LAWS[law] is not None:
+        assignments = [assignment for assignment in assignments if not assignment.startswith(f"{OF_WORK}=")]
+    common.run(options, folder, deck(law, options.relaxation), assignments)
     return folder
 
 
-def history(folder):
-    table = fissure.read_history(folder)
-    return {name: numpy.array(table[name]) for name in table}
+def metres(places):
+    """Places in mm as an array of places in m."""
+    return 1e-3 * numpy.array(places)
 
 
 def branches(folder):
-    """Read the branches of the crack as arrays of positions (m), longest first."""
-    with open(folder / "crack_main.csv") as file:
-        rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
-    numbers = sorted({row[0] for row in rows})
-    lines = [numpy.array([row[1:3] for row in rows if row[0] == number]) for number in numbers]
-    return sorted(lines, key=lambda line: -numpy.hypot(*numpy.diff(line, axis=0).T).sum())
+    """The branches of the crack as arrays of positions (m), longest first."""
+    return common.branches(folder / "crack_main.csv")
 
 
 def deviation(path):
-    """Return the largest distance (m) of a path from the measured path, and the leftmost x (m) of the comparison."""
-    # Sort the path from left to right; if the path turns back, its last part is used.
-    left = max(path[:, 0].min(), MEASURED[-1, 0])
-    places = numpy.linspace(left, min(path[:, 0].max(), MEASURED[0, 0]), 400)
+    """Largest distance (m) of a path from the measured one, and the leftmost x (m) of the comparison."""
+    # From left to right; where the path turns back, its last part counts.
+    along, up = metres(MEASURED).T
+    left = max(path[:, 0].min(), along[-1])
+    places = numpy.linspace(left, min(path[:, 0].max(), along[0]), 400)
     order = numpy.argsort(path[:, 0], kind="stable")
     found = numpy.interp(places, path[order, 0], path[order, 1])
-    measured = numpy.interp(places, MEASURED[::-1, 0], MEASURED[::-1, 1])
+    measured = numpy.interp(places, along[::-1], up[::-1])
     return float(numpy.abs(found - measured).max()), float(left)
 
 
@@ -295,8 +262,8 @@ def draw_path(runs, path):
         size = (72 * 7 / 140 * 1e3 * dx) ** 2
         marks = axis.scatter(x, y, c=values[-1], s=size, marker="s", linewidths=0, cmap="Greys", vmin=0, vmax=0.8)
         figure.colorbar(marks, ax=axis, label="damage")
-        axis.plot(*(1e3 * MEASURED.T), color="#009e73", linewidth=1.5, label="measured path")
-        axis.plot(*(1e3 * NOTCH.T), color="#009e73", linewidth=1, linestyle=":", label="measured notch")
+        axis.plot(*zip(*MEASURED), color="#009e73", linewidth=1.5, label="measured path")
+        axis.plot(*zip(*NOTCH), color="#009e73", linewidth=1, linestyle=":", label="measured notch")
         for number, branch in enumerate(branches(folder)):
             label = "computed path" if number == 0 else None
             axis.plot(*(1e3 * branch.T), color="#d1495b", linewidth=1.2, label=label)
