@@ -8,7 +8,7 @@ use crate::solver::model::Model;
 
 use super::Fields;
 use super::load_step::sums;
-use super::pieces::Piece;
+use super::pieces::{Piece, Pieces};
 
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -42,15 +42,15 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// The message names the piece with the smallest point id.
     pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
-        for (stage, time) in self.load_times() {
-            let found = self.with_loads(stage, time, |simulation| {
-                let unheld = simulation.unheld_load()?;
+        for stage in 0..self.stages.len() {
+            let found = self.at_load_steps(stage, |simulation, pieces, time| {
+                let unheld = simulation.unheld_load(pieces)?;
                 let component = unheld.component;
                 let along = |_: usize, force: [f64; D]| force[component];
                 let condition = simulation.largest_load(&unheld.piece.points, along);
-                Some((condition, simulation.describe_unheld_load(&unheld)))
+                Some((condition, time, simulation.describe_unheld_load(&unheld)))
             });
-            if let Some((condition, text)) = found {
+            if let Some((condition, time, text)) = found {
                 let condition = &self.problem.conditions[condition];
                 let (name, quantity) = (&condition.name, condition.quantity);
                 let message = format!("[condition.{name}] {quantity}: at t = {time:.6e} s, {text}");
@@ -63,41 +63,44 @@ impl<const D: usize> Simulation<'_, D> {
     /// Find loads of the first stage that turn a piece that no support holds in the plane of the rotation. The
     /// simulation must be at time 0. Positions of later stages are unknown. Collective.
     pub fn unheld_torque(&mut self) -> Option<UnheldTorque> {
-        let times = self.load_times().into_iter();
-        let mut times = times.filter(|(stage, _)| *stage == 0 && D > 1);
-        times.find_map(|(stage, time)| self.with_loads(stage, time, Self::find_unheld_torque))
-    }
-
-    /// Stage and time (s) of the first and the last load step of each stage with load steps. Empty with
-    /// contact, which can also hold pieces.
-    fn load_times(&self) -> Vec<(usize, f64)> {
-        let (mut times, mut begin) = (Vec::new(), 0.0);
-        for (stage, Time { end, method, .. }) in
-            self.stages.iter().map(|stage| stage.time).enumerate()
-        {
-            if let Some(load_steps) = method.load_steps().filter(|_| self.contact.is_none()) {
-                let first = begin + (end - begin) / load_steps as f64;
-                times.extend([(stage, first), (stage, end)]);
-            }
-            begin = end;
+        if D == 1 {
+            return None;
         }
-        times
+        self.at_load_steps(0, |simulation, pieces, _| {
+            simulation.find_unheld_torque(pieces)
+        })
     }
 
-    /// Call `look` with the loads and supports of a stage at a time (s). Afterwards, those of the first stage
-    /// at time 0 act again.
-    fn with_loads<T>(
+    /// Call `look` with the pieces, the loads and the supports of a stage at its first and at its last load
+    /// step (s), until it returns a value. Afterwards, the loads and supports of the first stage at time 0 act
+    /// again. Without effect for explicit stages, and with contact, which can also hold pieces. Collective.
+    fn at_load_steps<T>(
         &mut self,
         stage: usize,
-        time: f64,
-        look: impl FnOnce(&mut Self) -> Option<T>,
+        mut look: impl FnMut(&Self, &Pieces<D>, f64) -> Option<T>,
     ) -> Option<T> {
-        self.set_stage_loads(stage, time);
-        let result = if self.conditions.have_loads() {
-            look(self)
-        } else {
-            None
-        };
+        let Time { end, method, .. } = self.stages[stage].time;
+        let load_steps = method.load_steps().filter(|_| self.contact.is_none())?;
+        let begin = stage
+            .checked_sub(1)
+            .map_or(0.0, |before| self.stages[before].time.end);
+        let first = begin + (end - begin) / load_steps as f64;
+        self.set_stage_loads(stage, first);
+        let mut result = None;
+        if self.conditions.have_loads() {
+            let mut is_unloaded = self.unloaded_points();
+            self.set_stage_loads(stage, end);
+            let both = is_unloaded.iter_mut().zip(self.unloaded_points());
+            for (column, at_end) in both {
+                let entries = column.iter_mut().zip(at_end);
+                entries.for_each(|(entry, at_end)| *entry = entry.min(at_end));
+            }
+            let pieces = self.find_pieces(is_unloaded);
+            result = [first, end].into_iter().find_map(|time| {
+                self.set_stage_loads(stage, time);
+                look(self, &pieces, time)
+            });
+        }
         self.set_stage_loads(0, 0.0);
         result
     }
@@ -115,7 +118,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// The message names the piece with the smallest point id.
     pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
-        self.unheld_load().map_or(Ok(()), |unheld| {
+        let pieces = self.find_pieces(self.unloaded_points());
+        self.unheld_load(&pieces).map_or(Ok(()), |unheld| {
             let text = self.describe_unheld_load(&unheld);
             Err(Error::run(format!("{failure}: {text}")))
         })
@@ -127,19 +131,18 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.residual == 0.0
             && self.contact.is_none()
             && self.conditions.have_loads()
-            && self.unheld_load().is_some()
+            && self.check_pieces_are_held("").is_err()
     }
 
     /// Find the piece with the smallest point id that is loaded along an axis in which no support holds it,
     /// so that no equilibrium within the tolerance exists. Collective.
-    fn unheld_load(&mut self) -> Option<UnheldLoad> {
+    fn unheld_load(&self, pieces: &Pieces<D>) -> Option<UnheldLoad> {
         let allowed = self.allowed_force();
-        let pieces = self.find_pieces();
         let is_suspect = |point: usize, d: usize| {
             pieces.is_free[d][point] == 1.0 && pieces.is_unloaded[d][point] == 0.0
         };
         let any = |point: usize| (0..D).any(|d| is_suspect(point, d));
-        self.first_of_pieces(&pieces, any, |piece| {
+        self.first_of_pieces(pieces, any, |piece| {
             let mut is_held = [0.0; D];
             let mut sums = [const { ExactSum::ZERO }; 6];
             for point in &piece.points {
@@ -192,10 +195,9 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Find the piece with the smallest point id that the present loads turn.
-    fn find_unheld_torque(&mut self) -> Option<UnheldTorque> {
+    /// Find the piece with the smallest point id that the present loads turn. Collective.
+    fn find_unheld_torque(&self, pieces: &Pieces<D>) -> Option<UnheldTorque> {
         const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
-        let pieces = self.find_pieces();
         let planes = || (0..3).filter(|axis| PLANES[*axis].iter().all(|d| *d < D));
         let is_suspect = |point: usize, axis: usize| {
             let plane = PLANES[axis];
@@ -203,7 +205,7 @@ impl<const D: usize> Simulation<'_, D> {
                 && plane.iter().any(|d| pieces.is_unloaded[*d][point] == 0.0)
         };
         let any = |point: usize| planes().any(|axis| is_suspect(point, axis));
-        self.first_of_pieces(&pieces, any, |piece| {
+        self.first_of_pieces(pieces, any, |piece| {
             let mut flags = [0.0; 3];
             let mut moments = [const { ExactSum::ZERO }; 4];
             for point in &piece.points {

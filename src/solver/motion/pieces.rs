@@ -26,19 +26,14 @@ pub(super) struct Piece {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Find the pieces of all bodies. Collective.
-    pub(super) fn find_pieces(&mut self) -> Pieces<D> {
-        let (model, local) = (&self.model, self.model.volume.len());
-        let mut pieces = Pieces {
-            first: model.ids.iter().map(|id| *id as f64).collect(),
-            is_free: self.conditions.free_components(local),
-            is_unloaded: std::array::from_fn(|_| vec![1.0; local]),
-        };
+    /// For each component, 0 for local points on which a load acts at present, else 1.
+    pub(super) fn unloaded_points(&self) -> [Vec<f64>; D] {
+        let mut all = std::array::from_fn(|_| vec![1.0; self.model.volume.len()]);
         // A point without bonds in its reference family does not move in a relaxation, so its loads do not
         // count.
         let density = self.fields.fictitious_density.as_deref();
         if let (Some(force), Some(density)) = (&self.fields.external_force, density) {
-            for (is_unloaded, force) in pieces.is_unloaded.iter_mut().zip(force) {
+            for (is_unloaded, force) in all.iter_mut().zip(force) {
                 for (point, force) in force.iter().enumerate() {
                     if *force != 0.0 && density[point].is_finite() {
                         is_unloaded[point] = 0.0;
@@ -46,6 +41,17 @@ impl<const D: usize> Simulation<'_, D> {
                 }
             }
         }
+        all
+    }
+
+    /// Find the pieces of all bodies, with the unloaded points and the present supports. Collective.
+    pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
+        let (model, local) = (&self.model, self.model.volume.len());
+        let mut pieces = Pieces {
+            first: model.ids.iter().map(|id| *id as f64).collect(),
+            is_free: self.conditions.free_components(local),
+            is_unloaded,
+        };
         self.spread_least(&mut pieces.columns());
         pieces
     }
