@@ -124,10 +124,7 @@ fn a_result_of_some_points_in_single_precision() {
         assert_eq!(side_car.matches("<Time").count(), 5);
     }
     // Other points or another precision are not appended to an existing file.
-    for (other, told) in [
-        ("", "points"),
-        (", set = 'strip'", "another precision"),
-    ] {
+    for (other, told) in [("", "points"), (", set = 'strip'", "another precision")] {
         let deck = folder.write("deck.toml", &deck(other).replace("end = 4", "end = 5"));
         let mut command = fissure(1);
         command

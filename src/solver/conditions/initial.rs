@@ -1,6 +1,6 @@
 //! Initial displacements and velocities.
 
-use crate::comm::{Communicator, IdOrder, agree, all_gather};
+use crate::comm::{Communicator, Found, IdOrder, agree, all_gather, least};
 use crate::error::{Error, Result};
 use crate::points::value_file;
 use crate::problem::{Initial, InitialFile, Problem};
@@ -67,15 +67,16 @@ fn apply_file<const D: usize>(
         Error::input(message).at(&file.span)
     };
     let row = |point: u32| &values[point as usize * width..][..width];
-    let mut missing = points.iter().filter(|point| row(**point)[0].is_nan());
-    let found = match missing.next() {
-        Some(point) => {
-            let id = model.ids[*point as usize];
-            Err(error(format!("has no row for the point {id} of the set")))
-        }
-        None => Ok(()),
-    };
-    agree(comm, found)?;
+    let missing = points.iter().filter(|point| row(**point)[0].is_nan());
+    let missing = missing.map(|point| model.ids[*point as usize]).min();
+    let missing = missing.map(|id| Found {
+        key: 0.0,
+        ids: [id],
+        payload: (),
+    });
+    if let Some(Found { ids: [id], .. }) = least(comm, missing) {
+        return Err(error(format!("has no row for the point {id} of the set")));
+    }
     for point in points {
         let (displacement, velocity) = row(*point).split_at(D);
         for d in 0..D {
