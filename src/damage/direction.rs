@@ -15,7 +15,7 @@
 //! | 1 − (n·a)² | along a | (2j − 1)/(2j + 1) | j/(j + 1) |
 //! | 1 − (n·a)² | across a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
 //!
-//! p and q follow from both fracture energies, with the smallest k = 1, 2, 4 for which p is at least 0.1. Smaller p are
+//! p and q follow from both fracture energies, with the smaller k = 1, 2 for which p is at least 0.1. Smaller p are
 //! rejected: bonds in the weak direction would break at small strains, far from any crack. A critical stretch is multiplied
 //! by the root of w_c/w.
 
@@ -24,8 +24,9 @@ use std::f64::consts::PI;
 use crate::lanes::{Lanes, Simd};
 use crate::material::Bond;
 
-/// Squarings of c: k is at most 2 to this power. With larger k, too few bonds of usual families take part.
-const MOST_SQUARINGS: u32 = 2;
+/// Squarings of c: k is at most 2 to this power. With k = 4 and three spacings in a horizon, the few tough bonds hold the
+/// faces of cracks together.
+const MOST_SQUARINGS: u32 = 1;
 
 /// The smallest p.
 const LEAST_BASE: f64 = 0.1;

@@ -48,15 +48,16 @@ fn opening_costs_the_fracture_energy_of_its_direction() {
         ("plane-strain", 6, &["[0, 2]", "[3, 0]"][..], 0.03),
         ("3d", 3, &["[0, 1, 0]", "[1, 0, 0]", "[0, 0, 1]"][..], 0.08),
     ] {
+        // In correspondence, the order in which bonds break changes the energy too.
         let laws = [
-            (pmb, "critical_stretch"),
-            (pmb, "energy"),
-            (ordinary, "energy"),
-            (correspondence, "energy"),
+            (pmb, "critical_stretch", bound),
+            (pmb, "energy", bound),
+            (ordinary, "energy", bound),
+            (correspondence, "energy", 0.1),
         ];
         // The blocks of state-based laws are too large in space, and slow with a large horizon.
         let count = if dimension == "3d" { 2 } else { 4 };
-        for (law, rule) in &laws[..count] {
+        for (law, rule, bound) in &laws[..count] {
             let isotropic = format!("fracture_energy = {ALONG}");
             let isotropic = cost(&deck(dimension, horizon, law, rule, &isotropic));
             for ratio in [0.7, 1.9] {
@@ -64,7 +65,7 @@ fn opening_costs_the_fracture_energy_of_its_direction() {
                     let keys = directed(ratio, axis);
                     let found = cost(&deck(dimension, horizon, law, rule, &keys)) / isotropic;
                     assert!(
-                        (found - 1.0).abs() < bound,
+                        (found - 1.0).abs() < *bound,
                         "{dimension} {rule} {ratio} {axis}: {found}, {law}"
                     );
                 }
@@ -125,56 +126,60 @@ fn bonds_along_the_direction_break_last() {
     );
 }
 
-/// Angle (degrees) of the crack that grows from a notch along x under tension along y.
+/// Angle (degrees) of the crack that grows from a notch along x under tension along y: of the points that have lost 40 % of
+/// their bonds, 6 to 14 spacings ahead of the notch.
 fn angle_of_crack(law: &str, damage: &str) -> f64 {
     let text = format!(
         "dimension = 'plane-stress'
         grid = {{ spacing = 1, horizon = 3.01, volume_correction = 'exact' }}
         material.m.{law}
         damage.d.{damage}
-        body.plate = {{ material = 'm', damage = 'd', shape.box = {{ lower = [0, 0], upper = [50, 60] }} }}
-        crack.notch.segment = {{ from = [-1, 30], to = [18, 30] }}
-        set.top.where = 'y > 57'
+        body.plate = {{ material = 'm', damage = 'd', shape.box = {{ lower = [0, 0], upper = [36, 40] }} }}
+        crack.notch.segment = {{ from = [-1, 20], to = [12, 20] }}
+        set.top.where = 'y > 37'
         set.bottom.where = 'y < 3'
         condition.down = {{ set = 'bottom', velocity = [0, '-2e-3'] }}
         condition.up = {{ set = 'top', velocity = [0, '2e-3'] }}
-        time = {{ end = 400, safety = 0.5 }}
+        time = {{ end = 240, safety = 0.5 }}
         "
     );
     simulate::<2, _>(&text, |mut simulation: Simulation<2>| {
-        // The mean place of the bonds that break 8 to 14 from the notch.
-        let (mut place, mut count) = (0.0, 0.0);
-        while !simulation.is_over() && count < 40.0 {
+        while !simulation.is_over() {
             simulation.advance();
-            (place, count) = (0.0, 0.0);
-            let model = &simulation.model;
-            simulation.forces.for_each_broken(|a, b| {
-                let [i, j] = [a, b].map(|point| model.position(point));
-                let [x, y] = [0, 1].map(|d| 0.5 * (i[d] + j[d]) - [18.0, 30.0][d]);
-                if (8.0..14.0).contains(&x) {
-                    place += y / x;
-                    count += 1.0;
-                }
-            });
         }
-        assert!(count >= 40.0, "the crack did not grow");
-        (place / count).atan().to_degrees()
+        let mut bonds = vec![[0.0; 2]; simulation.model.owned()];
+        let forces = &simulation.forces;
+        forces.for_each_broken(|a, _| bonds[a][0] += 1.0);
+        forces.for_each_intact(|a, _| bonds[a][1] += 1.0);
+        let (mut slope, mut count) = (0.0, 0.0);
+        for (point, [broken, intact]) in bonds.into_iter().enumerate() {
+            let [x, y, _] = simulation.model.position(point);
+            let ahead = x - 12.0;
+            if broken >= 0.4 * (broken + intact) && (6.0..14.0).contains(&ahead) {
+                slope += (y - 20.0) / ahead;
+                count += 1.0;
+            }
+        }
+        assert!(count >= 8.0, "no crack: {damage}");
+        (slope / count).atan().to_degrees()
     })
 }
 
+/// Fibres at 30° turn the crack, by some degrees more than that: the strengths of bonds differ more than the energies.
 #[test]
 fn a_crack_follows_the_weak_direction() {
     let pmb = "pmb = { density = 2, youngs_modulus = 5 }";
     let ordinary = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
     for (law, rule) in [(pmb, "critical_stretch"), (ordinary, "energy")] {
         let isotropic = format!("{rule} = {{ fracture_energy = 0.01 }}");
-        assert!(angle_of_crack(law, &isotropic).abs() < 3.0);
+        let straight = angle_of_crack(law, &isotropic);
+        assert!(straight.abs() < 10.0, "{law}: {straight}");
         for sign in [1.0, -1.0] {
             let slope = sign * 30_f64.to_radians().tan();
-            let keys = "fracture_energy_along = 0.01, fracture_energy_across = 0.033";
+            let keys = "fracture_energy_along = 0.01, fracture_energy_across = 0.019";
             let oblique = format!("{rule} = {{ {keys}, direction = [1, {slope}] }}");
             let angle = sign * angle_of_crack(law, &oblique);
-            assert!((15.0..40.0).contains(&angle), "{law}: {angle}");
+            assert!((25.0..50.0).contains(&angle), "{law}: {angle}");
         }
     }
 }
