@@ -63,20 +63,20 @@ fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
 
 /// Quantity that is compared with a threshold to break bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Breaks {
-    ByStretch,
-    ByWork,
-    ByStress(StressMeasure),
+enum Measured {
+    Stretch,
+    Work,
+    Stress(StressMeasure),
 }
 
 /// Quantity that breaks the bonds of a body with this damage. In bond-based laws, the work follows from the
 /// stretch, so their bonds break at the equivalent critical stretch.
-fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
+fn breaks(body: &Body, damage: &problem::Damage) -> Measured {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     match damage.rule {
-        DamageRule::Stress(rule) => Breaks::ByStress(rule.measure),
-        DamageRule::Energy { .. } if !bond_based => Breaks::ByWork,
-        DamageRule::Energy { .. } | DamageRule::CriticalStretch => Breaks::ByStretch,
+        DamageRule::Stress(rule) => Measured::Stress(rule.measure),
+        DamageRule::Energy { .. } if !bond_based => Measured::Work,
+        DamageRule::Energy { .. } | DamageRule::CriticalStretch => Measured::Stretch,
     }
 }
 
@@ -231,7 +231,7 @@ fn damage_law(
     };
     let (critical, alpha) = (stretch(energy), damage.alpha);
     match damage.rule {
-        DamageRule::Energy { work, .. } if breaks(body, damage) == Breaks::ByWork => {
+        DamageRule::Energy { work, .. } if breaks(body, damage) == Measured::Work => {
             DamageLaw::BondEnergy(BondEnergy {
                 critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
                 alpha,

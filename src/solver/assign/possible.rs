@@ -1,6 +1,6 @@
 //! Checks which laws and which damage the bodies of a problem can have.
 
-use super::{Breaks, breaks, build, constants, given};
+use super::{Measured, breaks, build, constants, given};
 use crate::error::{Error, Result};
 use crate::problem::{
     self, Block, Body, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Problem,
@@ -85,7 +85,7 @@ fn pair_damage_is_possible(
             return error(format!("[body.{}]: {fault}", body.name));
         }
     }
-    let mut by_work = bodies.map(|body| (breaks(body, damage) == Breaks::ByWork, &body.name));
+    let mut by_work = bodies.map(|body| (breaks(body, damage) == Measured::Work, &body.name));
     if let (Some((first, a)), Some((second, b))) = (by_work.next(), by_work.next())
         && first != second
     {
@@ -161,7 +161,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let of_other_kind = problem.bodies.iter().find(|other| {
         let of_other = match &other.damage {
             Some(damage) => breaks(other, damage),
-            None if other.can_break() => Breaks::ByStretch,
+            None if other.can_break() => Measured::Stretch,
             None => return false,
         };
         of_other != own && meets(other)
@@ -199,7 +199,7 @@ fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Opt
     if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {
         return Some("a critical stretch is no measure of energy".to_owned());
     }
-    if breaks(body, damage) != Breaks::ByWork || problem.volume_correction == VolumeCorrection::None
+    if breaks(body, damage) != Measured::Work || problem.volume_correction == VolumeCorrection::None
     {
         return None;
     }
