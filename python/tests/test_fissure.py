@@ -179,9 +179,6 @@ class Results(unittest.TestCase):
             self.assertEqual(result.deck["time"]["end"], 2e-6)
             self.assertEqual(result.deck["parameters"]["speed"], 0.5)
             count = result.steps[-1] + 1
-        with fissure.run(self.deck, output=out, overlays=slow, overwrite=True, speed=2, threads=1) as result:
-            self.assertEqual(result.deck["time"]["end"], 3e-6)
-            self.assertEqual(result.deck["parameters"]["speed"], 2)
         for path in (out, out / "result.vtkhdf"):
             with fissure.open(path, output="left") as result:
                 self.assertEqual((len(result), len(result.points)), (count, 30))
@@ -189,6 +186,11 @@ class Results(unittest.TestCase):
                 self.assertEqual(len(result.history), 0)
         with self.assertRaisesRegex(FileNotFoundError, "no result of the output 'right'; there are left"):
             fissure.open(out, output="right")
+        with fissure.run(self.deck, output=out, overlays=slow, overwrite=True, speed=2, threads=1) as result:
+            self.assertEqual(result.deck["time"]["end"], 3e-6)
+            self.assertEqual(result.deck["parameters"]["speed"], 2)
+        # The deck of this run has no further output.
+        self.assertFalse((out / "result_left.vtkhdf").exists())
         with self.assertRaisesRegex(fissure.RunError, "missing.toml"):
             fissure.run(self.deck, output=out, overlays=["missing.toml"])
 

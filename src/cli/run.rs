@@ -203,7 +203,8 @@ impl Observer for Log {
     }
 
     fn begin(&mut self, now: &mut dyn RunState) {
-        let left = now.last() - now.number();
+        // A restart may have an end before its checkpoint.
+        let left = now.last().saturating_sub(now.number());
         if self.prints && left > 0 {
             let step = si(now.step(), "s");
             let set_up = si(self.started.elapsed().as_secs_f64(), "s");
