@@ -191,7 +191,7 @@ impl Section<'_> {
             _ => return Err(self.wrong_number_of_constants(&given)),
         };
         let last = given.last().map(|(name, _)| *name);
-        // An error about the constants points at the last one, but no single constant is wrong.
+        // If several constants are wrong together, the error points at the last one.
         let error = |message: String| {
             let place = last.map_or(self.place.clone(), |name| self.table[name].span());
             self.scope.error(place, format!("{}: {message}", self.key))

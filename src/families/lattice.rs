@@ -37,7 +37,7 @@ pub struct BondLattice {
     offsets: Vec<Offset>,
     /// Whether some weights differ from 1, and whether the weights of i and j differ.
     weighted: [bool; 2],
-    /// The vectors, sorted by local index.
+    /// The lane groups, sorted by local index.
     vectors: Vec<Vector>,
     /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
@@ -182,7 +182,7 @@ impl BondLattice {
         self.bonds
     }
 
-    /// Number of vectors.
+    /// Number of lane groups.
     pub fn len(&self) -> usize {
         self.vectors.len()
     }
@@ -197,7 +197,7 @@ impl BondLattice {
         self.offsets.len()
     }
 
-    /// Number of vectors whose points have local indices below `limit`.
+    /// Number of lane groups whose first points have local indices below `limit`.
     pub fn vectors_below(&self, limit: usize) -> usize {
         self.vectors
             .partition_point(|vector| (vector.point as usize) < limit)

@@ -46,7 +46,7 @@ pub struct Vectors<'a> {
     pub(super) groups: Groups<'a>,
 }
 
-/// The tables of a lattice that all vectors use.
+/// The tables of a lattice that all its lane groups share.
 #[derive(Clone, Copy)]
 pub(super) struct LatticeTables<'a> {
     pub(super) offsets: &'a [Offset],

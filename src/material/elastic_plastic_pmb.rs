@@ -53,7 +53,7 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Critical stretch s0 from the critical stretch s_e of the elastic bond, by equal energy of breaking.
+/// Critical stretch s0 at which breaking takes the energy of an elastic bond with the critical stretch s_e.
 ///
 /// Breaking takes c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore s0 =
 /// s_e²/(2 s_y) + s_y/2.

@@ -158,7 +158,7 @@ fn of_product(a: usize, b: usize) -> [usize; 3] {
     exponents
 }
 
-/// Result of a fit: the function of the direction nearest to a constant that satisfies given sums.
+/// Result of a fit: of all functions of the direction that satisfy given sums, the one nearest to a constant.
 struct Fit<const D: usize> {
     /// Matrix of the function: T in n·T n or N·T N.
     tensor: SMatrix<f64, D, D>,

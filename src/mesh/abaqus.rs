@@ -187,7 +187,7 @@ struct Reader {
     place: Place,
 }
 
-/// Remove repeated numbers if there are more than `limit`, and raise the limit.
+/// If there are more than `limit` numbers, remove repeated ones and raise the limit.
 fn compact(numbers: &mut Vec<u64>, limit: &mut usize) {
     if numbers.len() > *limit {
         numbers.sort_unstable();

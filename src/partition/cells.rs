@@ -42,7 +42,7 @@ pub struct Cells {
 pub struct CellLoads {
     /// Measured time of the points of each cell, ns.
     pub costs: Vec<u64>,
-    /// A rank that owns points of each cell; −1 if the cell has no points.
+    /// For each cell, a rank that owns points of it; −1 if the cell has no points.
     pub ranks: Vec<f64>,
 }
 

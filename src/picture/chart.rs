@@ -354,7 +354,7 @@ impl Chart<'_> {
             }
         }
         if self.series.len() > 1 {
-            // Lines between distant points also occupy a corner, so sample each line.
+            // A line between two distant points can cross the place of the legend, so each line is sampled.
             let step = |ends: &[[f64; 2]], k: usize| {
                 let share = k as f64 / LINE_SAMPLES as f64;
                 [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))

@@ -93,7 +93,7 @@ fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     [first, ((centre + half).round() as i64).max(first + 1)]
 }
 
-/// Cubes in the isometric view; of each pixel the nearest one is seen.
+/// Cubes in the isometric view; each pixel shows the nearest cube.
 struct Cubes<'a> {
     image: &'a mut Image,
     /// x − y + z of what each pixel shows, in pixels of a length along an axis.

@@ -248,8 +248,8 @@ impl Marks<'_> {
     }
 }
 
-/// Whether a slice shows a point with a position and an edge of its cell (m). Deformed layers can have gaps, so the
-/// reach exceeds half a cell.
+/// Whether a slice at `position` (m) along `axis` shows a point at `place` whose cell has this edge (m).
+/// Deformed layers can have gaps, so the reach exceeds half a cell.
 pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> bool {
     (place[axis.index()] - position).abs() <= 0.75 * edge
 }

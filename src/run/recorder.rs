@@ -420,7 +420,7 @@ fn reason_for_new_result<const D: usize>(
     found_by_root(comm, compare)
 }
 
-/// Description of the damage of a result, if its first `outputs` outputs cannot be read. Collective.
+/// What is broken in a result file, if its first `outputs` outputs cannot be read. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

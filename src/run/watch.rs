@@ -112,7 +112,7 @@ pub struct Watch<'a> {
     cost: Duration,
     /// Number of iterations of the time loop.
     iterations: u64,
-    /// Time and iteration of the last decision.
+    /// Time and iteration of the last decision on a checkpoint or a stop.
     last_decision: (Instant, u64),
     /// Iteration of the next decision.
     next_decision: u64,

@@ -170,7 +170,7 @@ pub struct History {
     /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks whose path and length are computed, by name; in 3-D area and front.
+    /// Cracks by name. Their path and length are computed, in 3-D their area and front.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
     /// Crack tips that are tracked, by name.

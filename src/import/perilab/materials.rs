@@ -250,7 +250,7 @@ fn anisotropic(
     Ok(found)
 }
 
-/// Read the thermal models with expansion; `acts` if the solver enables thermal models.
+/// Read the thermal models with expansion. `acts` tells whether the solver enables thermal models.
 pub(super) fn expansions(
     translation: &Translation,
     models: &Node,

@@ -80,7 +80,7 @@ fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     }
 }
 
-/// Input from which the law of a body is created, if its bonds break by this damage.
+/// Input for creating the law of a body with this damage.
 fn given<'a>(
     problem: &Problem,
     body: &'a Body,

@@ -378,7 +378,7 @@ impl FastPathGate {
         }
     }
 
-    /// Sum over the bonds of a vector. Return the sums and the bits of the breaking bonds.
+    /// Sum over the bonds of a lane group. Return the sums and the bits of the breaking bonds.
     #[inline(always)]
     fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
