@@ -90,7 +90,7 @@ impl Progress {
                 }
                 *due = next_line(elapsed);
                 let full = (step as usize * WIDTH) / *last as usize;
-                let left = elapsed * last.saturating_sub(step) as f64 / (step - *first).max(1) as f64;
+                let left = elapsed * (*last - step) as f64 / (step - *first).max(1) as f64;
                 errln!(
                     "[{}{}] {:>3} %  {noun} {step}/{last}  t = {}  eta {left:.0} s",
                     "█".repeat(full),
