@@ -44,7 +44,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// Format a user's text for a message: in backticks, without control characters, at most [`EXCERPT`]
+/// Format a user's text for a message: in backticks, without control characters, at most `EXCERPT`
 /// characters.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
