@@ -83,11 +83,11 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
 /// Id of a point and its values: the components of the displacement, then those of the velocity.
 pub type Row = (u64, Vec<f64>);
 
-/// Read this rank's part of the rows. Collective.
+/// Read this rank's part of the rows. `total` is the number of points. Collective.
 ///
 /// # Errors
-/// If the file cannot be read or a row is invalid; the message gives file and line.
-pub fn read(file: &InitialFile, comm: &dyn Communicator) -> Result<Vec<Row>> {
+/// If the file cannot be read, a row is invalid, or a point does not exist; the message gives file and line.
+pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<Vec<Row>> {
     let columns = &file.columns;
     let mut rows = Vec::new();
     let part = for_each_row(
@@ -95,7 +95,7 @@ pub fn read(file: &InitialFile, comm: &dyn Communicator) -> Result<Vec<Row>> {
         Some(columns.heading),
         [comm.rank(), comm.size()],
         |entries| {
-            rows.push(row(columns, entries)?);
+            rows.push(row(columns, entries, total)?);
             Ok(())
         },
     );
@@ -105,7 +105,12 @@ pub fn read(file: &InitialFile, comm: &dyn Communicator) -> Result<Vec<Row>> {
     });
     agree(comm, part)?.check(&file.path, comm)?;
     if columns.id.is_none() {
-        let (before, _) = crate::comm::scan(comm, rows.len() as u64);
+        let (before, count) = crate::comm::scan(comm, rows.len() as u64);
+        if count > total {
+            let path = file.path.display();
+            let message = format!("{path}: has {count} rows, must have at most one for each of the {total} points");
+            return Err(Error::input(message).at(&file.span));
+        }
         for ((id, _), number) in rows.iter_mut().zip(before..) {
             *id = number;
         }
@@ -114,7 +119,11 @@ pub fn read(file: &InitialFile, comm: &dyn Communicator) -> Result<Vec<Row>> {
 }
 
 /// Parse a row.
-fn row(columns: &ValueColumns, entries: &[&str]) -> std::result::Result<Row, String> {
+fn row(
+    columns: &ValueColumns,
+    entries: &[&str],
+    total: u64,
+) -> std::result::Result<Row, String> {
     if entries.len() != columns.width {
         return Err(format!(
             "has {} entries, must have {} as the heading",
@@ -126,9 +135,15 @@ fn row(columns: &ValueColumns, entries: &[&str]) -> std::result::Result<Row, Str
         None => 0,
         Some(column) => entries[column].parse().map_err(|_| {
             let entry = excerpt(entries[column]);
-            format!("id must be a whole number from 0, is {entry}")
+            format!("id must be a whole number, 0 or more, is {entry}")
         })?,
     };
+    if id >= total {
+        return Err(format!(
+            "id must be at most {}, the id of the last point, is {id}",
+            total - 1
+        ));
+    }
     let value = |column: &Option<usize>| {
         let Some(column) = column else {
             return Ok(0.0);

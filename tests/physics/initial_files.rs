@@ -80,6 +80,7 @@ fn values_of_a_file_are_those_of_expressions() {
 #[test]
 fn a_wrong_row_is_named_with_its_line() {
     let folder = Folder::new("initial_rows");
+    let many = format!("vx{}", "\n1".repeat(64));
     for (name, text, expected) in [
         (
             "word",
@@ -94,17 +95,22 @@ fn a_wrong_row_is_named_with_its_line() {
         (
             "negative",
             "id vx\n-3 1\n",
-            ":2: id must be a whole number from 0, is `-3`",
+            ":2: id must be a whole number, 0 or more, is `-3`",
         ),
         (
             "beyond",
             "id vx\n63 1\n",
-            ": has a row for the point 63; the last point is 62",
+            ":2: id must be at most 62, the id of the last point, is 63",
         ),
         (
             "twice",
             "id vx\n7 1\n8 1\n7 2\n",
             ": has two rows for the point 7",
+        ),
+        (
+            "many",
+            &many,
+            ": has 64 rows, must have at most one for each of the 63 points",
         ),
     ] {
         folder.write("wrong.txt", text);

@@ -99,27 +99,17 @@ fn values_of_owned<const D: usize>(
     comm: &dyn Communicator,
     model: &Model<D>,
 ) -> Result<Vec<f64>> {
-    let rows = value_file::read(file, comm)?;
+    let rows = value_file::read(file, model.total, comm)?;
     let order = IdOrder::new(comm, &model.ids[..model.owned()], model.coarsest);
     let firsts = all_gather(comm, order.first());
     let path = file.path.display();
     let mut outgoing = vec![Vec::new(); comm.size()];
-    let mut checked = Ok(());
     for (id, values) in rows {
-        if id >= model.total {
-            let points = model.total;
-            checked = checked.and(Err(Error::input(format!(
-                "{path}: has a row for the point {id}; the last point is {}",
-                points - 1
-            ))));
-            continue;
-        }
         let home = firsts.partition_point(|first| *first <= id) - 1;
         outgoing[home].extend_from_slice(&id.to_ne_bytes());
         let bytes = values.iter().flat_map(|value| value.to_ne_bytes());
         outgoing[home].extend(bytes);
     }
-    agree(comm, checked)?;
     let width = 2 * D;
     let mut of_range = vec![f64::NAN; order.count() * width];
     let mut checked = Ok(());
@@ -130,7 +120,7 @@ fn values_of_owned<const D: usize>(
             if !values[0].is_nan() {
                 let id = words[0];
                 let message = format!("{path}: has two rows for the point {id}");
-                checked = checked.and(Err(Error::input(message)));
+                checked = checked.and(Err(Error::input(message).at(&file.span)));
             }
             for (value, word) in values.iter_mut().zip(&words[1..]) {
                 *value = f64::from_bits(*word);
