@@ -3,9 +3,10 @@
 //! the mean of both points.
 
 use super::{StressMeasure, StressRule, ToughnessByDirection};
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::simd::Task;
+use crate::lanes::{LaneTuple, Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
-use crate::material::{Bond, Law};
+use crate::material::{Bond, ForceState, Law};
 
 /// Criterion for the bonds between two blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,9 +158,9 @@ impl Limits {
 impl Criterion {
     /// Whether the criterion reads the thresholds of both points.
     #[inline(always)]
-    pub fn reads_thresholds(self) -> bool {
+    pub fn reads_thresholds(&self) -> bool {
         matches!(
-            self,
+            *self,
             Self::Thresholds(..)
                 | Self::ThresholdsBetween(..)
                 | Self::WorkThresholds(..)
@@ -169,8 +170,8 @@ impl Criterion {
 
     /// Whether the criterion reads the truncation factors of the points.
     #[inline(always)]
-    pub fn reads_truncation_factors(self) -> bool {
-        match self {
+    pub fn reads_truncation_factors(&self) -> bool {
+        match *self {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => rule.corrects(),
             _ => false,
         }
@@ -178,8 +179,8 @@ impl Criterion {
 
     /// Whether the criterion reads the rotations of both families.
     #[inline(always)]
-    pub fn reads_rotations(self) -> bool {
-        match self {
+    pub fn reads_rotations(&self) -> bool {
+        match *self {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 rule.measure == WorkMeasure::Objective
             }
@@ -189,8 +190,8 @@ impl Criterion {
 
     /// The measure of the stress of points that the criterion reads, if any.
     #[inline(always)]
-    pub fn stress_measure(self) -> Option<StressMeasure> {
-        match self {
+    pub fn stress_measure(&self) -> Option<StressMeasure> {
+        match *self {
             Self::Stress(_, rule) | Self::StressThresholds(rule) => Some(rule.measure),
             _ => None,
         }
@@ -198,15 +199,15 @@ impl Criterion {
 
     /// Whether the criterion reads the work of the force states.
     #[inline(always)]
-    pub fn reads_work(self) -> bool {
-        matches!(self, Self::Work(..) | Self::WorkThresholds(..))
+    pub fn reads_work(&self) -> bool {
+        matches!(*self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
     /// The |x| of [`crate::material::bond`] above which the series are not used. Bonds below this limit do not
     /// break by their stretch.
     #[inline(always)]
-    pub fn limit(self) -> f64 {
-        match self {
+    pub fn limit(&self) -> f64 {
+        match *self {
             // `next_down` lowers the limit by one bit: only bonds above the limit are tested, and a bond at
             // exactly the critical stretch must break.
             Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
@@ -222,8 +223,8 @@ impl Criterion {
     /// Whether every bond that breaks has an |x| above [`Self::limit`]. `scaled` is true for laws that scale
     /// thresholds.
     #[inline(always)]
-    pub fn marks_all(self, scaled: bool) -> bool {
-        match self {
+    pub fn marks_all(&self, scaled: bool) -> bool {
+        match *self {
             Self::Never => true,
             Self::Stretch(_) | Self::StretchBetween(..) => !scaled,
             _ => false,
@@ -233,13 +234,13 @@ impl Criterion {
     /// Return one bit per bond that breaks; `work` (J/m⁶) is read only if [`Self::reads_work`].
     #[inline(always)]
     pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
-        self,
+        &self,
         simd: S,
         bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
         work: Lanes,
     ) -> u8 {
-        match self {
+        match *self {
             Self::Never => 0,
             // Every bond that breaks has an |x| above the limit, so none of these bonds breaks.
             Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
@@ -255,8 +256,10 @@ impl Criterion {
                     Sense::Either => spent,
                 }
             }
+            // The points of laws with forces along the bonds have no stress.
+            Self::Stress(..) | Self::StressThresholds(_) if L::Force::CENTRAL => 0,
             Self::Stress(_, rule) | Self::StressThresholds(rule) => {
-                let (stress, acting) = mean_stress(simd, ends);
+                let (stress, acting) = simd.aside(MeanStress::new(simd, ends));
                 let reached = simd.at_least(stress, self.threshold(simd, bond, ends)) & acting;
                 match rule.sense {
                     Sense::Pulled => reached & bond.relative_square_extension.above(0.0),
@@ -278,13 +281,13 @@ impl Criterion {
     /// Return the stretch, work or stress at which each bond breaks.
     #[inline(always)]
     fn threshold<S: Simd, L: Law<D>, const D: usize>(
-        self,
+        &self,
         simd: S,
         bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
     ) -> Lanes {
         let scale = || ends.laws[0].toughness_scale(bond, ends.points, &ends.laws[1]);
-        match self {
+        match *self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
             Self::Stretch(critical) | Self::Stress(critical, _) => Lanes::splat(critical),
@@ -301,8 +304,8 @@ impl Criterion {
                     threshold
                 }
             }
-            Self::Thresholds(critical, directions)
-            | Self::ThresholdsBetween(critical, _, directions) => {
+            Self::Thresholds(critical, ref directions)
+            | Self::ThresholdsBetween(critical, _, ref directions) => {
                 let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if L::SCALED {
                     let growth = scale() - Lanes::splat(1.0);
@@ -310,21 +313,25 @@ impl Criterion {
                     there += growth * critical[1];
                 }
                 if let Some(directions) = directions {
-                    here = here * directions[0].factor(simd, bond).sqrt();
-                    there = there * directions[1].factor(simd, bond).sqrt();
+                    let [factor_i, factor_j] =
+                        simd.aside(DirectionFactors::new(simd, directions, bond));
+                    here = here * factor_i.sqrt();
+                    there = there * factor_j.sqrt();
                 }
-                match self {
+                match *self {
                     Self::ThresholdsBetween(_, conversion, _) => {
                         conversion.convert(simd, [here, there], ends.weights.acting())
                     }
                     _ => here.min(there),
                 }
             }
-            Self::WorkThresholds([[ii, ij], [ji, jj]], rule, directions) => {
+            Self::WorkThresholds([[ii, ij], [ji, jj]], rule, ref directions) => {
                 let (mut i, mut j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if let Some(directions) = directions {
-                    i = i * directions[0].factor(simd, bond);
-                    j = j * directions[1].factor(simd, bond);
+                    let [factor_i, factor_j] =
+                        simd.aside(DirectionFactors::new(simd, directions, bond));
+                    i = i * factor_i;
+                    j = j * factor_j;
                 }
                 let takes_i = (i * ii).min(j * ij) * 0.5;
                 let takes_j = (i * ji).min(j * jj) * 0.5;
@@ -337,7 +344,7 @@ impl Criterion {
     /// once per step: 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)². The stretch of the bond must be set.
     #[inline(always)]
     pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
-        self,
+        &self,
         simd: S,
         bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
@@ -347,8 +354,10 @@ impl Criterion {
         let ratio = if self.reads_work() {
             threshold / work
         } else {
-            let reached = match self {
-                Self::Stress(..) | Self::StressThresholds(_) => mean_stress(simd, ends).0,
+            let reached = match *self {
+                Self::Stress(..) | Self::StressThresholds(_) => {
+                    MeanStress::new(simd, ends).run(simd).0
+                }
                 _ => bond.stretch,
             };
             let ratio = threshold / reached;
@@ -358,19 +367,70 @@ impl Criterion {
     }
 }
 
-/// The mean stress (Pa) of the ends of each bond, and a bit for each bond that has one. An end takes part if the bond is
-/// within its horizon and its point carries stress. Both ends compute the same bits.
-#[inline(always)]
-fn mean_stress<S: Simd, L, P>(simd: S, ends: Ends<'_, L, P>) -> (Lanes, u8) {
-    let [i, j] = ends.limits.map(|end| end.stresses);
-    let [acts_i, acts_j] = ends.weights.acting();
-    let acts_i = acts_i & i.above(f64::NEG_INFINITY);
-    let acts_j = acts_j & j.above(f64::NEG_INFINITY);
-    let sum = simd.keep(i, acts_i) + simd.keep(j, acts_j);
-    (
-        simd.select(sum * 0.5, acts_i & acts_j, sum),
-        acts_i | acts_j,
-    )
+/// Computation of the mean stress (Pa) of the ends of each bond, and of a bit for each bond that has one.
+///
+/// An end takes part if the bond is within its horizon and its point carries stress. Both ends compute the same bits.
+struct MeanStress {
+    stresses: [Lanes; 2],
+    acting: [u8; 2],
+}
+
+impl MeanStress {
+    /// Read the stresses of both ends. The array is written out, see [`WorkRule::sum_of_acting`].
+    #[inline(always)]
+    fn new<S: Simd, L, P>(simd: S, ends: Ends<'_, L, P>) -> Self {
+        let [i, j] = ends.limits;
+        Self {
+            stresses: [simd.whole(i.stresses), simd.whole(j.stresses)],
+            acting: ends.weights.acting(),
+        }
+    }
+}
+
+impl Task for MeanStress {
+    type Output = (Lanes, u8);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> (Lanes, u8) {
+        let [i, j] = self.stresses;
+        let acts_i = self.acting[0] & i.above(f64::NEG_INFINITY);
+        let acts_j = self.acting[1] & j.above(f64::NEG_INFINITY);
+        let sum = simd.keep(i, acts_i) + simd.keep(j, acts_j);
+        let mean = simd.select(sum * 0.5, acts_i & acts_j, sum);
+        (mean, acts_i | acts_j)
+    }
+}
+
+/// Computation of the factors of the critical work of bonds at both ends, from their directions.
+struct DirectionFactors<'a, const D: usize> {
+    directions: &'a [ToughnessByDirection; 2],
+    xi: [Lanes; D],
+    inverse: Lanes,
+}
+
+impl<'a, const D: usize> DirectionFactors<'a, D> {
+    /// Copy what the factors depend on. With a reference to the bond, all its data would stay in memory.
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, directions: &'a [ToughnessByDirection; 2], bond: &Bond<D>) -> Self {
+        Self {
+            directions,
+            xi: LaneTuple::each(|d| simd.whole(bond.reference[d])),
+            inverse: simd.whole(bond.inverse),
+        }
+    }
+}
+
+impl<const D: usize> Task for DirectionFactors<'_, D> {
+    type Output = [Lanes; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> [Lanes; 2] {
+        let [i, j] = self.directions;
+        [
+            i.factor(simd, self.xi, self.inverse),
+            j.factor(simd, self.xi, self.inverse),
+        ]
+    }
 }
 
 impl WorkRule {

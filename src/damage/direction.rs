@@ -22,7 +22,6 @@
 use std::f64::consts::PI;
 
 use crate::lanes::{Lanes, Simd};
-use crate::material::Bond;
 
 /// Squarings of c: k is at most 2 to this power. With k = 4 and three spacings in a horizon, the few tough bonds hold the
 /// faces of cracks together.
@@ -90,12 +89,17 @@ impl ToughnessByDirection {
 
     /// w_c/w of eight bonds; the same bits from both ends.
     #[inline(always)]
-    pub fn factor<S: Simd, const D: usize>(&self, simd: S, bond: &Bond<D>) -> Lanes {
-        let mut along = bond.reference[0] * self.axis[0];
+    pub fn factor<S: Simd, const D: usize>(
+        &self,
+        simd: S,
+        xi: [Lanes; D],
+        inverse: Lanes,
+    ) -> Lanes {
+        let mut along = xi[0] * self.axis[0];
         for d in 1..D {
-            along = simd.multiply_add(bond.reference[d], Lanes::splat(self.axis[d]), along);
+            along = simd.multiply_add(xi[d], Lanes::splat(self.axis[d]), along);
         }
-        let cosine = along * bond.inverse;
+        let cosine = along * inverse;
         let square = cosine * cosine;
         let mut power = if self.is_tough_across {
             square

@@ -85,11 +85,8 @@ impl<const N: usize> LaneTuple for [Lanes; N] {
     #[inline(always)]
     fn each(mut value: impl FnMut(usize) -> Lanes) -> Self {
         let mut all = [Lanes::splat(0.0); N];
-        // An iterator would triple the code, of which the compiler processes more than a thousand copies.
-        let mut k = 0;
-        while k < N {
-            all[k] = value(k);
-            k += 1;
+        for (k, lanes) in all.iter_mut().enumerate() {
+            *lanes = value(k);
         }
         all
     }
@@ -143,10 +140,10 @@ impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     #[inline(always)]
     fn each(mut value: impl FnMut(usize) -> Lanes) -> Self {
         let mut all = [[Lanes::splat(0.0); N]; M];
-        let mut k = 0;
-        while k < N * M {
-            all[k / N][k % N] = value(k);
-            k += 1;
+        for (row, rows) in all.iter_mut().enumerate() {
+            for (k, lanes) in rows.iter_mut().enumerate() {
+                *lanes = value(row * N + k);
+            }
         }
         all
     }

@@ -153,6 +153,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         && !L::LINEAR
         && L::BondHistory::COUNT == 0
         && (L::FORCE_READS_STRETCH || L::FORCE_READS_EXTENSION);
+    const READS_STRESSES: bool = !L::Force::CENTRAL;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::FORCE_READS_STRETCH,

@@ -265,7 +265,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             return Limits::unread();
         }
         // SAFETY: `ReadLimits::new` has checked the lengths.
-        (self.limits).eight(|column| unsafe { eight(column, place) })
+        (self.limits).eight(K::READS_STRESSES, |column| unsafe { eight(column, place) })
     }
 
     /// # Safety

@@ -115,6 +115,9 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether to load the point numbers of points j; otherwise they are 0.
     const READS_FAR: bool = true;
 
+    /// Whether the kernel's criterion can read stresses of points i and j.
+    const READS_STRESSES: bool = false;
+
     /// Quantities of the deformed bonds to compute.
     const WANTED: Wanted;
 

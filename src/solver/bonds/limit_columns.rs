@@ -127,9 +127,10 @@ impl<'a> ReadLimits<'a> {
         }
     }
 
-    /// Load the limits of eight points. `take` is called only for columns whose length was checked.
+    /// Load the limits of eight points. `take` is called only for columns whose length was checked. Stresses
+    /// are loaded only if `may_read_stresses`; the caller passes a constant.
     #[inline(always)]
-    pub fn eight(&self, take: impl Fn(&[f64]) -> Lanes) -> Limits {
+    pub fn eight(&self, may_read_stresses: bool, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();
         if self.any {
             if let Some(column) = self.thresholds {
@@ -138,7 +139,7 @@ impl<'a> ReadLimits<'a> {
             if let Some(column) = self.truncation_factors {
                 limits.truncation_factors = take(column);
             }
-            if let Some(column) = self.stresses {
+            if may_read_stresses && let Some(column) = self.stresses {
                 limits.stresses = take(column);
             }
         }

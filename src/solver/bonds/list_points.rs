@@ -138,7 +138,9 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     #[inline(always)]
     unsafe fn limits(&self, indices: &[u32; 8]) -> Limits {
         // SAFETY: `ReadLimits::new` has checked the lengths.
-        (self.limits).eight(|column| unsafe { gather(column, indices) })
+        (self.limits).eight(K::READS_STRESSES, |column| unsafe {
+            gather(column, indices)
+        })
     }
 
     /// # Safety

@@ -150,10 +150,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
             let leaf = leaf(LEAF, list.groups_a_row());
             let points = ListPoints::new(kernel, list.reach(), nodes, numbers, limits, is_thermal);
             let runner = OverRows { kernel, points };
-            let run = |part, base, results: Results<'_, K, D>| {
-                run(part, base, results, &runner, instructions)
-            };
-            split::<_, K::Sums>(list.rows(rows), base, results, leaf, &run)
+            split(list.rows(rows), base, results, &runner, leaf, instructions)
         }
         BlockBonds::Lattice(lattice) => {
             let vectors = lattice.vectors_below(points.start)..lattice.vectors_below(points.end);
@@ -181,39 +178,32 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
             };
             let leaf = leaf(most, lattice.offsets());
             let part = lattice.vectors(vectors);
-            let run = |part, base, results: Results<'_, K, D>| {
-                run(part, base, results, &runner, instructions)
-            };
-            split::<_, K::Sums>(part, base, results, leaf, &run)
+            split(part, base, results, &runner, leaf, instructions)
         }
     }
 }
 
-/// A closure that runs a kernel over a part. The results are columns from a local index on.
-type RunPart<'a, P, N> =
-    &'a (dyn Fn(P, usize, <N as LaneTuple>::ColumnsMut<'_>) -> Vec<BrokenSums> + Sync);
-
-/// Halve a part until tasks are small, and run them. It is compiled once for all kernels with the same
-/// results.
-fn split<'a, P: Part, N: LaneTuple + 'a>(
+/// Halve a part until tasks are small, and run them.
+fn split<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
-    results: N::ColumnsMut<'_>,
+    results: <R::Sums as LaneTuple>::ColumnsMut<'_>,
+    runner: &R,
     leaf: usize,
-    run: RunPart<'a, P, N>,
+    instructions: Instructions,
 ) -> Vec<BrokenSums> {
     if part.len() <= leaf {
-        return run(part, base, results);
+        return run(part, base, results, runner, instructions);
     }
     let half = part.len() / 2;
     let border = part.point(half);
     let (part_a, part_b) = part.split_at(half);
-    let [results_a, results_b] = N::split_at(results, border - base);
+    let [results_a, results_b] = R::Sums::split_at(results, border - base);
     let half = |part, base, results| {
         let mut work = Some((part, results));
         move |broken_sums: &mut Vec<BrokenSums>| {
             if let Some((part, results)) = work.take() {
-                *broken_sums = split::<P, N>(part, base, results, leaf, run);
+                *broken_sums = split(part, base, results, runner, leaf, instructions);
             }
         }
     };
