@@ -50,7 +50,7 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Index of its condition.
+    /// Index of the condition that defines the load.
     pub fn condition(&self) -> usize {
         self.condition
     }
