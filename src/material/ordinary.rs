@@ -33,7 +33,7 @@ pub struct Ordinary {
     dimension: f64,
     /// κ = k′ − A/d², Pa.
     volumetric: f64,
-    /// A, Pa.
+    /// Constant A of the law, Pa.
     extensional: f64,
     /// m of an untruncated family, m⁵.
     whole: f64,
@@ -81,12 +81,12 @@ impl Ordinary {
         self.dimension
     }
 
-    /// κ, Pa.
+    /// Constant κ = k′ − A/d², Pa.
     pub fn volumetric(&self) -> f64 {
         self.volumetric
     }
 
-    /// A, Pa.
+    /// Constant A of the law, Pa.
     pub fn extensional(&self) -> f64 {
         self.extensional
     }

@@ -57,7 +57,7 @@ pub struct GlobalState {
     pub cracks: Vec<[f64; 2]>,
     /// State of each crack tip.
     pub tips: Vec<TipNow>,
-    /// Quantities of contact.
+    /// Contact quantities, of all contacts and by pair of bodies.
     pub contact: ContactNow,
     /// Fragments; empty if the history does not contain them.
     pub fragments: Fragments,
