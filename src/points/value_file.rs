@@ -108,7 +108,9 @@ pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<V
         let (before, count) = crate::comm::scan(comm, rows.len() as u64);
         if count > total {
             let path = file.path.display();
-            let message = format!("{path}: has {count} rows, must have at most one for each of the {total} points");
+            let message = format!(
+                "{path}: has {count} rows, must have at most one for each of the {total} points"
+            );
             return Err(Error::input(message).at(&file.span));
         }
         for ((id, _), number) in rows.iter_mut().zip(before..) {
@@ -119,11 +121,7 @@ pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<V
 }
 
 /// Parse the entries of a row. Without a column of ids, the id is 0.
-fn row(
-    columns: &ValueColumns,
-    entries: &[&str],
-    total: u64,
-) -> std::result::Result<Row, String> {
+fn row(columns: &ValueColumns, entries: &[&str], total: u64) -> std::result::Result<Row, String> {
     if entries.len() != columns.width {
         return Err(format!(
             "has {} entries, must have {} as the heading",
