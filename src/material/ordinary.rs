@@ -196,7 +196,7 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 /// Return the force state of bonds with an inelastic deviatoric extension. `extension_factor` is A/m and
-/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension over |ξ|.
+/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension divided by |ξ|.
 #[inline(always)]
 pub(super) fn eased_force<const D: usize>(
     bond: &Bond<D>,
