@@ -22,9 +22,9 @@ pub struct Neighbour {
 /// Accumulated message traffic of a rank.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// Messages sent.
+    /// Number of messages sent.
     pub messages: u64,
-    /// Bytes sent.
+    /// Number of bytes sent.
     pub bytes: u64,
     /// Communication time: sending, calls that drive progress, and waiting, without the overlapped work.
     pub time: Duration,

@@ -2,9 +2,8 @@
 //! only stretched bonds break.
 //!
 //! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work on a linear bond is w =
-//! ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η.
-//! Breaking all bonds across a unit area takes G0. In the plane G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ
-//! dz = (2/3) h δ³ w_c.
+//! ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the plane G0 = 2h ∫₀^δ
+//! ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
 
 use std::f64::consts::PI;
 
@@ -14,10 +13,11 @@ use crate::dimension::Dimension;
 /// Formula for w_c from the fracture energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Calibration {
-    /// Breaking all bonds across a unit area takes the fracture energy.
+    /// Breaking all bonds across a unit area dissipates the fracture energy.
     Energy,
-    /// Opening a crack takes the fracture energy: w_c of [`Self::Energy`] is divided by the separation energy
-    /// ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None` until then.
+    /// Opening a crack dissipates the fracture energy: w_c of [`Self::Energy`] is divided by the separation
+    /// energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None`
+    /// until then.
     Opening(Option<f64>),
     /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). Their
     /// w is the work on η, so it holds for small rotations only.
@@ -52,7 +52,7 @@ impl Calibration {
         }
     }
 
-    /// Return the energy per area that breaking all bonds takes, divided by the fracture energy.
+    /// Return the energy per area that breaking all bonds dissipates, divided by the fracture energy.
     pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         match (self, dimension) {

@@ -1,6 +1,8 @@
-//! Criteria that break bonds. Both ends of a bond decide with the same operations. Stretches are compared by
-//! x of [`crate::material::bond`], which needs no root; energies by the work of both force states; stresses by
-//! the mean of both points.
+//! Criteria that break bonds. Points i and j of a bond decide with the same operations.
+//!
+//! - Stretches are compared by x of [`crate::material::bond`], which needs no root.
+//! - Energies are compared by the work of both force states.
+//! - Stresses are compared by the mean of the stress measures of points i and j.
 
 use super::{StressMeasure, StressRule, ToughnessByDirection};
 use crate::lanes::simd::Task;
@@ -28,14 +30,16 @@ pub enum Criterion {
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
-    /// When the mean stress of the acting ends reaches this strength, Pa.
+    /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
+    /// stress measures of its acting ends.
     Stress(f64, StressRule),
-    /// As [`Self::Stress`], at the smaller strength of the two points.
+    /// Same as [`Self::Stress`], with the smaller strength of points i and j.
     StressThresholds(StressRule),
 }
 
-/// Toughness by direction of the bodies of points i and j; `None` if both are equally tough in all directions.
-/// It multiplies the thresholds of the points.
+/// Factors w_c/w of the critical work by direction, at points i and j. `None` if both bodies have the same
+/// fracture energy in all directions. The factors multiply work thresholds; their square roots multiply
+/// stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k
@@ -81,7 +85,7 @@ impl StretchConversion {
 /// Rule for the work of bonds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
-    /// Whether the criterion breaks pulled bonds only, or compressed bonds too.
+    /// Bonds that can break: stretched bonds only, or compressed bonds too.
     pub sense: Sense,
     /// Factor c from 0 to 1: work thresholds are multiplied by 1 + c (f − 1), with the
     /// [truncation factor](Law::truncation_factor) f.
@@ -100,17 +104,18 @@ pub enum WorkMeasure {
     Displacement,
 }
 
-/// Bonds that the criteria of energy and stress can break.
+/// Bonds that the energy and stress criteria can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
     /// Only bonds that are longer than in the undeformed body.
     Pulled,
-    /// Bonds that are longer, and compressed bonds too.
+    /// Stretched bonds and compressed bonds.
     Either,
 }
 
 impl Sense {
-    /// Combine the settings of two blocks for the bonds between them. Compressed bonds break if both say so.
+    /// Combine the settings of two blocks for the bonds between them. Compressed bonds break only if both
+    /// settings allow it.
     pub fn of_both(self, other: Self) -> Self {
         match self {
             Self::Either => other,
@@ -139,7 +144,7 @@ pub struct Limits {
     pub thresholds: Lanes,
     /// [`Law::truncation_factor`] of the points.
     pub truncation_factors: Lanes,
-    /// The measure of their stress that the criterion reads, Pa; −∞ for points that carry no stress.
+    /// Stress measure that the criterion reads, Pa; −∞ for points that carry no stress.
     pub stresses: Lanes,
 }
 
@@ -188,7 +193,7 @@ impl Criterion {
         }
     }
 
-    /// The measure of the stress of points that the criterion reads, if any.
+    /// Stress measure that the criterion reads, if any.
     #[inline(always)]
     pub fn stress_measure(&self) -> Option<StressMeasure> {
         match *self {
@@ -203,15 +208,16 @@ impl Criterion {
         matches!(*self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] above which the series are not used. Bonds below this limit do not
-    /// break by their stretch.
+    /// The |x| of [`crate::material::bond`] above which the series are not used. Bonds below this limit do
+    /// not break by their stretch.
     #[inline(always)]
     pub fn limit(&self) -> f64 {
         match *self {
             // `next_down` lowers the limit by one bit: only bonds above the limit are tested, and a bond at
             // exactly the critical stretch must break.
             Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
-            // The margin of 1e-12 covers the round-off by which this bound and the threshold of a bond differ.
+            // The margin of 1e-12 covers the round-off by which this bound and the threshold of a bond
+            // differ.
             Self::StretchBetween(critical, conversion) => {
                 let smallest = conversion.smallest(critical) * (1.0 - 1e-12);
                 NEAR.min(relative_square_extension_of(smallest))
@@ -367,9 +373,9 @@ impl Criterion {
     }
 }
 
-/// Computation of the mean stress (Pa) of the ends of each bond, and of a bit for each bond that has one.
-///
-/// An end takes part if the bond is within its horizon and its point carries stress. Both ends compute the same bits.
+/// Computation of the mean stress measure of the ends of each bond (Pa), and of one bit per bond that has at least
+/// one such end. An end counts if the bond is within its horizon and its point carries stress. Points i and j
+/// compute the same bits.
 struct MeanStress {
     stresses: [Lanes; 2],
     acting: [u8; 2],
@@ -434,8 +440,9 @@ impl<const D: usize> Task for DirectionFactors<'_, D> {
 }
 
 impl WorkRule {
-    /// Combine the rules of two blocks for the bonds between them. Compressed bonds break if both rules say
-    /// so. The smaller family correction is used. The work is objective if at least one rule says so.
+    /// Combine the rules of two blocks for the bonds between them. Compressed bonds break only if both rules
+    /// allow it. The smaller family correction is used. The work is objective if at least one rule requires
+    /// it.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             sense: self.sense.of_both(other.sense),

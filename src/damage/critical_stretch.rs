@@ -48,7 +48,7 @@ impl CriticalStretch {
     }
 
     /// Return s0 of an ordinary state-based law from the fracture energy G0 (J/m²) and the horizon δ (m).
-    /// Pulling a body apart at this stretch takes G0 per area.
+    /// Pulling a body apart with this critical stretch dissipates G0 per area.
     pub fn from_energy_ordinary(
         law: &Ordinary,
         influence: Influence,

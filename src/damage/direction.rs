@@ -1,12 +1,17 @@
-//! Toughness that depends on the direction of a crack, for laminates and wood.
+//! Fracture energy that depends on the direction of a crack, for laminates and wood.
 //!
-//! With a unit vector a of the undeformed body and the direction n of a bond, its critical work is
+//! With a unit vector a of the undeformed body and the direction n of a bond, the critical work of the bond
+//! is
 //!
-//! w_c(n) = w (p + q c^k),
+//! w_c(n) = w (p + q c^k).
 //!
-//! where w is that of an isotropic body with the fracture energy of cracks along a. If cracks across a take more,
-//! c = (n·a)²; if they take less, c = 1 − (n·a)². A crack with the normal N takes all bonds across it, which is the mean of
-//! w_c(n) over all directions with the weight |n·N|. The means of c^k are products over j = 1 … k:
+//! w is the critical work in an isotropic body with the fracture energy of cracks along a. Cracks along a
+//! have a normal perpendicular to a; cracks across a have the normal a. If cracks across a have the larger
+//! fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
+//!
+//! A crack with the normal N breaks all bonds that cross its plane. Its fracture energy is proportional to
+//! the mean of w_c(n) over all directions n with the weight |n·N|. The mean of c^k is a product over j = 1 …
+//! k of these factors:
 //!
 //! | c | N | plane | space |
 //! |---|---|---|---|
@@ -15,44 +20,44 @@
 //! | 1 − (n·a)² | along a | (2j − 1)/(2j + 1) | j/(j + 1) |
 //! | 1 − (n·a)² | across a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
 //!
-//! p and q follow from both fracture energies, with the smaller k = 1, 2 for which p is at least 0.1. Smaller p are
-//! rejected: bonds in the weak direction would break at small strains, far from any crack. A critical stretch is multiplied
-//! by the root of w_c/w.
+//! p and q follow from the fracture energies of cracks along and across a. k is 1 if p is then at least 0.1,
+//! otherwise 2. Fracture energies with p < 0.1 for k = 2 are rejected: bonds in the weak direction would
+//! break at small strains, far from any crack. A critical stretch is multiplied by √(w_c/w).
 
 use std::f64::consts::PI;
 
 use crate::lanes::{Lanes, Simd};
 
-/// Squarings of c: k is at most 2 to this power. With k = 4 and three spacings in a horizon, the few tough bonds hold the
-/// faces of cracks together.
+/// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, the few
+/// tough bonds hold the faces of cracks together.
 const MOST_SQUARINGS: u32 = 1;
 
-/// The smallest p.
+/// Minimum of p.
 const LEAST_BASE: f64 = 0.1;
 
-/// Round-off of p.
+/// Tolerance of [`LEAST_BASE`] for the round-off of p.
 const ROUNDING: f64 = 1e-12;
 
-/// Directions in a quarter of a circle, for sums over all directions.
+/// Number of directions per quarter of a circle, in sums over all directions.
 const DIRECTIONS: u32 = 256;
 
-/// Factor w_c/w of the critical work by the direction of a bond.
+/// Factor w_c/w of the critical work of a bond, as a function of the bond's direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToughnessByDirection {
-    /// a.
+    /// Unit vector a.
     axis: [f64; 3],
-    /// p.
+    /// Constant part p of w_c/w.
     base: f64,
-    /// q.
+    /// Factor q of c^k in w_c/w.
     share: f64,
-    /// k = 2^squarings.
+    /// Binary logarithm of k.
     squarings: u32,
-    /// Whether c = (n·a)².
+    /// Whether c is (n·a)². Otherwise, c is 1 − (n·a)².
     is_tough_across: bool,
 }
 
 impl ToughnessByDirection {
-    /// The same toughness in all directions.
+    /// The same fracture energy in all directions: w_c/w = 1.
     pub const NONE: Self = Self {
         axis: [0.0; 3],
         base: 1.0,
@@ -61,8 +66,8 @@ impl ToughnessByDirection {
         is_tough_across: true,
     };
 
-    /// Factor for a unit vector a and the fracture energy of cracks across a divided by that of cracks along a, in 2 or 3
-    /// dimensions; `None` beyond [`Self::limits`].
+    /// Create the factor in 2 or 3 dimensions from a unit vector a. `ratio` is the fracture energy of cracks
+    /// across a divided by that of cracks along a. `None` if `ratio` is beyond [`Self::limits`].
     pub fn new(dimension: usize, axis: [f64; 3], ratio: f64) -> Option<Self> {
         let is_tough_across = ratio >= 1.0;
         (0..=MOST_SQUARINGS).find_map(|squarings| {
@@ -79,7 +84,7 @@ impl ToughnessByDirection {
         })
     }
 
-    /// The smallest and the largest ratio of both fracture energies for which p is not too small.
+    /// Return the smallest and the largest `ratio` for which p is large enough.
     pub fn limits(dimension: usize) -> [f64; 2] {
         [false, true].map(|is_tough_across| {
             let [across, along] = means(dimension, is_tough_across, MOST_SQUARINGS);
@@ -87,7 +92,7 @@ impl ToughnessByDirection {
         })
     }
 
-    /// w_c/w of eight bonds; the same bits from both ends.
+    /// Compute w_c/w of eight bonds. Both ends of a bond compute the same bits.
     #[inline(always)]
     pub fn factor<S: Simd, const D: usize>(
         &self,
@@ -112,13 +117,14 @@ impl ToughnessByDirection {
         power * self.share + Lanes::splat(self.base)
     }
 
-    /// The fracture energy of cracks across a, divided by that of cracks along a.
+    /// Fracture energy of cracks across a, divided by that of cracks along a.
     pub fn ratio(&self, dimension: usize) -> f64 {
         let [across, _] = means(dimension, self.is_tough_across, self.squarings);
         self.base + self.share * across
     }
 
-    /// Fracture energy of cracks with a unit normal, divided by that of cracks along a; a sum over directions.
+    /// Fracture energy of cracks with a unit normal, divided by that of cracks along a. Computed as a sum
+    /// over directions.
     pub fn cost(&self, dimension: usize, normal: [f64; 3]) -> f64 {
         let quarter = f64::from(DIRECTIONS);
         let mut sums = [0.0; 2];
@@ -151,7 +157,8 @@ impl ToughnessByDirection {
     }
 }
 
-/// Means of c^k over the bonds across an area whose normal is along a and across it, k = 2^squarings.
+/// Return the means of c^k, k = 2^squarings, over the bonds that cross a plane. The first mean is for a
+/// normal along a, the second for a normal across a.
 fn means(dimension: usize, is_tough_across: bool, squarings: u32) -> [f64; 2] {
     let mut means = [1.0; 2];
     for j in 1..=1_u32 << squarings {

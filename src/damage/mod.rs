@@ -23,7 +23,7 @@ pub enum DamageLaw {
     CriticalStretch(CriticalStretch),
     /// Bonds break by the work of their force states.
     BondEnergy(BondEnergy),
-    /// By the stress of points.
+    /// Bonds break by the stress of their points.
     Stress(StressLimit),
 }
 
@@ -46,7 +46,7 @@ impl DamageLaw {
         }
     }
 
-    /// The factor [`WorkRule::family_correction`]; 0 for the stretch criterion.
+    /// The factor [`WorkRule::family_correction`]; 0 for the criteria of stretch and stress.
     pub fn family_correction(&self) -> f64 {
         match self {
             Self::CriticalStretch(_) | Self::Stress(_) => 0.0,
@@ -54,7 +54,7 @@ impl DamageLaw {
         }
     }
 
-    /// Whether bonds break by work without the part of rigid rotation ([`WorkMeasure::Objective`]).
+    /// Whether bonds break by the work of deformation without rigid rotation ([`WorkMeasure::Objective`]).
     pub fn is_objective_work(&self) -> bool {
         match self {
             Self::CriticalStretch(_) | Self::Stress(_) => false,
@@ -62,7 +62,7 @@ impl DamageLaw {
         }
     }
 
-    /// The measure of the stress that breaks bonds, if stress breaks them.
+    /// Stress measure that breaks bonds; `None` for the other criteria.
     pub fn stress_measure(&self) -> Option<StressMeasure> {
         match self {
             Self::Stress(law) => Some(law.rule.measure),

@@ -1,8 +1,9 @@
-//! A bond breaks for good when the stress of its points reaches a strength.
+//! Stress criterion: a bond breaks irreversibly when the stress at its ends reaches a strength.
 //!
-//! The stress is a measure of the Cauchy stress of a point, σ = P Fᵀ/det F, with the deformation gradient F of its family
-//! and the stress across plane bodies. A bond compares the mean over its ends with the strength. The energy that a crack
-//! takes then follows from strength and horizon.
+//! The criterion reads a scalar measure of the Cauchy stress σ = P Fᵀ/det F of a point. F is the deformation
+//! gradient of the point's family. In plane problems, σ and det F include the direction perpendicular to the
+//! plane. The mean of the measures at points i and j is compared with the strength. Strength and horizon
+//! determine the energy per area that a growing crack dissipates.
 
 use nalgebra::Matrix3;
 
@@ -13,9 +14,9 @@ use crate::material::eigenvalues;
 /// Scalar measure of a Cauchy stress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StressMeasure {
-    /// √(3/2 s:s) of the deviator s.
+    /// Von Mises stress √(3/2 s:s), with the deviator s.
     VonMises,
-    /// The largest principal stress, positive in tension.
+    /// Largest principal stress, positive in tension.
     Principal,
 }
 
@@ -23,7 +24,7 @@ impl StressMeasure {
     /// All measures, in the order of [`Self::index`].
     pub const ALL: [Self; 2] = [Self::VonMises, Self::Principal];
 
-    /// Its index in [`Self::ALL`].
+    /// Index of the measure in [`Self::ALL`].
     pub fn index(self) -> usize {
         match self {
             Self::VonMises => 0,
@@ -31,7 +32,7 @@ impl StressMeasure {
         }
     }
 
-    /// Its name in reports.
+    /// Name of the measure in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::VonMises => "von Mises stress",
@@ -39,7 +40,7 @@ impl StressMeasure {
         }
     }
 
-    /// The measure of a symmetric stress, in the unit of the stress.
+    /// Compute the measure of a symmetric stress tensor, in the unit of the tensor.
     pub fn of(self, stress: &Matrix3<f64>) -> f64 {
         match self {
             Self::VonMises => {
@@ -52,18 +53,18 @@ impl StressMeasure {
     }
 }
 
-/// How the stress of points breaks bonds.
+/// Rule for bonds that break by the stress of their points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StressRule {
-    /// The measure that is compared with the strength.
+    /// Measure of the stress that is compared with the strength.
     pub measure: StressMeasure,
-    /// Which bonds break.
+    /// Bonds that can break: stretched bonds only, or compressed bonds too.
     pub sense: Sense,
 }
 
 impl StressRule {
-    /// The rule of bonds between points with this and another rule of the same measure: a pressed bond breaks where both
-    /// say so.
+    /// Combine the rules of two blocks with the same measure, for the bonds between them. Compressed bonds
+    /// break only if both rules allow it.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             sense: self.sense.of_both(other.sense),
@@ -72,12 +73,12 @@ impl StressRule {
     }
 }
 
-/// The law with its constants.
+/// The constants of the criterion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StressLimit {
-    /// The stress at which bonds break, Pa.
+    /// Strength: stress at which bonds break, Pa.
     pub strength: f64,
-    /// How the stress is compared with it.
+    /// Measure of the stress, and bonds that can break.
     pub rule: StressRule,
 }
 

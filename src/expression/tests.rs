@@ -509,7 +509,8 @@ impl Tree {
         }
     }
 
-    /// Return the text, with parentheses around every operand or only around those that need them.
+    /// Return the text. If `minimal`, parentheses enclose only the operands that need them; otherwise, all
+    /// operands.
     fn text(&self, names: &[&str; 4], minimal: bool) -> String {
         let operand = |tree: &Self, needed: bool| {
             let text = tree.text(names, minimal);

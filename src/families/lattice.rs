@@ -16,7 +16,7 @@ use super::offset::{Offset, offsets};
 use super::store::{Store, bit_bytes};
 use super::vectors::{LatticeTables, Vector, Vectors, vectors};
 
-/// Number of vectors that one task sets up.
+/// Number of lane groups that one task sets up.
 const CHUNK: usize = 256;
 
 /// The bonds from points i of one block to points j of one block, both on the same grid.
@@ -44,7 +44,7 @@ pub struct BondLattice {
     /// Shift for each line of the grid and each line offset: the difference between the slots of points with
     /// equal x in both lines.
     shifts: Vec<i32>,
-    /// State of the bonds: a group for each vector and offset.
+    /// State of the bonds: a group of eight bonds for each lane group and offset.
     pub(super) store: Store,
     bonds: u64,
 }
@@ -108,7 +108,7 @@ impl BondLattice {
         Ok(lattice)
     }
 
-    /// Set the bits of all bonds, and remove vectors without bonds.
+    /// Set the bits of all bonds, and remove lane groups without bonds.
     fn find_bonds(&mut self) {
         let count = self.offsets.len().max(1);
         let mut intact = vec![0; self.vectors.len() * count];
@@ -141,7 +141,7 @@ impl BondLattice {
         self.store.intact = intact;
     }
 
-    /// Compute the bits of a vector's bonds, intact or broken.
+    /// Compute the bits of the bonds of a lane group, intact or broken.
     fn family(&self, vector: &Vector, bits: &mut [u8]) {
         let grid = &*self.grid;
         let line = &grid.lines[vector.line as usize];
@@ -203,7 +203,7 @@ impl BondLattice {
             .partition_point(|vector| (vector.point as usize) < limit)
     }
 
-    /// The vectors of a range.
+    /// Return a range of lane groups.
     pub fn vectors(&mut self, range: Range<usize>) -> Vectors<'_> {
         let count = self.offsets.len();
         let bits = range.start * count..range.end * count;
@@ -238,13 +238,13 @@ impl BondLattice {
         }
     }
 
-    /// The bits of a vector's intact bonds.
+    /// Return the bits of the intact bonds of the lane group with index `vector`.
     fn intact(&self, vector: usize) -> &[u8] {
         let count = self.offsets.len();
         &self.store.intact[vector * count..(vector + 1) * count]
     }
 
-    /// Call `visit(group, lane, [i, j])` for each set bit of one vector.
+    /// Call `visit(group, lane, [i, j])` for each set bit of the lane group with index `vector`.
     fn for_each_of(
         &self,
         bits: impl Iterator<Item = u8>,
@@ -267,13 +267,13 @@ impl BondLattice {
         }
     }
 
-    /// The vector of a point, if the point has bonds.
+    /// Index of the lane group of a point; `None` if the point has no bonds.
     fn vector_of(&self, point: usize) -> Option<usize> {
         let k = self.vectors_below(point + 1).checked_sub(1)?;
         (point < self.points_of(k).end).then_some(k)
     }
 
-    /// The points of a vector up to the last one with bonds.
+    /// Local indices of the points of a lane group, up to the last point with bonds.
     fn points_of(&self, vector: usize) -> Range<usize> {
         let vector = &self.vectors[vector];
         let first = vector.point as usize;
@@ -354,7 +354,8 @@ impl BondLattice {
         bit_bytes(self.offsets.len()) + self.offsets.len() * self.store.history_bytes_per_bond()
     }
 
-    /// Call `visit(point, vector, lane)` for each point with bonds.
+    /// Call `visit(point, vector, lane)` for each point with bonds. The arguments are the local index, the
+    /// index of its lane group, and its lane.
     pub fn for_each_point(&self, mut visit: impl FnMut(usize, usize, usize)) {
         for (k, vector) in self.vectors.iter().enumerate() {
             for lane in (0..WIDTH).filter(|lane| vector.members >> lane & 1 == 1) {
@@ -392,7 +393,7 @@ impl BondLattice {
         }
     }
 
-    /// The bits of all bonds, intact or broken. There is a byte for each vector and offset.
+    /// Compute the bits of all bonds, intact or broken. There is a byte for each lane group and offset.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
         let mut filled = vec![0; self.store.intact.len()];

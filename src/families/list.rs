@@ -324,7 +324,7 @@ impl<'a> Rows<'a> {
         (first, second)
     }
 
-    /// One row.
+    /// Return the row with index `row`.
     #[inline(always)]
     pub fn row(&mut self, row: usize) -> Row<'_> {
         let groups = self.starts[row] - self.starts[0]..self.starts[row + 1] - self.starts[0];

@@ -17,7 +17,7 @@ const IN_FULL: u32 = 1 << 31;
 /// A group of eight indices.
 #[derive(Debug, Clone, Copy)]
 struct Compact {
-    /// The lowest index.
+    /// Smallest of the eight indices; with [`IN_FULL`], an index into the full groups.
     first: u32,
     /// Differences from the lowest index.
     differences: [u16; WIDTH],
@@ -47,7 +47,7 @@ pub enum Group<'a> {
 }
 
 impl Neighbours {
-    /// Append a group.
+    /// Append a group of eight neighbour indices.
     pub fn push(&mut self, indices: [u32; WIDTH]) {
         let first = indices.into_iter().fold(u32::MAX, u32::min);
         assert!(first < IN_FULL, "too many points for one rank");
@@ -105,7 +105,7 @@ impl Neighbours {
         }
     }
 
-    /// All groups.
+    /// View of all groups.
     pub fn all(&self) -> NeighbourGroups<'_> {
         self.groups(0..self.len())
     }
@@ -115,7 +115,7 @@ impl Neighbours {
         self.all().group(group).indices()
     }
 
-    /// The largest index.
+    /// Largest index of all groups; `None` without groups.
     pub fn largest(&self) -> Option<u32> {
         let largest = |group: usize| self.indices(group).into_iter().fold(0, u32::max);
         (0..self.len()).into_par_iter().map(largest).max()
@@ -154,7 +154,7 @@ impl<'a> NeighbourGroups<'a> {
         [self.range(0..group), self.range(group..self.len())]
     }
 
-    /// One group.
+    /// Return the group with index `group`.
     #[inline(always)]
     pub fn group(self, group: usize) -> Group<'a> {
         let compact = &self.compact[group];

@@ -14,7 +14,7 @@ pub struct Store {
     pub(super) breakable: Option<Vec<u8>>,
     /// Number of history values per bond.
     width: usize,
-    /// History values: `width` vectors per group.
+    /// History values of the bonds: `width` entries of eight lanes per group.
     history: Vec<Lanes>,
 }
 

@@ -1,4 +1,8 @@
-//! Lane groups of a lattice: vectors of up to eight points adjacent along x.
+//! Lane groups of a lattice.
+//!
+//! A lane group is a group of up to eight points of a grid that are adjacent along x. They have consecutive
+//! slots and consecutive local indices. The bonds of a lane group at one offset are computed together, one
+//! point per lane. In the code, a lane group is a `Vector`.
 
 use std::ops::Range;
 
@@ -8,7 +12,7 @@ use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
-/// Up to eight points that are adjacent along x. Slot, local index and line are those of the first point.
+/// A lane group. Slot, local index and line are those of its first point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
     pub(super) slot: u32,
@@ -18,7 +22,7 @@ pub(super) struct Vector {
     pub(super) members: u8,
 }
 
-/// The bonds of up to eight adjacent points.
+/// The bonds of a lane group.
 pub struct VectorBonds<'a> {
     /// Slot of the first point.
     pub slot: usize,
@@ -26,7 +30,8 @@ pub struct VectorBonds<'a> {
     pub point: usize,
     /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Range of this vector's groups among those of all vectors, in the order of `BondLattice::whole`.
+    /// Range of the groups of bonds of this lane group among those of all lane groups, in the order of
+    /// `BondLattice::whole`.
     pub bits: Range<usize>,
     /// The offsets of the lattice.
     pub offsets: &'a [Offset],
@@ -37,11 +42,11 @@ pub struct VectorBonds<'a> {
     shifts: &'a [i32],
 }
 
-/// A range of vectors that can be split between threads.
+/// A range of lane groups that can be split between threads.
 pub struct Vectors<'a> {
     pub(super) lattice: LatticeTables<'a>,
     pub(super) vectors: &'a [Vector],
-    /// Index of the first vector.
+    /// Index of the first lane group.
     pub(super) first: usize,
     pub(super) groups: Groups<'a>,
 }
@@ -56,7 +61,7 @@ pub(super) struct LatticeTables<'a> {
     pub(super) lines: usize,
 }
 
-/// Create the vectors of a grid, sorted by local index. All their points are members at first.
+/// Create the lane groups of a grid, sorted by local index. All their points are members at first.
 pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
     let mut vectors: Vec<Vector> = Vec::new();
     let mut line = 0;
@@ -91,22 +96,22 @@ pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
 }
 
 impl<'a> Vectors<'a> {
-    /// Number of vectors.
+    /// Number of lane groups in the range.
     pub fn len(&self) -> usize {
         self.vectors.len()
     }
 
-    /// Whether the range has no vectors.
+    /// Whether the range has no lane groups.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }
 
-    /// The local index of a vector's first point.
+    /// Local index of the first point of a lane group.
     pub fn point(&self, vector: usize) -> usize {
         self.vectors[vector].point as usize
     }
 
-    /// Split before `vector`.
+    /// Split the range before the lane group with index `vector`.
     pub fn split_at(self, vector: usize) -> (Self, Self) {
         let bits = vector * self.lattice.offsets.len();
         let (vectors_a, vectors_b) = self.vectors.split_at(vector);
@@ -126,7 +131,7 @@ impl<'a> Vectors<'a> {
         (first, second)
     }
 
-    /// The bonds of one vector.
+    /// Return the bonds of the lane group with index `vector`.
     #[inline(always)]
     pub fn vector(&mut self, vector: usize) -> VectorBonds<'_> {
         let LatticeTables {

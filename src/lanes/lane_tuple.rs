@@ -21,7 +21,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Create the tuple by calling `value` with the index of each quantity.
     fn each(value: impl FnMut(usize) -> Lanes) -> Self;
 
-    /// Get a quantity.
+    /// Return the quantity with this index.
     fn get(&self, quantity: usize) -> Lanes;
 
     /// Get a quantity for writing.

@@ -61,7 +61,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
 /// that is compiled without these instructions. If the compiler does not inline a large closure, every vector
 /// operation in it is a call.
 pub trait Task {
-    /// The result.
+    /// Type of the result.
     type Output;
 
     /// Run the task.

@@ -46,7 +46,7 @@ pub struct Declaration {
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
     /// Whether the law scales the critical stretch of each bond, with these values of its keys.
     pub scales_thresholds: fn(&Values) -> bool,
-    /// Create the law.
+    /// Create the law from the constants of one body.
     pub build: fn(&Given) -> Built,
     /// Examples for the tests: keys in addition to density and Young's modulus.
     pub examples: &'static [&'static str],
@@ -141,7 +141,7 @@ pub struct Key {
     pub name: &'static str,
     /// Meaning of the key's value, with unit.
     pub meaning: &'static str,
-    /// The allowed values.
+    /// Type of the value, with its allowed range and its default.
     pub kind: Kind,
 }
 
@@ -157,7 +157,7 @@ pub enum Kind {
         /// Default; `None` if the key is required.
         default: Option<f64>,
     },
-    /// An optional number.
+    /// A number that may be missing and has no default.
     Optional {
         /// The allowed range.
         range: Range<f64>,
@@ -288,7 +288,7 @@ impl Values {
 pub struct Given<'a> {
     /// Dimension of the problem.
     pub dimension: Dimension,
-    /// Elastic constants.
+    /// Isotropic elastic constants of the body.
     pub elastic: Isotropic,
     /// Horizon δ, m.
     pub horizon: f64,
@@ -306,7 +306,7 @@ pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
 
 /// A law with the data that the loops over bonds do not read.
 pub struct Built {
-    /// The law.
+    /// The law that the loops over bonds call.
     pub law: AnyLaw,
     /// Influence function: factor on a bond of a length (m) in all sums of a point; `None` for 1.
     pub influence: Option<Box<dyn Fn(f64) -> f64 + Sync>>,

@@ -53,10 +53,11 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Critical stretch s0 at which breaking takes the energy of an elastic bond with the critical stretch s_e.
+/// Critical stretch s0 at which breaking a bond dissipates the energy of an elastic bond with the critical
+/// stretch s_e.
 ///
-/// Breaking takes c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore s0 =
-/// s_e²/(2 s_y) + s_y/2.
+/// Breaking dissipates c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
+/// s0 = s_e²/(2 s_y) + s_y/2.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let elastic = bond_based_critical_stretch(given, energy);
     let limit = given.values.number(YIELD_STRETCH.name);

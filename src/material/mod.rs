@@ -89,14 +89,14 @@ impl fmt::Display for Property {
     }
 }
 
-/// The stress of a point whose law has a deformation gradient per point.
+/// Deformation and stress of a point, for laws with a deformation gradient per point.
 #[derive(Debug, Clone, Copy)]
 pub struct FamilyStress<const D: usize> {
     /// Displacement gradient H = F − I.
     pub gradient: SMatrix<f64, D, D>,
     /// First Piola–Kirchhoff stress P, Pa.
     pub piola: SMatrix<f64, D, D>,
-    /// Plastic state at this gradient.
+    /// Plastic state of the point at this gradient, after flow.
     pub plastic: PlasticState,
 }
 
@@ -197,9 +197,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the values
-    /// that only the law reads ([`Self::OWN_NUMBERS`]). A plastic state that plastic flow has changed is
-    /// stored only at the end of a step.
+    /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the
+    /// values that only the law reads ([`Self::OWN_NUMBERS`]). A plastic state that plastic flow has changed
+    /// is stored only at the end of a step.
     fn update_point(
         &self,
         _pass: usize,
@@ -242,8 +242,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// N/m⁷.
     fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
-    /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. The results of
-    /// both ends are equal to the last bit, except for the sign. Laws may override this function to save
+    /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. The results
+    /// of both ends are equal to the last bit, except for the sign. Laws may override this function to save
     /// operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
@@ -284,8 +284,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         rotation::IDENTITY
     }
 
-    /// The stress of a point, from the sums of the first pass, its numbers and its plastic state before or after flow; for
-    /// laws with a deformation gradient per point. `None` where a point carries no stress.
+    /// Compute the stress of a point, for laws with a deformation gradient per point. `None` if the point
+    /// carries no stress. The arguments are the sums of the first pass, the point numbers, and the plastic
+    /// state before or after the flow of a step.
     fn family_stress(
         &self,
         _sums: &[f64],

@@ -33,7 +33,7 @@ pub struct Ordinary {
     dimension: f64,
     /// κ = k′ − A/d², Pa.
     volumetric: f64,
-    /// A, Pa.
+    /// Constant A of the law, Pa.
     extensional: f64,
     /// m of an untruncated family, m⁵.
     whole: f64,
@@ -81,12 +81,12 @@ impl Ordinary {
         self.dimension
     }
 
-    /// κ, Pa.
+    /// Constant κ = k′ − A/d², Pa.
     pub fn volumetric(&self) -> f64 {
         self.volumetric
     }
 
-    /// A, Pa.
+    /// Constant A of the law, Pa.
     pub fn extensional(&self) -> f64 {
         self.extensional
     }
@@ -196,7 +196,7 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 /// Return the force state of bonds with an inelastic deviatoric extension. `extension_factor` is A/m and
-/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension over |ξ|.
+/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension divided by |ξ|.
 #[inline(always)]
 pub(super) fn eased_force<const D: usize>(
     bond: &Bond<D>,

@@ -17,10 +17,9 @@
 //! Therefore s0 is chosen such that the tensile strength f_t is the largest stress in uniaxial tension. This
 //! stress is computed by quadrature over the directions of the bonds.
 //!
-//! Stretching a bond to sc takes c |ξ| A with A = ∫ F dκ. Breaking a `pmb` bond at the stretch s_e takes c
-//! |ξ| s_e²/2.
-//! With A = s_e²/2 the bonds across a unit area take the fracture energy for which s_e is the critical
-//! stretch of `pmb`. This holds in every dimension.
+//! Stretching a bond to sc dissipates c |ξ| A with A = ∫ F dκ. Breaking a `pmb` bond at the stretch s_e
+//! dissipates c |ξ| s_e²/2. With A = s_e²/2, the bonds across a unit area dissipate the fracture energy for
+//! which s_e is the critical stretch of `pmb`. This holds in every dimension.
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -10,7 +10,7 @@ use crate::points::Point;
 /// 3. ghosts, grouped by owner and sorted by id.
 #[derive(Debug, Default)]
 pub struct Domain {
-    /// All local points.
+    /// The local points: owned points, then ghosts.
     pub points: Vec<Point>,
     /// Number of interior points.
     pub interior: usize,
@@ -20,7 +20,7 @@ pub struct Domain {
     pub total: u64,
     /// Extent of the points of all ranks per direction, m.
     pub extent: [f64; 3],
-    /// The halo plan.
+    /// Plan of the exchange between ghosts and their owners.
     pub halo: Halo,
 }
 

@@ -101,13 +101,13 @@ impl Columns {
 /// Layout of the rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// The columns.
+    /// Index of the column of each quantity.
     pub columns: Columns,
     /// Offset of the heading in bytes; `None` if the file has no heading.
     pub heading: Option<u64>,
 }
 
-/// An invalid heading.
+/// Error in the heading of a point file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HeadingError {
     /// Line of the heading, from 1.

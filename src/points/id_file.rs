@@ -8,8 +8,8 @@ use crate::error::excerpt;
 /// Maximum length of a file, bytes.
 const LONGEST: u64 = 1 << 32;
 
-/// Read ids from a file. The returned ids are counted from 0, sorted, and without repeats. `first` is the number
-/// that the file uses for the first point.
+/// Read ids from a file. The returned ids are counted from 0, sorted, and without repeats. `first` is the
+/// number that the file uses for the first point.
 ///
 /// Numbers are separated by white space or commas. Comments and a heading are skipped.
 ///

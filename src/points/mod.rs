@@ -49,7 +49,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// Create a point.
+    /// Create a point with its id, reference position (m), volume (m³) and the index of its block.
     pub fn new(id: u64, position: [f64; 3], volume: f64, block: usize) -> Self {
         Self {
             id,

@@ -34,7 +34,8 @@ struct CellBox {
     end: [i64; 3],
 }
 
-/// A range of layers along one direction that have the same cells in the lower directions.
+/// Consecutive layers along one direction that contain the same cells in the lower directions. The order of
+/// directions is x, y, z.
 #[derive(Debug)]
 struct Span {
     first: i64,
@@ -142,7 +143,7 @@ fn cells(
     Some(cells)
 }
 
-/// The union of boxes as spans in this direction and the lower ones.
+/// Compute the union of boxes as spans along `direction`, with nested spans along the lower directions.
 fn spans_along(boxes: &[&CellBox], direction: usize) -> Vec<Span> {
     let span = |cells: &CellBox| [cells.first[direction], cells.end[direction]];
     let mut spans: Vec<[i64; 2]> = boxes.iter().map(|cells| span(cells)).collect();

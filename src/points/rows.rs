@@ -9,10 +9,10 @@ use crate::error::{Error, Result};
 
 use super::columns::{BYTE_ORDER_MARK, LONGEST_ROW, entries, is_comment};
 
-/// What reading one part of a file found, besides its rows.
+/// Result of reading one part of a file, without the rows.
 #[derive(Default)]
 pub struct Part {
-    /// Number of lines, with comments and empty lines.
+    /// Number of lines in the part, including comments and empty lines.
     lines: u64,
     /// The first invalid row: its line within the part, from 0, and the message.
     error: Option<(u64, String)>,
@@ -102,10 +102,10 @@ fn of_row(
 }
 
 impl Part {
-    /// Check the parts of all ranks, in the order of ranks. Collective.
+    /// Return an error if a part of any rank has an invalid row. Collective.
     ///
     /// # Errors
-    /// The message gives file and line of the first invalid row.
+    /// The message names the file and the line of the first invalid row.
     pub fn check(self, path: &Path, comm: &dyn Communicator) -> Result<()> {
         let (lines_before, _) = scan(comm, self.lines);
         let checked = match self.error {

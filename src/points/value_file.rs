@@ -16,10 +16,10 @@ const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
 /// Name of the column with the ids of the points, from 0.
 const ID: &str = "id";
 
-/// Columns of the file.
+/// Columns of a file of initial values.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ValueColumns {
-    /// Number of columns.
+    /// Number of columns, and so of entries per row.
     pub width: usize,
     /// Offset of the heading in bytes.
     pub heading: u64,
@@ -32,12 +32,12 @@ pub struct ValueColumns {
 }
 
 impl ValueColumns {
-    /// Whether the file has a displacement.
+    /// Whether the file has a column of displacements.
     pub fn has_displacement(&self) -> bool {
         self.displacement.iter().any(Option::is_some)
     }
 
-    /// Whether the file has a velocity.
+    /// Whether the file has a column of velocities.
     pub fn has_velocity(&self) -> bool {
         self.velocity.iter().any(Option::is_some)
     }
@@ -120,7 +120,7 @@ pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<V
     Ok(rows)
 }
 
-/// Parse a row.
+/// Parse the entries of a row. Without a column of ids, the id is 0.
 fn row(columns: &ValueColumns, entries: &[&str], total: u64) -> std::result::Result<Row, String> {
     if entries.len() != columns.width {
         return Err(format!(

@@ -1,4 +1,4 @@
-//! Detection of nodes that have coarser nodes within a distance.
+//! Search for nodes of a level that have nodes of coarser levels within a distance.
 
 use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
@@ -10,7 +10,8 @@ pub struct AtCoarser<'a> {
     level: u32,
     /// The nodes of the level that are not nodes of level 0.
     finer: GridIndexSet,
-    /// The bits of a word that lie on the grid of level 0. They are the same for all words with such bits.
+    /// Bits of a word whose indices lie on the grid of level 0. All words with such indices have the same
+    /// bits.
     coarsest: u64,
     /// For each bit of a word, the neighbouring words and their bits within the distance.
     reach: Vec<Vec<(GridIndex, u64)>>,
@@ -62,8 +63,8 @@ impl<'a> AtCoarser<'a> {
         }
     }
 
-    /// Test whether a coarser node lies within the distance of `index`. This is the case if a node of the
-    /// level is possible at an index within the distance, but does not exist.
+    /// Test whether a coarser node lies within the distance of `index`. This is true if an index within the
+    /// distance could have a node of the level but has none.
     ///
     /// `body` tests whether a cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {

@@ -46,7 +46,7 @@ impl Pattern {
         }
     }
 
-    /// The finest level.
+    /// The finest refinement level that nodes can have.
     pub fn finest(&self) -> u32 {
         self.refined.len() as u32
     }

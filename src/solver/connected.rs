@@ -13,8 +13,8 @@ impl<const D: usize> Simulation<'_, D> {
         self.spread_least_over(pieces, columns);
     }
 
-    /// Set each column over the local points to its minimum over the points of a piece; pieces of different
-    /// ranks are connected if they contain the same point. Collective.
+    /// Replace each entry of columns over the local points by the minimum over the piece of its point. Pieces
+    /// of different ranks are connected if they contain the same point. Collective.
     pub(super) fn spread_least_over(&mut self, mut pieces: Pieces, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
         loop {
@@ -49,7 +49,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Connected local points, as trees.
+/// Disjoint sets of connected local points. Entry k is the parent of point k in the tree of its set.
 pub(super) struct Pieces(Vec<usize>);
 
 impl Pieces {

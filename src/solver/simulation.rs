@@ -40,7 +40,7 @@ pub struct Simulation<'a, const D: usize> {
     pub problem: &'a Problem,
     /// Communication with the other ranks.
     pub comm: &'a dyn Communicator,
-    /// The points.
+    /// The local points: positions, volumes and blocks.
     pub model: Model<D>,
     /// The fields of the points.
     pub fields: Fields<D>,
@@ -123,8 +123,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Create and distribute the points and bonds, and evaluate the forces at time 0.
     ///
     /// # Errors
-    /// If the points cannot be created, if a set of a condition is empty, if there is no stable step, or if no
-    /// support holds a loaded piece in load steps. The error is the same on all ranks.
+    /// If the points cannot be created, if a set of a condition is empty, if there is no stable step, or if
+    /// no support holds a loaded piece in load steps. The error is the same on all ranks.
     pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }

@@ -26,7 +26,7 @@ const CONVERGED: f64 = 1e-32;
 
 /// Elastic trial state of a point, before any flow.
 struct Trial {
-    /// F⁻¹.
+    /// Inverse deformation gradient F⁻¹.
     inverse: Matrix3<f64>,
     /// Eigenvalues b_a.
     squares: Vector3<f64>,

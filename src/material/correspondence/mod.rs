@@ -207,21 +207,22 @@ fn row<S: Simd, const D: usize>(
     sum
 }
 
-/// What follows from the deformation gradient of a family.
+/// Quantities of a point that follow from the deformation gradient of its family.
 struct Family<const D: usize> {
-    /// K⁻¹, m⁻⁵.
+    /// Inverse shape tensor K⁻¹, m⁻⁵.
     inverse: SMatrix<f64, D, D>,
-    /// H.
+    /// Displacement gradient H.
     gradient: SMatrix<f64, D, D>,
-    /// P, Pa.
+    /// First Piola–Kirchhoff stress P, Pa.
     stress: SMatrix<f64, D, D>,
-    /// W, J/m³.
+    /// Strain energy density W, J/m³.
     energy: f64,
 }
 
 impl Correspondence {
-    /// The stress of a point from the sums of the first pass and the spring constant of the whole family (N/m⁷), after
-    /// flow, which changes the state; `None` where the family has too few bonds or the law has no stress.
+    /// Compute K⁻¹, H, P and W of a point, and update its plastic state. `sums` are the sums of the first
+    /// pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if the family has too few
+    /// bonds, or if the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],

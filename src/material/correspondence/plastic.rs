@@ -381,8 +381,8 @@ mod tests {
             assert!(flow.trace().abs() < 1e-16);
             if state != before {
                 assert!(over > -1e-12, "{over}");
-                // The increment of the plastic strain is along the deviator; its length gives the increment of
-                // the equivalent strain.
+                // The increment of the plastic strain is along the deviator; its length gives the increment
+                // of the equivalent strain.
                 let growth = state.equivalent - before.equivalent;
                 let wanted = deviator(&stress) * (1.5 * growth / equivalent(&stress));
                 assert!((flow - wanted).norm() < 1e-9 * growth);

@@ -9,7 +9,7 @@ use super::tensor::{Number, Tensor, contracted, matrix, rows, tensor};
 use crate::dimension::Dimension;
 use crate::lanes::{Lanes, WIDTH};
 
-/// The stress law.
+/// Law for the first Piola–Kirchhoff stress P and the strain energy density W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stress {
     /// P = F S, S = C : E with E = ½ (FᵀF − I). It derives from an energy and is objective.

@@ -152,8 +152,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     Err(Error::input(message).at(&body.span))
 }
 
-/// Return an error if the bonds of a body break by their energy and another setting is incompatible with
-/// this.
+/// Return an error if the damage of a body is incompatible with the damage of a body that it may be bonded
+/// to, or with another setting.
 fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());

@@ -77,11 +77,11 @@ pub struct Acting<'a, const D: usize> {
     pub plastic: PlasticColumns<'a>,
 }
 
-/// Fields of the owned points that point values depend on.
+/// Fields of the owned points from which point values are computed.
 pub(super) struct AtPoints<'a, 'b> {
-    /// Plastic state; changed only in a step.
+    /// Plastic states; only an evaluation at the end of a step changes them.
     pub plastic: &'a mut PlasticColumns<'b>,
-    /// Thermal stretches, if there are any.
+    /// Thermal stretches; `None` in runs without temperatures.
     pub thermal_stretch: Option<&'a [f64]>,
 }
 
@@ -171,9 +171,9 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Return the first point, from `from` on, that starts a new lane group. If a lattice vector were cut,
-    /// its last points would get their bond contributions in another order. The round-off of their sums
-    /// would then depend on when messages arrive.
+    /// Return the first point, from `from` on, that starts a new lane group. If a lane group were cut, its
+    /// last points would get their bond contributions in another order. The round-off of their sums would
+    /// then depend on when messages arrive.
     pub(super) fn border(&self, from: usize) -> usize {
         let end = self.lane_group(from - 1).end;
         if end == from { from } else { self.border(end) }
@@ -221,7 +221,7 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// Return the content of each message to ghosts in a force evaluation, with its number of columns. If bonds
+    /// Return the name and the number of columns of each message to ghosts in a force evaluation. If bonds
     /// break, the point numbers are sent a second time.
     pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
         let mut thermal_stretch = Vec::new();
@@ -363,7 +363,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Compute the thresholds or point numbers of some points from the sums of a pass.
+    /// Compute the thresholds, or the point numbers, rotations and stress measures, of some points from the
+    /// sums of a pass.
     pub(super) fn finish(
         &mut self,
         pass: Pass,

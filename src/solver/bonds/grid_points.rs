@@ -90,7 +90,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the stresses of some of the local points.
+    /// Copy the stress measures of some of the local points.
     pub fn update_stresses(&mut self, which: Which, stresses: &[Column]) {
         for (places, values) in self.limits.stresses.iter_mut().zip(stresses) {
             if !values.is_empty() {
@@ -282,7 +282,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// Load eight adjacent points i, starting at a slot.
     ///
     /// # Safety
-    /// `place` must be the slot of a vector of the grid.
+    /// `place` must be the slot of the first point of a lane group of the grid.
     #[inline(always)]
     pub unsafe fn load_point_i(&self, place: usize) -> PointI<K::Point, K::Rotation, D> {
         // SAFETY: `new` has checked the lengths.
@@ -297,11 +297,11 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// Load the bonds of a vector at one offset. `FAST_PATH` omits the data of the criterion and, for bonds
-    /// beyond the series limit, the extensions.
+    /// Load the bonds of a lane group at one offset. `FAST_PATH` omits the data of the criterion and, for
+    /// bonds beyond the series limit, the extensions.
     ///
     /// # Safety
-    /// The vector must belong to the grid, and the offset to the vector.
+    /// The lane group must belong to the grid, and the offset to the lane group.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd, const FAST_PATH: bool>(
         &self,
@@ -311,7 +311,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         o: usize,
     ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
-        // SAFETY: the offset belongs to the vector, so `far` and the seven following slots are in the grid.
+        // SAFETY: the offset belongs to the lane group, so `far` and the seven following slots are in the
+        // grid.
         let (displacement, numbers, limits, rotation) = unsafe {
             let far = vector.far(offset);
             let component = |d| eight(self.displacement[d], far);

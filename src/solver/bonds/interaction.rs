@@ -9,7 +9,7 @@ use crate::scatter::Weibull;
 
 /// The bonds between two blocks, their laws, and their failure criterion.
 pub struct Interaction {
-    /// The bonds.
+    /// The bonds from points of one block to points of the same or another block.
     pub bonds: BlockBonds,
     /// The laws of both ends.
     pub laws: PairLaw,
@@ -22,19 +22,19 @@ pub struct Interaction {
 /// Laws of the points of a block.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockLaws {
-    /// The material law.
+    /// Material law of the block.
     pub law: AnyLaw,
     /// The damage law, if bonds can break.
     pub damage: Option<DamageLaw>,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// Toughness by direction; `None` if it is the same in all directions.
+    /// Factor of the critical work by the direction of a bond; `None` if it is 1 in all directions.
     pub direction: Option<ToughnessByDirection>,
     /// Data that criteria read of these points, for bonds between bodies that have a separate damage law.
     pub pairs: PairReads,
-    /// Dimension, for the stress across plane bodies.
+    /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
-    /// Elastic constants, on average over all directions.
+    /// Elastic constants; for anisotropic bodies, averages over all directions.
     pub elastic: Isotropic,
 }
 
@@ -47,7 +47,7 @@ pub struct PairReads {
     pub truncation_factors: bool,
     /// Whether these criteria read rotations.
     pub rotations: bool,
-    /// Whether these criteria read each measure of stress, in the order of [`StressMeasure::ALL`].
+    /// Whether these criteria read each stress measure, in the order of [`StressMeasure::ALL`].
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 

@@ -25,9 +25,9 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub own: &'a K::Point,
     /// Point numbers of points j.
     pub far: K::Point,
-    /// Thresholds and truncation factors of points i.
+    /// Thresholds, truncation factors and stress measures of points i.
     pub limits_i: &'a Limits,
-    /// Thresholds and truncation factors of points j.
+    /// Thresholds, truncation factors and stress measures of points j.
     pub limits_j: Limits,
     /// Rotations of the families of points i.
     pub rotation_i: &'a K::Rotation,
@@ -106,7 +106,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Instruction sets for which the kernel's loops are compiled. One is enough for output kernels.
     const ISA_SET: IsaSet = IsaSet::One;
 
-    /// Whether to compile a second loop for vectors whose bonds all stay within the series limit.
+    /// Whether to compile a second loop for lane groups whose bonds all stay within the series limit.
     const HAS_FAST_PATH: bool = false;
 
     /// Whether to load the bits of all bonds, broken ones included.

@@ -15,7 +15,7 @@ pub struct LimitsRead {
     pub truncation_factors: bool,
     /// Whether rotations are read.
     pub rotations: bool,
-    /// Whether each measure of stress is read, in the order of [`StressMeasure::ALL`].
+    /// Whether each stress measure is read, in the order of [`StressMeasure::ALL`].
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 
@@ -52,7 +52,7 @@ pub struct LimitColumns {
     pub truncation_factors: Column,
     /// Rotations by component; in 2-D only q_z and q₀ are stored.
     pub rotations: [Column; 4],
-    /// Measures of stress, Pa, in the order of [`StressMeasure::ALL`]; −∞ for points that carry no stress.
+    /// Stress measures, Pa, in the order of [`StressMeasure::ALL`]; −∞ for points that carry no stress.
     pub stresses: [Column; StressMeasure::ALL.len()],
 }
 
@@ -74,7 +74,7 @@ impl LimitColumns {
         }
     }
 
-    /// The columns of rotations and stresses that are stored.
+    /// Iterate over the columns of rotations and stress measures that are stored.
     pub fn kept_changing(&mut self) -> impl Iterator<Item = &mut Column> {
         let columns = self.rotations.iter_mut().chain(&mut self.stresses);
         columns.filter(|column| !column.is_empty())
@@ -88,14 +88,15 @@ impl LimitColumns {
     }
 }
 
-/// Thresholds, truncation factors and stresses, prepared for a kernel with a certain criterion.
+/// Thresholds, truncation factors and stress measures, prepared for a kernel with a certain criterion.
 #[derive(Clone, Copy)]
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    /// Measures of the stress of the points, Pa, if the criterion reads them.
+    /// Stress measure that the criterion reads, Pa; `None` if it reads no stress.
     stresses: Option<&'a [f64]>,
-    /// Whether the criterion reads thresholds, truncation factors or stresses. Otherwise, one branch skips them.
+    /// Whether the criterion reads thresholds, truncation factors or stress measures. If not, one branch
+    /// skips them.
     any: bool,
 }
 

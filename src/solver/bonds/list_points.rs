@@ -10,8 +10,8 @@ use crate::solver::model::Model;
 use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, ReadLimits, ReadRotations};
 
-/// Reference position (m), displacement (m), volume (m³) and thermal stretch of a point. Both vectors have
-/// three components.
+/// Reference position (m), displacement (m), volume (m³) and thermal stretch of a point. Position and
+/// displacement have three components each.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Node([f64; 8]);

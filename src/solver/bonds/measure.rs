@@ -117,8 +117,7 @@ impl<const D: usize> Forces<D> {
         columns.swap_remove(0)
     }
 
-    /// Moments of the family and of the broken bonds of each owned point: the sums of
-    /// `BrokenMoments`. In 3-D only.
+    /// Compute the sums of `BrokenMoments` for each owned point. In 3-D only.
     pub fn broken_moments(&mut self, model: &Model<D>) -> [Vec<f64>; 14] {
         let columns = self.measure(model.owned(), 14, |interaction, sums, source| {
             let kernel = &measures::BrokenMoments;

@@ -275,9 +275,14 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     }
 }
 
-/// Kernel that sums the moments of the family of a point and of its broken bonds, with ω as in
-/// [`FamilyTensors`]: Σ ω Ṽ (m³), Σ ω ξ Ṽ (m⁴) and Σ ω ξ⊗ξ Ṽ (m⁵: xx, yy, zz, xy, yz, xz) over all bonds, then
-/// Σ ω Ṽ and Σ ω ξ Ṽ over the broken ones.
+/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D, with ω as in
+/// [`FamilyTensors`]. The sums are:
+///
+/// - 0: Σ ω Ṽ over all bonds, m³;
+/// - 1 to 3: Σ ω ξ Ṽ over all bonds, m⁴;
+/// - 4 to 9: Σ ω ξ⊗ξ Ṽ over all bonds, m⁵, in the order of `PAIRS`;
+/// - 10: Σ ω Ṽ over the broken bonds, m³;
+/// - 11 to 13: Σ ω ξ Ṽ over the broken bonds, m⁴.
 #[derive(Clone, Copy)]
 pub struct BrokenMoments;
 

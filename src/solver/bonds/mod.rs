@@ -346,7 +346,7 @@ impl<const D: usize> Forces<D> {
         self.instructions
     }
 
-    /// The halo plan.
+    /// Plan of the halo exchanges between force passes.
     pub fn halo(&self) -> &Halo {
         &self.halo
     }

@@ -26,8 +26,8 @@ const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 /// Plastic states of the owned points by column; empty if no law has a plastic state.
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
-/// Point numbers by column. The first columns are those that bonds read, of owned points and ghosts. The
-/// remaining columns, which only laws read, contain owned points.
+/// Point numbers, one column per number. The first columns contain owned points and ghosts, because bonds
+/// read them. The other columns, which only laws read, contain owned points only.
 pub struct PointNumbers {
     /// The point numbers by column; 0 for points whose law does not have that number.
     pub columns: Vec<Column>,

@@ -1,4 +1,4 @@
-//! Measures of the Cauchy stress of points, for failure criteria.
+//! Stress measures of points, computed from the Cauchy stress, for failure criteria.
 
 use std::ops::Range;
 
@@ -13,21 +13,21 @@ use crate::solver::model::Model;
 use super::interaction::BlockLaws;
 use super::point_numbers::{PlasticColumns, PointNumbers, over_points};
 
-/// Data from which stresses follow, besides the sums of the first pass.
+/// Inputs of the stress measures, in addition to the sums of the first pass.
 pub struct StressInputs<'a, 'b, const D: usize> {
-    /// The points.
+    /// Model of the points, which gives the block of each point.
     pub model: &'a Model<D>,
-    /// The laws of the blocks.
+    /// Laws of the blocks, by index of the block.
     pub blocks: &'a [BlockLaws],
     /// Plastic states of the owned points.
     pub plastic: &'a PlasticColumns<'b>,
-    /// Thermal stretches of the owned points, if there are any.
+    /// Thermal stretches of the owned points; `None` in runs without temperatures.
     pub thermal_stretch: Option<&'a [f64]>,
 }
 
 impl PointNumbers {
-    /// Compute the measures of the stress of some owned points (Pa) from the sums of the first pass. Measures with empty
-    /// columns are skipped.
+    /// Compute the stress measures of some owned points (Pa) from the sums of the first pass. Measures with
+    /// empty columns are skipped.
     pub fn find_stresses<const D: usize>(
         &self,
         points: Range<usize>,
@@ -66,7 +66,8 @@ impl PointNumbers {
     }
 }
 
-/// Cauchy stress of a point in space (Pa) with a thermal stretch; `None` where the body is inverted.
+/// Compute the 3-D Cauchy stress of a point (Pa) with the thermal stretch `thermal`; `None` if the family is
+/// inverted.
 fn cauchy<const D: usize>(
     block: &BlockLaws,
     found: &FamilyStress<D>,
@@ -96,7 +97,8 @@ fn cauchy<const D: usize>(
         Dimension::PlaneStrain { .. } => {
             let of_law = Law::<D>::stress_across(&block.law, gradient, plastic);
             let default = ratio * (stress[(0, 0)] + stress[(1, 1)]);
-            // The thermal stretch of the setting is (1 + ν) α ΔT, and the stress across is −E α ΔT.
+            // In plane strain, `thermal` is (1 + ν) α ΔT. The thermal stress −E α ΔT perpendicular to the
+            // plane is therefore −2G `thermal`.
             let confined = 2.0 * block.elastic.shear_modulus() * thermal;
             stress[(2, 2)] = of_law.unwrap_or(default) - confined;
             (1.0, 2)

@@ -21,7 +21,7 @@ use super::list_points::{ListPoints, Node, store_history};
 /// Tasks with at most this number of groups of eight bonds are not split further.
 const LEAF: usize = 2048;
 
-/// Same as [`LEAF`], for kernels that reuse the sums of a vector for other vectors of the task.
+/// Same as [`LEAF`], for kernels that reuse the sums of a lane group for other lane groups of the task.
 const UNDEFORMED_LEAF: usize = 128 * LEAF;
 
 /// Maximum number of cached bit patterns per task. Many patterns at curved surfaces never recur, so a full
@@ -35,13 +35,13 @@ pub struct PointData<'a, const D: usize> {
     pub nodes: &'a [Node],
     /// Point numbers by column, for lists.
     pub numbers: &'a [Column],
-    /// Thresholds, truncation factors and rotations, for lists.
+    /// Thresholds, truncation factors, rotations and stress measures, for lists.
     pub limits: &'a LimitColumns,
     /// Point data for lattices (point numbers, limits and geometry), by grid.
     pub grids: &'a [GridValues<D>],
     /// Whether points have thermal stretches.
     pub is_thermal: bool,
-    /// Instruction set.
+    /// Instruction set with which the kernels run.
     pub instructions: Instructions,
 }
 
@@ -62,13 +62,13 @@ pub const MAX_BROKEN_SUMS: usize = 6;
 
 /// A part of the bonds of two blocks.
 trait Part: Sized + Send {
-    /// Number of rows or vectors.
+    /// Number of rows (lists) or lane groups (lattices).
     fn len(&self) -> usize;
 
-    /// Local index of the first point of row or vector `k`.
+    /// Local index of the first point of the row or lane group `k`.
     fn point(&self, k: usize) -> usize;
 
-    /// Split before row or vector `k`.
+    /// Split before the row or lane group `k`.
     fn split_at(self, k: usize) -> (Self, Self);
 }
 
@@ -348,15 +348,16 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
     }
 }
 
-/// Number of vectors that skip the fast path after a failed attempt, because large strains occur in clusters.
+/// Number of lane groups that skip the fast path after a failed attempt, because large strains occur in
+/// clusters.
 const FAST_PATH_BACKOFF: usize = 7;
 
-/// Choice of the loop for the next vector. Lists have no fast path, because loading points j dominates
+/// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates
 /// their time.
 struct FastPathGate {
     /// Whether the fast path is allowed.
     is_allowed: bool,
-    /// Number of vectors left that skip the fast path.
+    /// Number of lane groups that must still skip the fast path.
     skipped: usize,
 }
 
@@ -379,7 +380,7 @@ impl FastPathGate {
             return task.run(simd);
         }
         if self.is_allowed && self.skipped == 0 {
-            // SAFETY: the points of a task were made for the grid of its vector.
+            // SAFETY: the points of a task belong to the grid of its lane group.
             let sums = unsafe { fast_vector(simd, task.kernel, task.points, task.vector) };
             if let Some(sums) = sums {
                 return (sums, 0);
@@ -392,12 +393,12 @@ impl FastPathGate {
     }
 }
 
-/// Cache of the sums over the bonds of a vector, for [undeformed](Kernel::is_undeformed) kernels. The key is
-/// the intact bits of the vector.
+/// Cache of the sums over the bonds of lane groups, for [undeformed](Kernel::is_undeformed) kernels. The key
+/// is the intact bits of a lane group.
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
 impl<N: LaneTuple> Known<N> {
-    /// Store the sums of a vector.
+    /// Store the sums of a lane group.
     fn insert(&mut self, vector: &VectorBonds<'_>, sums: N) {
         if self.0.len() == CACHE_CAPACITY {
             self.0.clear();
@@ -406,11 +407,11 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sum over the bonds of a vector; `None` if a bond is beyond the series limit. The arguments are copied so
-/// that they stay in registers.
+/// Sum over the bonds of a lane group; `None` if a bond is beyond the series limit. The arguments are copied
+/// so that they stay in registers.
 ///
 /// # Safety
-/// The vector must belong to the grid of `points`.
+/// The lane group must belong to the grid of `points`.
 #[inline(always)]
 unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     simd: S,
@@ -419,7 +420,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     vector: &mut VectorBonds<'_>,
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
-    // SAFETY: the caller guarantees that the vector belongs to the grid.
+    // SAFETY: the caller guarantees that the lane group belongs to the grid.
     let own = unsafe { points.load_point_i(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
@@ -432,10 +433,10 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over all bonds of a vector and returns the bits of the breaking bonds.
+/// Task that sums over all bonds of a lane group and returns the bits of the breaking bonds.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    /// Points of the grid of the vector.
+    /// Points of the grid of the lane group.
     points: GridPoints<'p, K, D>,
     /// The bits of all bonds, broken or not, if the kernel reads them.
     whole: Option<&'t [u8]>,
@@ -450,7 +451,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
         let (kernel, points, vector) = (self.kernel, self.points, self.vector);
         let mut sums = kernel.start();
         let mut gone = 0;
-        // SAFETY: `points` was made for the grid of the vector.
+        // SAFETY: `points` belongs to the grid of the lane group.
         let own = unsafe { points.load_point_i(vector.slot) };
         for o in 0..vector.offsets.len() {
             // SAFETY: as above.
@@ -469,10 +470,10 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
     }
 }
 
-/// Task that sums over the breaking bonds of a vector and clears their intact bits.
+/// Task that sums over the breaking bonds of a lane group and clears their intact bits.
 struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    /// Points of the grid of the vector.
+    /// Points of the grid of the lane group.
     points: GridPoints<'p, K, D>,
     vector: &'t mut VectorBonds<'v>,
 }
@@ -484,7 +485,7 @@ impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (kernel, points, vector) = (self.kernel, self.points, self.vector);
         let mut broken = K::Broken::splat(0.0);
-        // SAFETY: `points` was made for the grid of the vector.
+        // SAFETY: `points` belongs to the grid of the lane group.
         let own = unsafe { points.load_point_i(vector.slot) };
         for o in 0..vector.offsets.len() {
             // SAFETY: as above.
@@ -585,7 +586,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
 struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
-    /// For kernels that need them, the bits of all bonds of all vectors, broken or not.
+    /// For kernels that need them, the bits of all bonds of all lane groups, broken or not.
     whole: Vec<u8>,
 }
 

@@ -85,7 +85,7 @@ fn normal(dimension: usize) -> usize {
     usize::from(dimension > 1)
 }
 
-/// The unit vector of an axis.
+/// Unit vector along the axis with this index.
 fn unit(axis: usize) -> [f64; 3] {
     std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 })
 }

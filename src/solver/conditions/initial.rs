@@ -47,7 +47,7 @@ pub fn apply_initials<const D: usize>(
     Ok(())
 }
 
-/// Set the values of the set's points from a file. Collective.
+/// Set the displacements and velocities of some owned points from a file. Collective.
 fn apply_file<const D: usize>(
     initial: &Initial,
     file: &InitialFile,
@@ -91,9 +91,9 @@ fn apply_file<const D: usize>(
     Ok(())
 }
 
-/// Displacement and velocity of each owned point from a file, 2 D values per point; NaN for points without a
-/// row. Each rank reads a part of the rows and sends them to the rank with the range of ids that contains them.
-/// Collective.
+/// Read displacement and velocity of the owned points from a file, 2 D values per point; NaN for points
+/// without a row. Each rank reads a part of the rows, and sends each row to the rank whose range of ids
+/// contains its id. Collective.
 fn values_of_owned<const D: usize>(
     file: &InitialFile,
     comm: &dyn Communicator,

@@ -21,7 +21,7 @@ pub struct Load<const D: usize> {
 
 /// The points of a [`Part`] on which a load acts.
 pub struct Loaded<const D: usize> {
-    /// Index of the load.
+    /// Index of the load among the loads of the stage.
     load: usize,
     /// Indices of the points in the part.
     points: Vec<u16>,
@@ -50,7 +50,7 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Index of its condition.
+    /// Index of the condition that defines the load.
     pub fn condition(&self) -> usize {
         self.condition
     }
@@ -108,7 +108,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Index of the load.
+    /// Index of the load among the loads of the stage.
     pub fn load(&self) -> usize {
         self.load
     }

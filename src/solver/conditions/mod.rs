@@ -333,8 +333,9 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sum `weight` over these owned points for each load, a function of a point and the force of the load on
-    /// it (N). Returns the indices of the conditions and the sums. `points` is sorted.
+    /// Sum a weight over some owned points, for each load of the stage. `weight` is a function of a point and
+    /// of the force of the load on this point (N). `points` is sorted. Returns the index of each load's
+    /// condition, and the sums of this rank.
     pub fn load_sums(
         &self,
         model: &Model<D>,

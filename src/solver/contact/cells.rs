@@ -30,7 +30,7 @@ pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item 
     })
 }
 
-/// Points by cell.
+/// Positions sorted into hashed cells.
 pub(super) struct Cells {
     edge: f64,
     dimension: usize,

@@ -80,7 +80,7 @@ impl WrenchSums {
         self.sums.into_iter().flatten()
     }
 
-    /// Number of sums.
+    /// Number of exact sums in the result of [`Self::flat`].
     pub const COUNT: usize = 3 * WRENCH;
 }
 

@@ -45,7 +45,7 @@ pub(super) fn check_outside<const D: usize>(
 /// Pairs of points of different bodies that start at the same position and therefore never touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coincident {
-    /// Number of pairs.
+    /// Number of pairs of points over all ranks.
     pub pairs: u64,
     /// Ids of the first pair, the smaller one first.
     pub ids: [u64; 2],

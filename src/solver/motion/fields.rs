@@ -12,7 +12,7 @@ use crate::solver::model::Model;
 pub struct Description {
     /// Name in standard terms.
     pub name: &'static str,
-    /// SI unit.
+    /// SI unit of the values; `1` for dimensionless values.
     pub unit: &'static str,
     /// Whether the field is part of the state of a run. The state is stored in checkpoints and migrates with
     /// the points. Other fields are recomputed from the state.

@@ -1,4 +1,4 @@
-//! The check that supports hold the loaded pieces in load steps.
+//! Check that supports hold the loaded pieces of bodies in load steps.
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::error::{Error, Result};
@@ -10,16 +10,17 @@ use super::Fields;
 use super::load_step::sums;
 use super::pieces::{Piece, Pieces};
 
-/// Names of the components.
+/// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A sum of loads below this fraction of the sum of their magnitudes is round-off.
+/// A sum of loads is round-off if it is below this fraction of the sum of their magnitudes.
 const ROUND_OFF: f64 = 1e-9;
 
-/// A torque below this fraction of the sum of its magnitudes turns a piece by a small angle only.
+/// Torques below this fraction of Σ |arm| |force| are ignored, because they rotate a piece by a small angle
+/// only.
 const SMALL_TORQUE: f64 = 0.01;
 
-/// Loads that act on a piece along an axis in which no support holds it.
+/// Loads on a piece along an axis in which no support holds the piece.
 struct UnheldLoad {
     piece: Piece,
     component: usize,
@@ -27,9 +28,9 @@ struct UnheldLoad {
     force: f64,
 }
 
-/// Loads that turn a piece that no support holds; equal on all ranks.
+/// Loads that rotate a piece that no support holds; the same on all ranks.
 pub struct UnheldTorque {
-    /// Index of the condition with the largest torque.
+    /// Index of the condition with the largest contribution to the torque.
     pub condition: usize,
     /// Description of the piece, the axis and the torque.
     pub description: String,
@@ -60,8 +61,9 @@ impl<const D: usize> Simulation<'_, D> {
         Ok(())
     }
 
-    /// Find loads of the first stage that turn a piece that no support holds in the plane of the rotation. The
-    /// simulation must be at time 0. Positions of later stages are unknown. Collective.
+    /// Find loads of the first stage that rotate a piece, if no support holds the piece in the plane of the
+    /// rotation. Later stages are not checked, because their positions are not known yet. The simulation must
+    /// be at time 0. Collective.
     pub fn unheld_torque(&mut self) -> Option<UnheldTorque> {
         if D == 1 {
             return None;
@@ -71,9 +73,11 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Call `look` with the pieces, the loads and the supports of a stage at its first and at its last load
-    /// step (s), until it returns a value. Afterwards, the loads and supports of the first stage at time 0 act
-    /// again. Without effect for explicit stages, and with contact, which can also hold pieces. Collective.
+    /// Call `look` at the first and at the last load step of a stage, until it returns a value. Its arguments
+    /// are the simulation with the loads and supports of this load step, the pieces, and the time, s.
+    ///
+    /// `look` is not called for explicit stages, nor in runs with contact, because contact can hold pieces,
+    /// too. Afterwards, the loads and supports of the first stage at time 0 act again. Collective.
     fn at_load_steps<T>(
         &mut self,
         stage: usize,
@@ -105,7 +109,7 @@ impl<const D: usize> Simulation<'_, D> {
         result
     }
 
-    /// Let the loads and supports of a stage act, with the loads at a time (s).
+    /// Activate the loads and supports of a stage, and compute the loads at a time (s).
     fn set_stage_loads(&mut self, stage: usize, time: f64) {
         let components = self.fields.external_force.iter_mut().flatten();
         components.for_each(|component| component.fill(0.0));
@@ -125,8 +129,9 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Whether the positions count as an equilibrium because forces are round-off at large displacements, but
-    /// a loaded piece is not held. Collective.
+    /// Whether a loaded piece without support drifts away. At large displacements, the unbalanced forces on
+    /// such a piece are below the round-off limit, so its positions would count as an equilibrium.
+    /// Collective.
     pub(super) fn is_drifting(&mut self) -> bool {
         self.load_step.residual == 0.0
             && self.contact.is_none()
@@ -134,8 +139,8 @@ impl<const D: usize> Simulation<'_, D> {
             && self.check_pieces_are_held("").is_err()
     }
 
-    /// Find the piece with the smallest point id that is loaded along an axis in which no support holds it,
-    /// so that no equilibrium within the tolerance exists. Collective.
+    /// Find a piece that is loaded along an axis in which no support holds it. Loads within the tolerance of
+    /// the stage are ignored. Of several pieces, return the one with the smallest point id. Collective.
     fn unheld_load(&self, pieces: &Pieces<D>) -> Option<UnheldLoad> {
         let allowed = self.allowed_force();
         let is_suspect = |point: usize, d: usize| {
@@ -169,8 +174,8 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Norm of the unbalanced forces (N) that the tolerance of the present stage allows with the present
-    /// loads, if there are no reactions. Collective.
+    /// Largest norm of unbalanced forces (N) that is within the tolerance of the present stage, with the
+    /// present loads and without reactions. Collective.
     fn allowed_force(&self) -> f64 {
         let tolerance = match self.time_rule().method {
             Method::Relaxation(Relaxation { tolerance, .. })
@@ -195,7 +200,8 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Find the piece with the smallest point id that the present loads turn. Collective.
+    /// Find a piece that the present loads rotate. Of several pieces, return the one with the smallest point
+    /// id. Collective.
     fn find_unheld_torque(&self, pieces: &Pieces<D>) -> Option<UnheldTorque> {
         const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
         let planes = || (0..3).filter(|axis| PLANES[*axis].iter().all(|d| *d < D));
@@ -259,8 +265,9 @@ impl<const D: usize> Simulation<'_, D> {
         std::array::from_fn(|d| self.model.reference[d][point] + displacement[d][point])
     }
 
-    /// Index of the condition whose load on these points has the largest sum of `weight`, a function of a
-    /// point and the force on it (N). `points` is sorted. Collective.
+    /// Return the index of the condition with the largest load on the points `points`, which are sorted.
+    /// Loads are compared by the magnitude of the sum of `weight`, a function of a point and the force on it
+    /// (N). Collective.
     fn largest_load(&self, points: &[usize], weight: impl Fn(usize, [f64; D]) -> f64) -> usize {
         let (conditions, mut sums) = self.conditions.load_sums(&self.model, points, weight);
         let sums = reduce(self.comm, &mut sums).into_iter();

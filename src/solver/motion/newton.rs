@@ -284,7 +284,8 @@ impl<const D: usize> Vectors<D> {
     }
 
     /// Improve x by conjugate gradients until ‖f − K x‖ is small. The tolerance is at least
-    /// `LINEAR_TOLERANCE_SHARE` times `allowed`, the norm ‖f‖ (N) that is accepted as equilibrium. Collective.
+    /// `LINEAR_TOLERANCE_SHARE` times `allowed`, the norm ‖f‖ (N) that is accepted as equilibrium.
+    /// Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };

@@ -15,7 +15,7 @@ pub(super) struct Pieces<const D: usize> {
     pub is_unloaded: [Vec<f64>; D],
 }
 
-/// A piece and this rank's points of it.
+/// A piece, and the points of this rank that belong to it.
 pub(super) struct Piece {
     /// Smallest point id of the piece.
     first: u64,
@@ -26,11 +26,11 @@ pub(super) struct Piece {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// For each component, 0 for local points on which a load acts at present, else 1.
+    /// Return a column per component over the local points: 0 for points with a nonzero load, otherwise 1.
     pub(super) fn unloaded_points(&self) -> [Vec<f64>; D] {
         let mut all = std::array::from_fn(|_| vec![1.0; self.model.volume.len()]);
-        // A point without bonds in its reference family does not move in a relaxation, so its loads do not
-        // count.
+        // A point without bonds in its reference family does not move in load steps, so its loads are
+        // ignored.
         let density = self.fields.fictitious_density.as_deref();
         if let (Some(force), Some(density)) = (&self.fields.external_force, density) {
             for (is_unloaded, force) in all.iter_mut().zip(force) {
@@ -44,7 +44,8 @@ impl<const D: usize> Simulation<'_, D> {
         all
     }
 
-    /// Find the pieces of all bodies, with the unloaded points and the present supports. Collective.
+    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]; the
+    /// supports are those of the present stage. Collective.
     pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {
@@ -56,8 +57,8 @@ impl<const D: usize> Simulation<'_, D> {
         pieces
     }
 
-    /// In the order of their smallest ids, call `look` with the pieces whose points are suspects, until it
-    /// returns a value. `is_suspect` has the same value at all points of a piece. Collective.
+    /// Call `look` with each suspected piece, in the order of their smallest point ids, until it returns a
+    /// value. `is_suspect` must have the same value at all points of a piece. Collective.
     pub(super) fn first_of_pieces<T>(
         &self,
         pieces: &Pieces<D>,
@@ -92,7 +93,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Describe a piece: the name of a body that it belongs to, its size, and the position of a point. Collective.
+    /// Describe a piece in two texts: the name of a body that it belongs to; its size and the position of a
+    /// point. Collective.
     pub(super) fn describe_piece(&self, piece: &Piece) -> [String; 2] {
         let ids = &self.model.ids;
         let named = piece.points.iter().find(|k| ids[**k] == piece.first);

@@ -18,7 +18,7 @@ use super::newton::NewtonState;
 /// The state of the points in this rank's range of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Saved {
-    /// The columns of all fields of the state.
+    /// Columns of all fields of the state, one per component.
     pub columns: Vec<SavedColumn>,
     /// State of the bonds.
     pub bonds: SavedBonds,
@@ -26,7 +26,7 @@ pub struct Saved {
     pub progress: Vec<u64>,
 }
 
-/// A component of a field.
+/// Column of one component of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedColumn {
     /// Name of the field and index of the component. For a count of newly broken bonds, the name of the
@@ -49,7 +49,7 @@ pub struct SavedBonds {
 /// missing in a checkpoint, because a restart may change the further results.
 const NEWLY_BROKEN_OF: &str = "newly_broken_of_";
 
-/// The words of the progress that are not decoded yet.
+/// Words of the progress that remain to be decoded.
 struct Words<'a>(&'a [u64]);
 
 impl<'a> Words<'a> {

@@ -44,7 +44,8 @@ pub struct GlobalState {
     pub refinement_energy: f64,
     /// Force of the supports on each set of `reactions` by component, N.
     pub reactions: Vec<Vec<f64>>,
-    /// Component of the support force in the requested direction, N, of each support force.
+    /// For each entry of `support_forces` in the deck, the component of the support force in the requested
+    /// direction, N.
     pub support_forces: Vec<f64>,
     /// Values of the columns of each probe.
     pub probes: Vec<Vec<f64>>,
@@ -52,11 +53,11 @@ pub struct GlobalState {
     pub statistics: Vec<Vec<f64>>,
     /// Position of each front, m.
     pub fronts: Vec<f64>,
-    /// Length (m) and number of branches of each crack; in 3-D area (m²) and reach (m).
+    /// Two values per crack: length (m) and number of branches in 2-D, area (m²) and reach (m) in 3-D.
     pub cracks: Vec<[f64; 2]>,
     /// State of each crack tip.
     pub tips: Vec<TipNow>,
-    /// Quantities of contact.
+    /// Contact quantities, of all contacts and by pair of bodies.
     pub contact: ContactNow,
     /// Fragments; empty if the history does not contain them.
     pub fragments: Fragments,
@@ -82,7 +83,7 @@ impl Columns {
         }
     }
 
-    /// Add a column.
+    /// Add a column with its name, its unit, and the function that computes its value.
     pub fn add(
         &mut self,
         name: impl Into<String>,

@@ -2,9 +2,9 @@
 //! of two such bodies that are nearer than their spacing. For bodies whose bonds have broken, it finds points
 //! that are nearer than half their spacing.
 //!
-//! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks by
-//! spatial cells, so that each rank compares a part. Points of the second body are sent to the ranks of all
-//! cells that are near enough.
+//! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks
+//! by spatial cells, so that each rank compares a part. Points of the second body are sent to the ranks of
+//! all cells that are near enough.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;

@@ -1,13 +1,15 @@
 //! Crack surfaces in 3-D: area and front of the crack that starts at a given position.
 //!
 //! Let H be 1 on one side of a crack and 0 on the other. The integral of |∇H| over the volume is the area of
-//! the crack. The gradient at point i is that of the linear function that fits H best, by least squares with
-//! the weights ω Ṽ over the family; H is 1 where the bond ij is broken. With the mean ξ̄ of the family, it is
+//! the crack. At point i, the gradient g of H is that of a linear function fitted to H by least squares. The
+//! fit has the weights ω Ṽ. H is 1 at neighbours j with a broken bond ij, and 0 at the other neighbours. With
+//! the mean ξ̄ of the family,
 //!
 //! g = C⁻¹ Σ_broken (ξ − ξ̄) ω Ṽ,   C = Σ (ξ − ξ̄) ⊗ (ξ − ξ̄) ω Ṽ over all bonds,   area = Σ |g| V.
 //!
-//! On a cubic lattice, C is isotropic, and the area of a plane crack is exact for each of its directions.
-//! Points without intact bonds have g = 0, so a crack with crushed points or with a width counts once.
+//! On a cubic lattice, C is isotropic, and the area of a plane crack is exact for any direction of its
+//! normal. Points without intact bonds have g = 0. Therefore a crack with crushed points, or with a width,
+//! counts once.
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -27,57 +29,61 @@ use super::snapshot::Snapshot;
 
 type Vector = Vector3<f64>;
 
-/// Distance, in horizons, up to which damaged points are connected, as in the plane.
+/// Distance, in horizons, up to which damaged points are connected; the same as in 2-D.
 const LINK: f64 = 2.0 / 3.0;
 
-/// Minimum of the same distance in spacings, so that diagonal neighbours are connected for any horizon.
+/// Minimum of this distance in spacings, so that diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.8;
 
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
-/// Part of the trace of C that is added to its diagonal, so that a layer of points has an inverse.
+/// Fraction of the trace of C that is added to the diagonal of C, so that C of a single layer of points is
+/// invertible.
 const LAYER: f64 = 1e-9;
 
-/// Distance, in horizons, that the mean of the damaged points around a point of the front has from the mean
-/// of its family. On a straight front it is 0.4, on an edge of the body 0.05.
+/// Threshold, in horizons, of the distance between the mean of the damaged points around a point and the mean
+/// of its family. Points of the front are above the threshold. The distance is 0.4 on a straight front, and
+/// 0.05 at an edge of the body.
 const ONE_SIDED: f64 = 0.2;
 
-/// Cosine of the half angle, 45°, of the cone ahead of a point of the front, in which no point is damaged.
+/// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged
+/// point.
 const CONE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Sine of the angle to the plane of the crack, 14°, up to which an undamaged point counts as ahead.
+/// Sine of 14°, the largest angle between the plane of the crack and the bond to an undamaged point ahead.
 const IN_PLANE: f64 = 0.25;
 
-/// Most damage of an undamaged point ahead, relative to the threshold. At an oblique surface of the body, the damage
-/// may fall below the threshold before the crack ends, but not as far.
+/// Largest damage of an undamaged point ahead, as a fraction of the threshold. At an oblique surface of the
+/// body, the damage falls below the threshold before the crack ends, but stays above this fraction.
 const UNDAMAGED: f64 = 0.5;
 
-/// A crack whose area and front are found.
+/// A crack in 3-D whose area and front are computed.
 pub struct CrackSurface {
     rule: problem::CrackPath,
     /// Owned points of the set.
     points: Vec<u32>,
-    /// Damaged points up to this distance apart are connected, m.
+    /// Distance up to which damaged points are connected, m.
     link: f64,
-    /// Distance up to which a point belongs to the surroundings of another one, m.
+    /// Radius of the surroundings of a point, m; about one horizon.
     radius: f64,
-    /// Distance of the points of the front from one another, m.
+    /// Minimum distance between points of the front, m.
     front_spacing: f64,
 }
 
-/// The present surface of a crack; the same on all ranks.
+/// Surface of a crack at one time; the same on all ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    /// Area, m².
+    /// Area of the crack, m², with one face counted.
     pub area: f64,
-    /// Largest distance of a damaged point of the crack from its start, m; 0 without a crack.
+    /// Largest distance between the start of the crack and a damaged point of the crack, m; 0 without damaged
+    /// points.
     pub reach: f64,
-    /// Positions of the front, m.
+    /// Positions of the points of the front, m, in the order of their ids.
     pub front: Vec<[f64; 3]>,
 }
 
-/// A point of the front, as sent to all ranks.
+/// A point of the front, in messages to all ranks.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct FrontPoint {
@@ -86,7 +92,7 @@ struct FrontPoint {
 }
 
 impl CrackSurface {
-    /// Find the points of the set in which the crack is searched. Collective.
+    /// Create the crack, and find the points of the set in which it is searched. Collective.
     ///
     /// # Errors
     /// If the set is empty; the error is the same on all ranks.
@@ -106,7 +112,7 @@ impl CrackSurface {
         comm.max(&mut extremes);
         let spacing = |volume| problem.dimension.edge(volume);
         let link = (LINK * problem.horizon).max(DIAGONAL * spacing(extremes[0]));
-        // Each rank knows the points up to the length of the longest bond.
+        // A rank has all points within the length of the longest bond from its owned points.
         let known = cutoffs(problem).into_iter().fold(0.0, f64::max);
         Ok(Self {
             rule: rule.clone(),
@@ -127,7 +133,7 @@ impl CrackSurface {
         self.rule.from
     }
 
-    /// Find the surface at the time of a snapshot. The result is bitwise the same on all ranks and for any
+    /// Compute the surface at the time of a snapshot. The result is bitwise the same on all ranks and for any
     /// number of ranks. Collective.
     pub fn now<const D: usize>(
         &self,
@@ -177,7 +183,7 @@ impl CrackSurface {
             if let Some(bins) = &bins {
                 bins.within(place, |other, _| around.push(damaged[other as usize]));
             }
-            // The order of the sums is that of the ids on any number of ranks.
+            // Sums in the order of ids have the same round-off on any number of ranks.
             around.sort_unstable_by_key(|other| model.ids[*other]);
             let own = Vector::from(place);
             let add = |sum: Matrix3<f64>, other: &usize| {
@@ -191,7 +197,8 @@ impl CrackSurface {
             let Some(edge) = self.edge(&bonds, normals, moments(point).mean()) else {
                 continue;
             };
-            // The crack does not end here if the body does.
+            // If no undamaged point is ahead, the crack has reached the surface of the body, so the point is
+            // not on the front.
             let mut is_front = false;
             simulation.forces.for_each_neighbour(point, |other| {
                 let bond = Vector::from(model.position(other)) - own;
@@ -214,13 +221,13 @@ impl CrackSurface {
         }
     }
 
-    /// Damage of the local points, ghosts included; `None` outside of the set. Collective.
+    /// Return the damage of the local points, ghosts included; `None` outside the set. Collective.
     fn damage<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
         snapshot: &Snapshot,
     ) -> Vec<Option<f64>> {
-        // NaN outside of the set.
+        // Points outside the set have NaN.
         let mut damage = vec![f64::NAN; simulation.model.volume.len()];
         for point in self.points.iter().map(|point| *point as usize) {
             damage[point] = snapshot.damage(&simulation.family_volume, point);
@@ -230,7 +237,7 @@ impl CrackSurface {
         damage.into_iter().map(in_set).collect()
     }
 
-    /// Local indices of the damaged points of the crack, ghosts included. Collective.
+    /// Return the local indices of the damaged points of the crack, ghosts included. Collective.
     fn damaged<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -242,7 +249,7 @@ impl CrackSurface {
         let damaged: Vec<usize> = (0..model.volume.len()).filter(is_damaged).collect();
         let places: Vec<[f64; 3]> = damaged.iter().map(|point| model.position(*point)).collect();
         let mut pieces = Pieces::new(model.volume.len());
-        // 0 in the piece that contains the start.
+        // 0 for points that are connected to the start of the crack, otherwise 1.
         let mut is_apart = vec![1.0; model.volume.len()];
         if !places.is_empty() {
             let bins = Bins::new(&places, self.link);
@@ -261,11 +268,13 @@ impl CrackSurface {
         damaged
     }
 
-    /// The edge of the damaged points at one of them; `None` for a point within them. `bonds` are the vectors
-    /// to the damaged points around it, `normals` is the sum of g ⊗ g over these points and it (1/m²), and `mean` is
-    /// that of its family (m).
+    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region.
     ///
-    /// At the edge, the damaged points lie on one side of the family. Ahead of it, no point is damaged.
+    /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
+    /// ⊗ g over these points and the point itself, 1/m². `mean` is the mean ξ̄ of the point's family, m.
+    ///
+    /// At the edge, the damaged points lie on one side of the family, and no damaged point lies in the cone
+    /// ahead.
     fn edge(&self, bonds: &[Vector], normals: Matrix3<f64>, mean: Vector) -> Option<Edge> {
         if bonds.is_empty() {
             return None;
@@ -290,8 +299,8 @@ impl CrackSurface {
         is_free.then_some(edge)
     }
 
-    /// The front in the order of the ids, without points that lie close to an earlier one, such as those of
-    /// the other face of the crack.
+    /// Sort the points of the front by id, and remove points that are too close to an earlier point. Such
+    /// points lie, for example, on the other face of the crack.
     fn thinned(&self, mut front: Vec<FrontPoint>) -> Vec<[f64; 3]> {
         front.sort_unstable_by_key(|point| point.id);
         if front.is_empty() {
@@ -313,13 +322,13 @@ impl CrackSurface {
     }
 }
 
-/// The edge of the damaged points at one of them.
+/// Edge of the damaged region at a damaged point.
 struct Edge {
-    /// Vector to the middle of the crack, m.
+    /// Vector from the point to the mid-plane of the crack, m.
     to_middle: Vector,
-    /// Direction away from the damaged points in the plane of the crack.
+    /// Unit vector in the plane of the crack that points away from the damaged points.
     ahead: Vector,
-    /// Direction across the crack.
+    /// Unit normal of the crack.
     normal: Vector,
 }
 
@@ -328,13 +337,13 @@ impl Edge {
         bond.dot(&self.ahead) > CONE * bond.norm()
     }
 
-    /// Whether a bond leads ahead along the crack.
+    /// Whether a bond lies in the cone ahead and close to the plane of the crack.
     fn is_ahead(&self, bond: &Vector) -> bool {
         self.is_in_cone(bond) && bond.dot(&self.normal).abs() <= IN_PLANE * bond.norm()
     }
 }
 
-/// The sums that [`broken_moments`](crate::solver::bonds::Forces::broken_moments) returns for a point.
+/// Sums of a point from [`broken_moments`](crate::solver::bonds::Forces::broken_moments).
 struct Moments([f64; 14]);
 
 impl Moments {
@@ -347,7 +356,7 @@ impl Moments {
         self.0[10] > 0.0
     }
 
-    /// Mean bond of the family, m; 0 without a family.
+    /// Mean ξ̄ of the family, m; 0 for a point without a family.
     fn mean(&self) -> Vector {
         match self.0[0] {
             0.0 => Vector::zeros(),
@@ -355,7 +364,7 @@ impl Moments {
         }
     }
 
-    /// Gradient of the function that is 1 across the broken bonds, 1/m.
+    /// Gradient g of H at the point, 1/m.
     fn gradient(&self) -> Vector {
         let mean = self.mean();
         let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);

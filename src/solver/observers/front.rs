@@ -7,7 +7,7 @@ use super::reach::Course;
 use super::row_fields::RowFields;
 use crate::solver::Simulation;
 
-/// A tracked front.
+/// A front whose position along a line is tracked.
 pub struct Front {
     rule: problem::Front,
     course: Course,

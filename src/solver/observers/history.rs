@@ -47,9 +47,9 @@ pub struct HistoryObserver {
     statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
     fronts: Vec<Front>,
-    /// Cracks in the plane.
+    /// Cracks in 2-D, with centre lines.
     cracks: Vec<CrackPath>,
-    /// Cracks in 3-D.
+    /// Cracks in 3-D, with surfaces.
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     /// Energy (J) in the first row, and number of bonds that were intact before any bond could break.
@@ -210,8 +210,8 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// Name, start position (m) and present surface of each tracked crack in 3-D; the same on all ranks.
-    /// Collective.
+    /// Name, start position (m) and surface of each tracked crack in 3-D, at the time of a snapshot; the same
+    /// on all ranks. Collective.
     pub fn crack_surfaces<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

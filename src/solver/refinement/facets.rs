@@ -48,9 +48,9 @@ impl Facets {
             }
         });
         let mut all = all_gather_many(comm, &own);
-        // The search above finds a facet only between points one spacing apart. Bonds on a refined grid can be too
-        // short to join such points of a coarser grid. Facets of the coarser
-        // grid are therefore taken from the stored faces.
+        // The search above finds a facet only between points one spacing apart. Bonds on a refined grid can
+        // be too short to join such points of a coarser grid. Facets of the coarser grid are therefore taken
+        // from the stored faces.
         let faces = simulation.grids.suppressed_faces().into_iter();
         all.extend(faces.map(|(centre, edges, axis)| Facet {
             centre,
