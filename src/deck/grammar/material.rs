@@ -178,13 +178,13 @@ pub struct CriticalStretch {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`: their normal is perpendicular to it.
+    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`: their normal is parallel to it.
+    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
-    /// Fibres, or the normal of layers, in the undeformed body; a vector of any length.
+    /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
     /// The critical stretch s0 itself.
@@ -214,13 +214,13 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`: their normal is perpendicular to it.
+    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`: their normal is parallel to it.
+    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
-    /// Fibres, or the normal of layers, in the undeformed body; a vector of any length.
+    /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
     /// How the critical work follows from the toughness. "energy": breaking all bonds across an area dissipates the
