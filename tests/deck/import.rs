@@ -417,7 +417,8 @@ fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
     }
 }
 
-/// PeriLab rejects a plane problem without plane stress or plane strain; the import says what it assumes.
+/// PeriLab rejects a plane material without plane stress or plane strain. The import assumes plane stress,
+/// and its log says so.
 #[test]
 fn a_plane_material_of_perilab_without_symmetry_is_named() {
     let folder = Folder::new("symmetry");
