@@ -421,8 +421,8 @@ fn reason_for_new_result<const D: usize>(
     found_by_root(comm, compare)
 }
 
-/// Check that the first `outputs` outputs of a result file can be read. Return a description of the damage, or
-/// `None` for an intact file. Collective.
+/// Check that the first `outputs` outputs of a result file can be read. Return a description of the damage,
+/// or `None` for an intact file. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

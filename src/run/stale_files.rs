@@ -10,9 +10,9 @@ use crate::problem::Problem;
 
 use super::crack_files;
 
-/// Remove the further results, with their side-cars, and the tables of cracks that a run of this problem does not
-/// replace. Return the paths of the removed results and tables. A file with such a name but other content is kept.
-/// Called on rank 0.
+/// Remove the further results, with their side-cars, and the tables of cracks that a run of this problem does
+/// not replace. Return the paths of the removed results and tables. A file with such a name but other content
+/// is kept. Called on rank 0.
 ///
 /// # Errors
 /// If a file cannot be removed.

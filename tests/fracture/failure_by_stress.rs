@@ -1,5 +1,5 @@
-//! Failure by stress: bonds break when the mean von Mises or largest principal stress of their points reaches the
-//! strength, and not before.
+//! Failure by stress: bonds break when the mean von Mises or largest principal stress of their points reaches
+//! the strength, and not before.
 
 use std::collections::BTreeSet;
 

@@ -1,5 +1,5 @@
-//! Toughness by direction of the bond: opening costs the fracture energy of its direction, and cracks follow the weak
-//! direction.
+//! Toughness by direction of the bond: opening costs the fracture energy of its direction, and cracks follow
+//! the weak direction.
 
 use crate::support::equilibria::same_on_ranks;
 use crate::support::{displace, problem, simulate};
