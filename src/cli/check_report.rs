@@ -71,7 +71,8 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("strength", si(law.strength, "Pa"));
                 }
             }
-            // Bonds that soften are broken by their law, without a damage section. Damage by stress has no alpha.
+            // Bonds that soften are broken by their law, without a damage section. Damage by stress has no
+            // alpha.
             if body.damage.is_some() && damage.stress_measure().is_none() {
                 report.line("alpha", damage.alpha());
             }

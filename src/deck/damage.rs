@@ -145,7 +145,8 @@ impl<'a> Directed<'a> {
         )
     }
 
-    /// The toughness by direction, if the keys are given.
+    /// Return the toughness by direction; `None` if the table has none of the keys. It is an error if the
+    /// table has only some of the keys.
     fn toughness(&self, scope: &Scope, key: &str) -> Result<Option<ToughnessByDirection>> {
         let across = self.across.as_ref();
         let given = [

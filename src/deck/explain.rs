@@ -24,7 +24,8 @@ pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> 
         let [times, values] = scope.tables[name].rows();
         *table.get_mut() = Table::of_rows(times, values);
     }
-    // Through a value, which needs no further serializer for each section.
+    // Serialize to a `toml::Value` first. Only the value is then written as text, which shortens the
+    // compilation.
     toml::Value::try_from(&deck)
         .and_then(|deck| toml::to_string(&deck))
         .map_err(|error| Error::run(format!("cannot write the deck: {error}")))

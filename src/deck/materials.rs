@@ -21,8 +21,8 @@ use crate::problem::law;
 /// Validate a material.
 ///
 /// # Errors
-/// On an unknown law or key; on wrong, missing or surplus constants; and on constants of a solid that the law
-/// cannot model.
+/// On an unknown law or key, on invalid, missing or surplus constants, and on elastic constants that the law does
+/// not support.
 pub fn material(
     scope: &Scope,
     dimension: Dimension,
@@ -70,12 +70,13 @@ struct Section<'a> {
 }
 
 impl Section<'_> {
-    /// Return the section header and a key, for error messages.
+    /// Format the section header and a key for error messages: `[material.glass.pmb] density`.
     fn key_of(&self, name: &str) -> String {
         format!("{} {name}", self.key)
     }
 
-    /// Return an error that points at the value of a key; without a key or value, at the whole table.
+    /// Return an error at the value of the key `name`. If `name` is `None` or the deck lacks the key, the
+    /// error is at the table.
     fn error(&self, name: Option<&str>, message: impl AsRef<str>) -> crate::error::Error {
         let number = name.and_then(|name| self.table.get(name));
         let place = number.map_or(self.place.clone(), Spanned::span);
@@ -154,7 +155,7 @@ impl Section<'_> {
     }
 
     /// Return the elastic constants. A bond-based law fixes Poisson's ratio, except for a bar under uniaxial
-    /// stress. A law may declare its own keys instead of elastic constants.
+    /// stress. Some laws compute the elastic constants from their own keys.
     fn elastic(&self, law: &problem::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
         if let Some(own) = own {
@@ -191,7 +192,7 @@ impl Section<'_> {
             _ => return Err(self.wrong_number_of_constants(&given)),
         };
         let last = given.last().map(|(name, _)| *name);
-        // If several constants are wrong together, the error points at the last one.
+        // If the combination of two constants is invalid, the error is at the second constant.
         let error = |message: String| {
             let place = last.map_or(self.place.clone(), |name| self.table[name].span());
             self.scope.error(place, format!("{}: {message}", self.key))

@@ -29,7 +29,7 @@ pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
     }
 }
 
-/// Return the message about a text that is not TOML.
+/// Return the message for a text that is not valid TOML.
 fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String {
     let marked = source.text.get(span.clone()).unwrap_or_default();
     let rest = source.text.get(span.end..).unwrap_or_default();
@@ -53,7 +53,7 @@ fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String 
     }
 }
 
-/// Return the error about a text that is TOML but not a deck.
+/// Return the error for a text that is valid TOML but not a valid deck.
 fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &str) -> Error {
     let place = find(tree, &span, &mut Vec::new()).unwrap_or_default();
     let mut quoted = message.split('`').skip(1).step_by(2);

@@ -1,4 +1,4 @@
-//! Functions, and the meaning of other names in an expression.
+//! Lookup of the names in an expression: functions, variables, constants, parameters and tables.
 
 use std::sync::Arc;
 

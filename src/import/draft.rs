@@ -42,7 +42,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// A text.
+    /// Create a text value.
     pub fn text(text: impl Into<String>) -> Self {
         Self::Text(text.into())
     }
@@ -74,7 +74,7 @@ impl Value {
         }
     }
 
-    /// A list.
+    /// Create a list value.
     pub fn list(values: impl IntoIterator<Item = Value>) -> Self {
         Self::List(values.into_iter().collect())
     }
@@ -132,7 +132,7 @@ impl Section {
         !self.is_left_out && self.header == header
     }
 
-    /// The header.
+    /// Return the header, without brackets.
     pub fn header(&self) -> &str {
         &self.header
     }

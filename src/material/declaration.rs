@@ -184,7 +184,8 @@ impl Kind {
 pub struct Word {
     /// The word as written in decks.
     pub word: &'static str,
-    /// Reason for the lack of a 1-D form with this word, and the alternative; `None` if a 1-D form exists.
+    /// Message for a 1-D deck with this word: why the word is not available in 1-D, and the alternative.
+    /// `None` if the word is available in 1-D.
     pub no_line: Option<&'static str>,
 }
 

@@ -29,7 +29,7 @@ pub enum Form {
 /// A type of element: its form and its number of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Kind {
-    /// The form.
+    /// Shape of the element.
     pub form: Form,
     /// Number of nodes.
     pub nodes: usize,

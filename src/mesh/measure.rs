@@ -349,7 +349,8 @@ pub struct Measure {
 const ROUND_OFF: f64 = 1e-9;
 
 impl Measure {
-    /// Test whether det J has both signs. If so, edges cross one another or a part of the element is inverted.
+    /// Test whether det J has both signs. If so, edges cross one another or a part of the element is
+    /// inverted.
     pub fn is_folded(&self) -> bool {
         let [low, high] = self.determinants;
         let limit = ROUND_OFF * low.abs().max(high.abs());
@@ -357,8 +358,8 @@ impl Measure {
     }
 }
 
-/// Compute the measure of a line along x, of a face in the x-y plane, or of a solid. `nodes` are the positions
-/// of the nodes, m.
+/// Compute the measure of a line along x, of a face in the x-y plane, or of a solid. `nodes` are the
+/// positions of the nodes, m.
 pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
     // Positions are relative to the first node, so that a mesh far from the origin loses no digits.
     let origin = nodes[0];

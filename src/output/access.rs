@@ -11,9 +11,9 @@ const HELD_METADATA_BYTES: usize = 32 << 20;
 /// Handling of an existing file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Creation {
-    /// Fail.
+    /// Return an error.
     Exclusive,
-    /// Replace the file.
+    /// Replace the existing file.
     Truncate,
 }
 

@@ -302,8 +302,8 @@ mod tests {
         );
         assert!(text.contains(r#"NumberType="Int" Precision="8" Dimensions="7" Format="HDF""#));
         assert!(text.contains(r#"<Time Value="1e-6"/>"#));
-        // The velocity is the only field that selects these rows. The positions do not change, so they are not
-        // selected per output.
+        // The velocity is the only field that selects these rows. The positions do not change, so they are
+        // not selected per output.
         assert_eq!(text.matches(">7 0 1 1 7 3</DataItem>").count(), 1);
         let text = render("a.h5", (&[7, 9], true), &fields[1..2], &[0.0, 1e-6]);
         assert_eq!(text.matches(">7 0 1 1 9 3</DataItem>").count(), 2);

@@ -128,8 +128,9 @@ impl Image {
     }
 }
 
-/// The rows of a convex polygon in a picture of this height, each with its first column and the one after its last.
-/// Which pixels belong to it is said at [`Image::fill_polygon`].
+/// Return the rows of pixels of a convex polygon in a picture of this height (pixels). Each row has the
+/// polygon's first column and the column after its last. [`Image::fill_polygon`] defines which pixels belong
+/// to a polygon.
 pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i64; 2])> + '_ {
     let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
     let rows = first_centre(top).max(0)..first_centre(bottom).min(height);
@@ -145,7 +146,7 @@ pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i
     })
 }
 
-/// The first row or column whose pixel centre is not before `edge`.
+/// Return the first row or column whose pixel centre is not before `edge`.
 fn first_centre(edge: f64) -> i64 {
     (edge - 0.5).ceil() as i64
 }

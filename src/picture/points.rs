@@ -33,17 +33,18 @@ const TOLERANCE: f64 = 0.01;
 /// Height of the strip that represents a bar, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Edge of the larger cube behind each cube, relative to it. It fills the gaps that the stretch of a drawn deformation
-/// opens between cubes.
+/// Edge of a larger cube painted behind each cube, divided by the edge of the cube. A drawn deformation opens
+/// gaps between cubes; the larger cubes fill these gaps.
 const BACKING: f64 = 1.3;
 
-/// Least edge in pixels of a cube with distinct faces.
+/// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
 const LEAST_CUBE: f64 = 2.0;
 
 /// Brightness of the top, the left and the right face of a cube.
 const BRIGHTNESS: [f64; 3] = [1.0, 0.86, 0.7];
 
-/// Paint all points in the given order.
+/// Paint the cells of all points. In flat views, a later point covers an earlier point. In the isometric
+/// view, a nearer point covers a farther point.
 pub fn paint(
     image: &mut Image,
     marks: impl Iterator<Item = Mark> + Clone,
@@ -53,7 +54,8 @@ pub fn paint(
 ) {
     if projection == Projection::Isometric {
         let mut cubes = Cubes::new(image);
-        // The buffer has four-byte numbers, so depths are relative to the first point.
+        // The depth buffer stores 4-byte floats. Depths relative to the first point keep their digits far
+        // from the origin.
         let mut first = None;
         for mark in marks {
             let [x, y, z] = mark.position;
@@ -93,10 +95,11 @@ fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     [first, ((centre + half).round() as i64).max(first + 1)]
 }
 
-/// Cubes in the isometric view; each pixel shows the nearest cube.
+/// Painter of cubes in the isometric view, with a depth buffer: each pixel shows the nearest cube.
 struct Cubes<'a> {
     image: &'a mut Image,
-    /// x − y + z of what each pixel shows, in pixels of a length along an axis.
+    /// Depth x − y + z of the surface that each pixel shows, times the scale (pixels per metre). The larger
+    /// of two depths is nearer to the viewer.
     depths: Vec<f32>,
 }
 
@@ -109,7 +112,7 @@ impl<'a> Cubes<'a> {
         }
     }
 
-    /// Paint a pixel, unless it shows something nearer.
+    /// Paint a pixel, unless it shows a nearer surface.
     fn paint_pixel(&mut self, [column, row]: [i64; 2], depth: f64, colour: Colour) {
         let columns = i64::from(self.image.width);
         if !(0..columns).contains(&column) || !(0..i64::from(self.image.height)).contains(&row) {
@@ -123,7 +126,8 @@ impl<'a> Cubes<'a> {
         }
     }
 
-    /// Paint the three visible faces of a cube with its centre and the depth of this centre.
+    /// Paint the three visible faces of a cube. `centre` is the pixel position of its centre, `depth` the
+    /// depth of its centre, and `edge` its edge in pixels.
     fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
         if edge < LEAST_CUBE {
             let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
@@ -136,8 +140,10 @@ impl<'a> Cubes<'a> {
         }
         let overlap = 2.0 * OVERLAP;
         self.paint_faces((centre, depth), edge + overlap, colour);
-        // A face that is moved out by a length comes nearer by three lengths, here by 1.5 times the growth. Behind the
-        // own cube, it still hides the sides of other cubes in a gap.
+        // A face that moves outwards by a distance d comes nearer by 3d. Each face of the larger cube is
+        // (BACKING − 1)/2 edges farther out, so the growth brings it nearer by 1.5 (BACKING − 1) edges. The
+        // shift of 2 (BACKING − 1) edges puts the face behind the face of its own cube. In a gap, it hides
+        // the sides of other cubes.
         let behind = depth - 2.0 * (BACKING - 1.0) * edge;
         self.paint_faces((centre, behind), BACKING * edge + overlap, colour);
     }
@@ -158,7 +164,8 @@ impl<'a> Cubes<'a> {
                         column as f64 + 0.5 - centre[0],
                         row as f64 + 0.5 - centre[1],
                     ];
-                    // Shares of both edges: the depth falls by an edge along each of them.
+                    // Fractions of the two edges of the face at this pixel. Along each edge, the depth
+                    // decreases by `edge`.
                     let along = (offset[0] * other[1] - offset[1] * other[0]) / area;
                     let beside = (one[0] * offset[1] - one[1] * offset[0]) / area;
                     let depth = nearest - edge * (along + beside);
@@ -169,8 +176,8 @@ impl<'a> Cubes<'a> {
     }
 }
 
-/// Vectors on the picture from the corner of a cube that is nearest to the eye, which is seen in the middle of the
-/// cube, to its three neighbours.
+/// Return three edges of a cube as vectors in the picture, pixels: to the left, to the right and down. They
+/// start at the corner nearest to the viewer, which appears in the middle of the cube.
 fn neighbours(edge: f64) -> [[f64; 2]; 3] {
     [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]].map(|direction| {
         let [across, up] = Projection::Isometric.project(direction);
@@ -212,7 +219,8 @@ mod tests {
 
     #[test]
     fn the_nearest_cube_is_seen_in_any_order_and_size() {
-        // A small cube behind the upper face of a large one, whose centre is nearer, and one before it.
+        // One small cube lies behind the upper face of a large cube, although the centre of the small cube is
+        // nearer. The other small cube lies in front of this face.
         let place = |[x, y, z]: [f64; 3]| {
             let [across, up] = Projection::Isometric.project([x, y, z]);
             ([60.0 + across, 60.0 - up], x - y + z)
@@ -255,7 +263,7 @@ mod tests {
         let mut image = Image::new(200, 200);
         let mut cubes = Cubes::new(&mut image);
         for index in 0..20 {
-            // Stretched by a tenth.
+            // The distances of the cubes are stretched by a tenth.
             let y = 1.1 * 7.3 * f64::from(index);
             let [across, up] = Projection::Isometric.project([0.0, y, 0.0]);
             cubes.paint(([20.0 + across, 120.0 - up], -y), 7.3, RED);

@@ -13,11 +13,11 @@ pub enum Projection {
     Isometric,
 }
 
-/// Horizontal part of a unit step along x or y in the isometric view.
+/// Length across the picture of a unit vector along x or y in the isometric view.
 const SIDEWAYS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Vertical part of a unit step along z in the isometric view. A unit step along x goes down by half of this
-/// part, and a unit step along y goes up by half.
+/// Length up the picture of a unit vector along z in the isometric view. A unit vector along x points down by
+/// half of this length, and a unit vector along y points up by half.
 const UPWARDS: f64 = 0.816_496_580_927_726;
 
 impl Projection {
@@ -54,7 +54,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box of all cells with a margin; a box at the origin for no cells.
+    /// Return the box of all cells, with a margin on each side. Without cells, return a box at the origin.
     pub fn of(marks: impl Iterator<Item = Mark>) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];

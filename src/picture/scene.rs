@@ -117,7 +117,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The points to draw, in the order in which they are painted.
+    /// Return the points to draw, in painting order.
     pub fn marks(&self) -> Marks<'_> {
         let points = self.positions.len().min(self.sizes.len());
         let points = points.min(self.values.len()) as u32;
@@ -140,15 +140,15 @@ impl Scene<'_> {
                 sort_by_key(&|mark| mark.value.max(0.0));
             }
             View::Plane => {}
-            // The nearest points are painted last.
+            // Paint the points nearest to the plane of the slice last.
             View::Slice { .. } => sort_by_key(&|mark| -self.depth(mark).abs()),
-            // The picture compares depths.
+            // A depth buffer selects the visible cubes, so the order does not matter.
             View::Orthographic => {}
         }
         Marks { scene: self, order }
     }
 
-    /// The point with a number.
+    /// Return the point with this index.
     fn mark(&self, point: u32) -> Mark {
         let point = point as usize;
         let size = self.sizes[point];
@@ -164,7 +164,8 @@ impl Scene<'_> {
         }
     }
 
-    /// Whether a point is in the layer of a slice; true in other views.
+    /// Test whether the view shows a point. A slice shows the points in its layer; other views show all
+    /// points.
     fn view_holds(&self, mark: &Mark) -> bool {
         match self.effective_view() {
             View::Slice { axis, position } => is_in_slice(axis, position, mark.position, mark.size),
@@ -205,7 +206,7 @@ impl Scene<'_> {
         ColourMap::for_field(self.field)
     }
 
-    /// The values at the ends of the colour bar, the first less than the second.
+    /// Return the values at the ends of the colour bar, the smaller value first.
     pub fn colour_range(&self, marks: &Marks) -> (f64, f64) {
         let given = self
             .range
@@ -229,27 +230,28 @@ impl Scene<'_> {
     }
 }
 
-/// The points of a scene that are drawn, in the order in which they are painted.
+/// The points of a scene to draw, in painting order.
 pub struct Marks<'a> {
     scene: &'a Scene<'a>,
-    /// Numbers of the points. Copies of the points would need ten times the memory.
+    /// Indices of the points. Copies of the points would need ten times the memory.
     order: Vec<u32>,
 }
 
 impl Marks<'_> {
-    /// Whether no point is drawn.
+    /// Test whether no point is drawn.
     pub fn is_empty(&self) -> bool {
         self.order.is_empty()
     }
 
-    /// The points in their order.
+    /// Iterate over the points in painting order.
     pub fn iter(&self) -> impl Iterator<Item = Mark> + Clone {
         self.order.iter().map(|point| self.scene.mark(*point))
     }
 }
 
-/// Whether a slice at `position` (m) along `axis` shows a point at `place` whose cell has this edge (m).
-/// Deformed layers can have gaps, so the reach exceeds half a cell.
+/// Test whether a slice shows a point. The slice is at `position` (m) along `axis`. The point is at `place`
+/// (m), and its cell has this edge (m). Deformed layers can have gaps, so the largest distance is more than
+/// half an edge.
 pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> bool {
     (place[axis.index()] - position).abs() <= 0.75 * edge
 }

@@ -21,7 +21,7 @@ pub struct Body {
     pub span: Range<usize>,
     /// Name of the material.
     pub material_name: String,
-    /// The material.
+    /// Law, density and elastic constants.
     pub material: Material,
     /// The damage law, if bonds can break.
     pub damage: Option<Damage>,
@@ -61,7 +61,7 @@ impl Body {
 /// A material: density, elastic constants and the law that uses them.
 #[derive(Debug, Clone)]
 pub struct Material {
-    /// The law.
+    /// Law with the values of its keys.
     pub law: Law,
     /// Density, kg/m³.
     pub density: f64,
@@ -154,7 +154,7 @@ pub struct InterfacePair {
 pub enum InterfaceDamage {
     /// By the damage laws of both bodies: a bond breaks at the smaller of their thresholds.
     OfBodies,
-    /// Never.
+    /// Bonds never break.
     Unbreakable,
     /// By a separate damage law, which replaces the damage laws of the bodies.
     Own(Damage),
@@ -233,8 +233,8 @@ pub struct Damage {
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
-    /// Toughness by direction; `None` if it is the same in all directions. The fracture energy is that of cracks
-    /// along its axis.
+    /// Dependence of the fracture energy on the direction of the crack; `None` if all directions are equal.
+    /// `toughness` is the fracture energy of cracks along the axis.
     pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
@@ -252,7 +252,7 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The stress of the points of the bond.
+    /// The mean stress of the two points of the bond.
     Stress(StressRule),
 }
 
@@ -274,7 +274,7 @@ pub enum Toughness {
 pub enum PointSource {
     /// Points in the cells of a lattice, if the centre of the cell lies within a shape.
     Lattice {
-        /// The shape.
+        /// The region that the cells fill.
         shape: Shape,
         /// Edges of a cell, m.
         spacing: [f64; 3],
@@ -314,16 +314,16 @@ pub enum PointSource {
 pub enum Shape {
     /// A box, rectangle or interval between two corners.
     Box {
-        /// Lower corner.
+        /// Corner with the smallest coordinates.
         lower: [f64; 3],
-        /// Upper corner.
+        /// Corner with the largest coordinates.
         upper: [f64; 3],
     },
     /// A disc or ball.
     Ball {
-        /// Centre.
+        /// Position of the centre.
         centre: [f64; 3],
-        /// Radius.
+        /// Radius, m.
         radius: f64,
     },
     /// A cylinder between the centres of its ends.
@@ -332,7 +332,7 @@ pub enum Shape {
         from: [f64; 3],
         /// Centre of the other end.
         to: [f64; 3],
-        /// Radius.
+        /// Radius, m.
         radius: f64,
     },
     /// A polygon in the xy plane, extended between two values of z.
@@ -353,7 +353,7 @@ pub enum Shape {
 /// A named set of points.
 #[derive(Debug, Clone)]
 pub struct Set {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
@@ -436,11 +436,11 @@ impl fmt::Debug for MeshSet {
 /// A pre-crack: bonds that cross its surface start broken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PreCrack {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
-    /// The surface.
+    /// Surface that the bonds cross.
     pub surface: Crack,
 }
 
@@ -449,16 +449,16 @@ pub struct PreCrack {
 pub enum Crack {
     /// A segment, in 2-D.
     Segment {
-        /// One end.
+        /// Position of one end.
         from: [f64; 3],
-        /// The other end.
+        /// Position of the other end.
         to: [f64; 3],
         /// Width of the slot, half on each side; 0 for a cut without width.
         width: f64,
     },
     /// A parallelogram.
     Rectangle {
-        /// A corner.
+        /// Position of one corner.
         corner: [f64; 3],
         /// Vector along one edge, from the corner.
         edge_a: [f64; 3],
@@ -469,11 +469,11 @@ pub enum Crack {
     },
     /// A flat disc.
     Disc {
-        /// Centre.
+        /// Position of the centre.
         centre: [f64; 3],
         /// Unit normal.
         normal: [f64; 3],
-        /// Radius.
+        /// Radius, m.
         radius: f64,
         /// Width of the slot, half on each side of the surface; 0 for a cut without width.
         width: f64,

@@ -9,7 +9,7 @@ use crate::points::value_file::ValueColumns;
 /// Initial values of a set.
 #[derive(Debug, Clone)]
 pub struct Initial {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Index of the set.
     pub set: usize,
@@ -24,7 +24,7 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// Whether it moves points at the start.
+    /// Whether the initial values include displacements.
     pub fn displaces(&self) -> bool {
         let by_file = |file: &InitialFile| file.columns.has_displacement();
         self.displacement.is_some() || self.file.as_ref().is_some_and(by_file)
@@ -34,18 +34,18 @@ impl Initial {
 /// A file with initial values, one row per point.
 #[derive(Debug, Clone)]
 pub struct InitialFile {
-    /// Its path.
+    /// Path of the file, relative to the working directory or absolute.
     pub path: PathBuf,
-    /// Span of its path in the deck.
+    /// Span of the path in the deck.
     pub span: Range<usize>,
-    /// Its columns.
+    /// Meaning of the columns, from the heading of the file.
     pub columns: ValueColumns,
 }
 
 /// A load, support or prescribed temperature.
 #[derive(Debug, Clone)]
 pub struct Condition {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Index of the set.
     pub set: usize,

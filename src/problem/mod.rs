@@ -70,14 +70,14 @@ pub struct Problem {
     pub refinement: Option<Refinement>,
     /// Sets: `all`, then one per body, then the sets of the deck.
     pub sets: Vec<Set>,
-    /// Pre-cracks.
+    /// Pre-cracks: bonds that cross their surfaces start broken.
     pub cracks: Vec<PreCrack>,
     /// Initial values. If several apply to a point, the last one counts.
     pub initials: Vec<Initial>,
     /// Loads, supports and temperatures. If several supports or temperatures apply to a point, the last one
     /// counts.
     pub conditions: Vec<Condition>,
-    /// Time settings.
+    /// End, time step and solution method of the run.
     pub time: Time,
     /// Stages of the run in order. If empty, the run is a single stage in which all conditions act.
     /// Otherwise, the last stage ends with [`Self::time`], of which only the end is used.
@@ -86,7 +86,7 @@ pub struct Problem {
     pub output: Output,
     /// Further result files, with separate fields and times.
     pub further_outputs: Vec<Output>,
-    /// The history.
+    /// Content of the history, and interval of its rows.
     pub history: History,
     /// Schedule of checkpoints.
     pub checkpoint: CheckpointRule,
@@ -99,7 +99,7 @@ pub struct Problem {
 pub struct Places {
     /// The horizon of the grid.
     pub horizon: Range<usize>,
-    /// The end time.
+    /// Span of the end time.
     pub end: Range<usize>,
     /// The time step; the span of the end time if the step is automatic.
     pub step: Range<usize>,

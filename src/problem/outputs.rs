@@ -110,20 +110,20 @@ pub struct Reaction {
 /// A set whose reaction force along a direction is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportForce {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
     /// Index of the set.
     pub set: usize,
-    /// Unit vector.
+    /// Direction, a unit vector.
     pub direction: [f64; 3],
 }
 
 /// A crack whose path is computed.
 #[derive(Debug, Clone)]
 pub struct CrackPath {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
@@ -138,7 +138,7 @@ pub struct CrackPath {
 /// A probe: a position; the history contains values of the point nearest to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
@@ -153,18 +153,18 @@ pub struct Probe {
 pub struct Line {
     /// Start position, m.
     pub from: [f64; 3],
-    /// Unit vector.
+    /// Direction, a unit vector.
     pub direction: [f64; 3],
 }
 
 /// A front: the farthest position along a line at which a field exceeds a threshold.
 #[derive(Debug, Clone)]
 pub struct Front {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
-    /// The line.
+    /// Start and direction of the line.
     pub line: Line,
     /// Length of the line, m.
     pub length: f64,
@@ -181,7 +181,7 @@ pub struct Front {
 /// A crack tip: the farthest damaged point in a direction.
 #[derive(Debug, Clone)]
 pub struct Tip {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,

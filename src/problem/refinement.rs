@@ -59,7 +59,7 @@ pub enum HorizonRule {
 /// A region whose points are refined from the start.
 #[derive(Debug, Clone)]
 pub struct RefinedRegion {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,

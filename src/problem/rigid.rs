@@ -8,11 +8,11 @@ use crate::expression::Expression;
 /// A rigid body.
 #[derive(Debug, Clone)]
 pub struct Rigid {
-    /// Name.
+    /// Name in the deck.
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
-    /// Shape.
+    /// Shape about the centre.
     pub shape: RigidShape,
     /// Initial position of the centre, m; for a half space, a point on its surface.
     pub centre: [f64; 3],
@@ -27,21 +27,21 @@ pub struct Rigid {
 pub enum RigidShape {
     /// A ball, or a disc in 2-D.
     Ball {
-        /// Radius.
+        /// Radius, m.
         radius: f64,
     },
     /// A cylinder.
     Cylinder {
         /// Direction of the axis, a unit vector.
         axis: [f64; 3],
-        /// Half the length.
+        /// Half of the length, m.
         half_length: f64,
-        /// Radius.
+        /// Radius, m.
         radius: f64,
     },
     /// A box with edges along the axes.
     Box {
-        /// Half the edges.
+        /// Half of the edge along x, y and z, m.
         half: [f64; 3],
     },
     /// The half space on one side of a plane.

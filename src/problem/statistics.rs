@@ -14,7 +14,7 @@ pub struct FieldStatistics {
     pub span: Range<usize>,
     /// Index of the set.
     pub set: usize,
-    /// The field.
+    /// Field whose values are summed or compared.
     pub field: Field,
     /// Component or invariant of the field.
     pub component: Component,

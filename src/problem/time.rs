@@ -9,7 +9,7 @@ pub struct Time {
     pub end: f64,
     /// Rule for the time step.
     pub step: StepRule,
-    /// The solution method.
+    /// Solution method: explicit time steps, or equilibria by relaxation or Newton's method.
     pub method: Method,
     /// Factor on the density in the equation of motion.
     pub density_scale: f64,
@@ -58,7 +58,7 @@ pub struct Stage {
     pub acting: Vec<bool>,
 }
 
-/// The solution method.
+/// Solution method: explicit time steps, or equilibria by relaxation or Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
     /// Integration of the equation of motion with velocity Verlet.

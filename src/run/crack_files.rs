@@ -9,13 +9,13 @@ use crate::error::{Error, Result};
 use crate::points::distance_squared;
 use crate::solver::observers::{Branch, Surface};
 
-/// First lines of the tables of paths and of fronts.
+/// Headings of the tables: of crack paths (2-D) and of crack fronts (3-D).
 const HEADS: [&str; 2] = [
     "branch,x [m],y [m],length [m]",
     "x [m],y [m],z [m],distance [m]",
 ];
 
-/// Name and table of a crack.
+/// Name of a crack, and its table as CSV text.
 type Table = (String, String);
 
 /// Write `crack_NAME.csv` for each crack, and replace the file of an earlier output. Collective.
@@ -45,7 +45,7 @@ pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[Table]) -> Result
     agree(comm, written)
 }
 
-/// Whether a file is such a table.
+/// Test by the heading whether a file is the table of a crack.
 pub fn is_table(path: &Path) -> bool {
     let text = fs::read_to_string(path).unwrap_or_default();
     text.lines()
@@ -53,13 +53,15 @@ pub fn is_table(path: &Path) -> bool {
         .is_some_and(|head| HEADS.contains(&head))
 }
 
-/// Tables of paths. Each row is a vertex of a branch, with the length of the crack up to it.
+/// Format the tables of crack paths. Each row is a vertex of a branch, with the length of the crack up to
+/// this vertex.
 pub fn of_paths(cracks: Vec<(&str, Vec<Branch>)>) -> Vec<Table> {
     let table = |(name, branches): (&str, Vec<Branch>)| (name.to_owned(), of_branches(&branches));
     cracks.into_iter().map(table).collect()
 }
 
-/// Tables of fronts. Each row is a position of the front, with its distance from the start of the crack.
+/// Format the tables of crack fronts. Each row is a position on the front, with its distance from the start
+/// of the crack.
 pub fn of_surfaces(cracks: Vec<(&str, [f64; 3], Surface)>) -> Vec<Table> {
     let table = |(name, from, surface): (&str, [f64; 3], Surface)| {
         let mut text = format!("{}\n", HEADS[1]);

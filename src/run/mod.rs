@@ -387,7 +387,7 @@ impl<'a> Job<'a> {
         Ok(LoopEnd::Complete)
     }
 
-    /// Return the error of an observer's request. The error is the same on all ranks. Collective.
+    /// Return the error of an invalid request of an observer. The error is the same on all ranks. Collective.
     fn wrong_request<const D: usize>(&self, stepper: &Stepper<'a, D>) -> Error {
         let own = stepper.wrong_request().cloned().map_or(Ok(()), Err);
         match agree(self.comm, own) {
@@ -517,7 +517,7 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// Remove the files of an earlier run that this one does not replace, and report them.
+    /// Remove the files of an earlier run that this run does not replace, and report their paths. Collective.
     fn remove_stale_files(&mut self) -> Result<()> {
         let removed = match self.comm.rank() {
             0 => stale_files::remove(self.problem, &self.files.folder),

@@ -64,8 +64,8 @@ pub enum Message {
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
     },
-    /// A new result replaces an existing one, and files of the earlier run that it does not replace were
-    /// removed.
+    /// Paths of removed files: further results and tables of cracks of an earlier run, which this run does
+    /// not replace.
     Removed(Vec<PathBuf>),
     /// The grid was refined or coarsened.
     Refined {

@@ -279,10 +279,11 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Close the files that are already open when another file fails, and remove those that are new. Collective.
+/// Clean up after a result file could not be opened: close the result files that are already open, and delete
+/// those among them that this run has created. Collective.
 fn abandon(comm: &dyn Communicator, opened: Vec<OutputFile>, files: &Files, starts: &[Start]) {
     for ((file, path), start) in opened.into_iter().zip(files.results()).zip(starts) {
-        // The caller reports the error of the other file, so this error is ignored.
+        // The caller reports why the other file could not be opened, so an error here is ignored.
         let _ = file.close(true);
         if matches!(start, Start::New(_)) && comm.rank() == 0 {
             // An error is ignored, because a result without outputs only takes space.
@@ -420,7 +421,8 @@ fn reason_for_new_result<const D: usize>(
     found_by_root(comm, compare)
 }
 
-/// What is broken in a result file, if its first `outputs` outputs cannot be read. Collective.
+/// Check that the first `outputs` outputs of a result file can be read. Return a description of the damage,
+/// or `None` for an intact file. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

@@ -1,4 +1,5 @@
-//! Files of an earlier run of the same folder, for outputs and cracks that a deck no longer has.
+//! Removal of files of an earlier run from the output folder: results of outputs and tables of cracks that
+//! the deck no longer has.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,8 +10,9 @@ use crate::problem::Problem;
 
 use super::crack_files;
 
-/// Remove the further results (with their side-cars) and the crack files of an earlier run that a run of this
-/// problem does not replace. Return their paths. Files that are not such, by their content, stay. For rank 0.
+/// Remove the further results, with their side-cars, and the tables of cracks that a run of this problem does
+/// not replace. Return the paths of the removed results and tables. A file with such a name but other content
+/// is kept. Called on rank 0.
 ///
 /// # Errors
 /// If a file cannot be removed.
@@ -28,7 +30,7 @@ pub fn remove(problem: &Problem, folder: &Path) -> Result<Vec<PathBuf>> {
             .extension()
             .is_some_and(|extension| extension == "vtkhdf")
         {
-            // A result may have no side-car.
+            // An error is ignored, because the result may have no side-car.
             let _ = fs::remove_file(path.with_extension("xdmf"));
         }
     }
@@ -52,7 +54,8 @@ fn is_stale(problem: &Problem, path: &Path) -> bool {
     false
 }
 
-/// Whether a file is the result of a further output of this name. A renamed result is not.
+/// Test whether a file is the result of a further output with this name. A result that a restart has renamed
+/// has another name in its attributes, so the file is not removed.
 fn is_result_of(path: &Path, name: &str) -> bool {
     let attributes = ResultReader::open(path).and_then(|reader| reader.attributes());
     attributes.is_ok_and(|attributes| {

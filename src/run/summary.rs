@@ -45,11 +45,11 @@ pub struct Phases {
     pub motion: f64,
     /// Refinement and rebalancing.
     pub regridding: f64,
-    /// Result.
+    /// Output of the results.
     pub output: f64,
-    /// History.
+    /// Computation and output of the history.
     pub history: f64,
-    /// Checkpoints.
+    /// Output of checkpoints.
     pub checkpoints: f64,
     /// Total since `Options::started`.
     pub whole: f64,

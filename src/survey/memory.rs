@@ -3,9 +3,9 @@
 /// Resident memory, bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Resident {
-    /// Current.
+    /// Current resident memory.
     pub now: f64,
-    /// Peak.
+    /// Largest resident memory since the start of the process.
     pub peak: f64,
 }
 

@@ -135,8 +135,9 @@ fn two_points_of_peridigm_oscillate() {
     let imported = folder.import("two.yaml", TWO_POINTS).unwrap();
     assert_eq!(imported.code, Code::Peridigm);
     let problem = folder.problem(&imported);
-    // One neighbour at x = 1.5 m with V = 1.5 m³: m = x² V, θ = 3 x e V/m = 3 e/x. The deviatoric extension e − θ x/3 is 0,
-    // so the force state is 3 k θ x/m = 9 k e/m, and the acceleration of the extension −2·2·9 k V/(m ρ) e.
+    // One neighbour at x = 1.5 m with V = 1.5 m³: m = x² V, θ = 3 x e V/m = 3 e/x. The deviatoric extension e
+    // − θ x/3 is 0, so the force state is 3 k θ x/m = 9 k e/m, and the acceleration of the extension −2·2·9 k
+    // V/(m ρ) e.
     let (x, bulk, density) = (1.5_f64, 12e6, 1000.0);
     let frequency = (4.0 * 9.0 * bulk / (x * x * density)).sqrt();
     let end = 4e-3;
@@ -417,7 +418,8 @@ fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
     }
 }
 
-/// PeriLab rejects a plane problem without plane stress or plane strain; the import says what it assumes.
+/// PeriLab rejects a plane material without plane stress or plane strain. The import assumes plane stress,
+/// and its log says so.
 #[test]
 fn a_plane_material_of_perilab_without_symmetry_is_named() {
     let folder = Folder::new("symmetry");

@@ -1,4 +1,4 @@
-//! Areas and fronts of cracks in 3-D, as the history and the tables beside it have them.
+//! Areas and fronts of cracks in 3-D, in the history and in the tables beside the history.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use crate::support::command::{Folder, fissure, succeed};
 use crate::support::history::column;
 use crate::support::{simulate, simulate_on};
 
-/// The surface of the only crack; the history has its area and reach.
+/// Return the surface of the only crack. Assert that the history has the same area and reach.
 fn crack(simulation: &mut Simulation<3>) -> Surface {
     let mut observer = HistoryObserver::new(simulation).unwrap_or_else(|error| panic!("{error}"));
     let snapshot = Snapshot::new(simulation);
@@ -21,7 +21,8 @@ fn crack(simulation: &mut Simulation<3>) -> Surface {
     surface
 }
 
-/// A cube of unit edge about the origin with a number of cells along an edge, cut by pre-cracks.
+/// Return the deck of a cube with an edge of 1 m and its centre at the origin. `cells` is the number of cells
+/// along an edge; `cuts` are pre-cracks.
 fn cube(cells: usize, cuts: &str) -> String {
     format!(
         "dimension = '3d'
@@ -35,14 +36,14 @@ fn cube(cells: usize, cuts: &str) -> String {
     )
 }
 
-/// A disc about the origin.
+/// Return a pre-crack: a disc with its centre at the origin.
 fn disc(normal: [f64; 3], radius: f64) -> String {
     format!(
         "crack.main.disc = {{ centre = [0, 0, 0], normal = {normal:?}, radius = {radius:?} }}\n"
     )
 }
 
-/// The surface of the crack in a cube, which is the same on up to three ranks.
+/// Return the surface of the crack in a cube. Assert that two and three ranks find the same surface.
 fn surface(cells: usize, cuts: &str) -> Surface {
     let deck = cube(cells, cuts);
     let surface = simulate::<3, _>(&deck, |mut simulation| crack(&mut simulation));
@@ -56,7 +57,8 @@ fn surface(cells: usize, cuts: &str) -> Surface {
 
 #[test]
 fn a_plane_across_a_block_has_its_area_in_each_direction_and_no_front() {
-    // The planes through the centre of a cube; that across the space diagonal is a regular hexagon.
+    // Normals of planes through the centre of the cube, and the areas of these sections. The section across
+    // the space diagonal is a regular hexagon.
     let planes = [
         ([0.0, 0.0, 1.0], 1.0),
         ([1.0, 0.0, 0.0], 1.0),
@@ -72,7 +74,8 @@ fn a_plane_across_a_block_has_its_area_in_each_direction_and_no_front() {
             println!("plane {normal:?}, {cells} cells: {error:.4}");
             error
         });
-        // The layers at the faces of the block, of which there are fewer on a fine grid.
+        // The error comes from the layers of points at the faces of the block, so a finer grid has a smaller
+        // error.
         assert!(errors[0].abs() < 0.05, "{normal:?}: {errors:?}");
         assert!(errors[1].abs() < 0.012, "{normal:?}: {errors:?}");
     }
@@ -92,7 +95,8 @@ fn a_penny_has_its_area_and_its_rim_is_the_front() {
                 front.len()
             );
             assert!((reach - radius).abs() < 1.5 * spacing, "{reach}");
-            // The points are about a spacing from one another all around.
+            // Adjacent points of the rim are about one spacing apart. Half of the resulting number is
+            // required.
             assert!(front.len() as f64 > PI * radius / spacing, "{front:?}");
             let mut sum = [0.0; 3];
             for place in &front {
@@ -103,11 +107,11 @@ fn a_penny_has_its_area_and_its_rim_is_the_front() {
                 assert!((-2.0 * spacing..spacing).contains(&off), "{place:?}: {off}");
                 (0..3).for_each(|k| sum[k] += place[k] / front.len() as f64);
             }
-            // No side of the rim has more points than another one.
+            // The points are evenly distributed along the rim, so their mean is near the centre.
             assert!(sum.iter().all(|x| x.abs() < 0.1 * radius), "{sum:?}");
             error
         });
-        // The rim counts as up to 0.08 horizons farther out.
+        // The computed area extends up to 0.08 horizons beyond the rim.
         for (error, cells) in errors.into_iter().zip([16.0, 32.0]) {
             let horizon = 3.0 / cells;
             assert!(
@@ -121,7 +125,7 @@ fn a_penny_has_its_area_and_its_rim_is_the_front() {
 
 #[test]
 fn the_front_of_a_notch_is_its_edge_within_the_block() {
-    // From the left face up to x = 0.13, over the whole width along y.
+    // The notch extends from the left face to x = 0.13, over the whole width along y.
     let cut = |width: f64| {
         format!(
             "crack.main.rectangle = {{ corner = [-1, -1, 0], edge_a = [1.13, 0, 0], edge_b = [0, 2, 0], \
@@ -130,10 +134,11 @@ fn the_front_of_a_notch_is_its_edge_within_the_block() {
     };
     for width in [0.0, 0.11] {
         let Surface { area, reach, front } = surface(24, &cut(width));
-        // Half of the surface that the cut has made.
+        // Half of the surface that the cut creates: two faces of 0.63 m², and the end of a notch with a
+        // width.
         let half = 0.63 + 0.5 * width;
         assert!((area / half - 1.0).abs() < 0.03, "width {width}: {area}");
-        // The corners of the notch at the left face.
+        // The corners of the notch at the left face are farthest from the start.
         assert!((reach - 0.5_f64.sqrt()).abs() < 0.04, "{reach}");
         let places = front.iter().map(|place| place[1]);
         assert!(front.len() >= 24, "{front:?}");
@@ -180,7 +185,7 @@ fn a_layer_of_points_has_the_area_of_its_section() {
 #[test]
 fn a_penny_that_grows_has_equal_bits_on_two_ranks_and_after_a_restart() {
     let folder = Folder::new("crack_surfaces");
-    // On the grid of the start.
+    // Remove the section [refinement] and keep the initial grid.
     let deck = include_str!("../../inputs/penny_crack.toml");
     let (start, refinement) = deck.split_once("[refinement]").unwrap();
     let (_, rest) = refinement.split_once("[material").unwrap();
@@ -227,10 +232,10 @@ fn a_penny_that_grows_has_equal_bits_on_two_ranks_and_after_a_restart() {
         .collect();
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
     let penny = PI * 6e-3 * 6e-3;
-    // A horizon is three quarters of the radius.
+    // The bound on the excess area of a penny is 0.16 horizons per radius; the horizon is 0.75 radii.
     let excess = first[area] / penny - 1.0;
     assert!((0.0..0.16 * 0.75).contains(&excess), "{excess}");
-    // Damage falls below the threshold of 0.35 behind the rim.
+    // The front lies inside the rim, because the damage near the rim is below the threshold of 0.35.
     assert!((4e-3..6e-3).contains(&first[reach]), "{}", first[reach]);
     assert!(last[area] > 3.0 * first[area] && last[reach] > 9e-3);
 }

@@ -1,5 +1,5 @@
-//! Failure by stress: bonds break when the mean von Mises or largest principal stress of their points reaches the
-//! strength, and not before.
+//! Failure by stress: bonds break when the mean von Mises or largest principal stress of their points reaches
+//! the strength, and not before.
 
 use std::collections::BTreeSet;
 
@@ -14,10 +14,10 @@ use fissure::solver::observers::{HistoryObserver, Snapshot};
 const YOUNG: f64 = 5.0;
 const RATIO: f64 = 0.3;
 
-/// Stress at which the bodies of these tests break.
+/// Stress at which the bodies of these tests break, Pa.
 const STRENGTH: f64 = 1e-3 * YOUNG;
 
-/// A block of one law, with a damage law `weak`.
+/// Return the deck of a block of one law, with the damage law `weak`.
 fn deck(dimension: &str, law: &str, keys: &str, damage: &str) -> String {
     let upper = if dimension == "3d" {
         "[6, 5, 5]"
@@ -40,12 +40,13 @@ fn deck(dimension: &str, law: &str, keys: &str, damage: &str) -> String {
     )
 }
 
-/// Damage of bonds in tension and compression.
+/// Return the keys of a damage law that breaks bonds in tension and in compression.
 fn by(measure: &str, strength: f64) -> String {
     format!("measure = '{measure}', strength = {strength}, tension_only = false")
 }
 
-/// Broken bonds and all bonds after an affine motion.
+/// Return the number of broken bonds and of all bonds after a homogeneous deformation with this displacement
+/// gradient.
 fn broken<const D: usize>(text: &str, gradient: [[f64; 3]; 3]) -> (usize, usize) {
     simulate::<D, _>(text, |mut simulation| {
         displace(&mut simulation, |x| {
@@ -58,7 +59,8 @@ fn broken<const D: usize>(text: &str, gradient: [[f64; 3]; 3]) -> (usize, usize)
     })
 }
 
-/// All bonds break at a stress of the strength, none below it. `at` has the motion for a stress.
+/// Assert that no bond breaks at 0.99 of the strength, and that all bonds break at 1.01. `at` returns the
+/// displacement gradient for a stress, Pa.
 fn breaks_at_strength(dimension: &str, measure: &str, at: impl Fn(f64) -> [[f64; 3]; 3]) {
     let laws = [
         ("correspondence", ""),
@@ -126,7 +128,7 @@ fn von_mises_stress_counts_the_stress_across_in_plane_strain() {
     breaks_at_strength("plane-strain", "von_mises", |stress| {
         diagonal([stress * (1.0 + RATIO) / YOUNG, 0.0, 0.0])
     });
-    // σ_xx = σ_yy = 2 (λ + G) ε and σ_zz = 2 λ ε: it is 2G ε again.
+    // σ_xx = σ_yy = 2 (λ + G) ε and σ_zz = 2 λ ε: the von Mises stress is 2G ε again.
     breaks_at_strength("plane-strain", "von_mises", |stress| {
         let strain = stress * (1.0 + RATIO) / YOUNG;
         diagonal([strain, strain, 0.0])
@@ -159,7 +161,7 @@ fn only_longer_bonds_break_with_tension_only() {
             let [i, j] = [a, b].map(|point| model.position(point));
             (j[0] - i[0]) * (j[1] - i[1])
         };
-        // The bonds along the axes are longer by the square of the shear.
+        // Bonds along the axes also become longer, by a term of second order in the shear.
         (simulation.forces).for_each_broken(|a, b| assert!(product(a, b) > -1e-9));
         (simulation.forces).for_each_intact(|a, b| assert!(product(a, b) < -1e-9));
     });
@@ -175,8 +177,8 @@ fn wave(x: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// The bonds that break are those whose ends have a mean of the output field above the strength: in all settings,
-/// with plastic flow and temperature.
+/// A bond breaks if the mean of an output field at its two points exceeds the strength. Checked in 2-D and
+/// 3-D, with plastic flow and temperature.
 #[test]
 fn the_stress_is_that_of_the_output_fields() {
     fn check<const D: usize>(dimension: &str, keys: &str, measure: &str) {
@@ -223,7 +225,8 @@ fn the_stress_is_that_of_the_output_fields() {
             means.len()
         );
     }
-    // Without control, which adds the square of the motion that the family does not see to the fields.
+    // Without zero-energy control: control adds to the output stress a term of second order in the motion
+    // that F does not represent.
     let elastic = ", zero_energy = 'none', thermal_expansion = 1e-4";
     for measure in ["von_mises", "principal"] {
         check::<2>("plane-stress", elastic, measure);
@@ -270,7 +273,7 @@ fn a_bond_takes_the_smaller_strength_of_scattered_points() {
     });
 }
 
-/// Two blocks side by side in uniform strain; that on the right has half the stiffness and the shorter horizon.
+/// Return the deck of two blocks side by side. The right block has half the stiffness and a shorter horizon.
 fn two_blocks(more: &str) -> String {
     format!(
         "dimension = 'plane-strain'
@@ -288,7 +291,8 @@ fn two_blocks(more: &str) -> String {
     )
 }
 
-/// Bonds across the interface that are broken and intact after a strain along x, by whether they are longer than 2.2.
+/// Return the numbers of broken and of intact bonds across the interface after a strain along x. In each
+/// pair, the first number counts the bonds up to 2.2 m, the second number the longer bonds.
 fn across(text: &str, strain: f64) -> [[u32; 2]; 2] {
     simulate::<2, _>(text, |mut simulation| {
         displace(&mut simulation, |[x, y, z]| [x * (1.0 + strain), y, z]);
@@ -311,7 +315,8 @@ fn across(text: &str, strain: f64) -> [[u32; 2]; 2] {
 fn an_end_whose_horizon_does_not_contain_the_bond_does_not_count() {
     let stiffness = YOUNG * (1.0 - RATIO) / ((1.0 + RATIO) * (1.0 - 2.0 * RATIO));
     let text = two_blocks("");
-    // Left the stress is 1.2 of the strength, right half of that; the mean is 0.9.
+    // On the left, the stress is 1.2 times the strength; on the right, 0.6 times. The mean is 0.9 times the
+    // strength.
     let [broken, intact] = across(&text, 1.2 * STRENGTH / stiffness);
     assert!(broken[0] == 0 && intact[0] > 0, "{broken:?} {intact:?}");
     assert!(broken[1] > 0 && intact[1] == 0, "{broken:?} {intact:?}");
@@ -324,7 +329,8 @@ fn a_pair_of_bodies_breaks_by_its_own_strength() {
     let pair = "interface.pair.glue = { bodies = ['left', 'right'], damage = 'glue' }
         damage.glue.stress = { measure = 'von_mises', strength = 1e-4 }";
     let strain = 1e-4;
-    // The von Mises stress is 2G ε: 3.8e-4 left and half of that right. Inside, nothing breaks.
+    // The von Mises stress is 2G ε: 3.8e-4 Pa on the left, and half of this on the right. No bond inside a
+    // block breaks.
     simulate::<2, _>(&two_blocks(pair), |mut simulation| {
         displace(&mut simulation, |[x, y, z]| [x * (1.0 + strain), y, z]);
         let is_left = |point: usize| simulation.model.position(point)[0] < 6.0;
@@ -353,15 +359,15 @@ fn a_spinning_square_does_not_break() {
             let mut broken = 0;
             simulation.forces.for_each_broken(|_, _| broken += 1);
             assert_eq!(broken, 0, "{measure}");
-            // It has made more than one turn.
+            // In 2000 s at 4e-3 rad/s, the square makes more than one turn.
             let [x, y] = [0, 1].map(|d| simulation.fields.displacement[d][0]);
             assert!(x.abs().max(y.abs()) > 1.0, "{x} {y}");
         });
     }
 }
 
-/// A bar pulled in load steps carries the strength times its cross-section and no more. What is left of its zone of broken
-/// bonds then carries little.
+/// The largest load of a bar pulled in load steps is the strength times the cross-section. Afterwards, the
+/// zone of broken bonds carries a small load.
 #[test]
 fn a_pulled_bar_carries_the_strength() {
     for (measure, method) in [
@@ -415,8 +421,9 @@ fn a_pulled_bar_carries_the_strength() {
     }
 }
 
-/// A notched plate is torn: the crack runs from the notch, and energy balances. The fracture energy is never negative. It can fall
-/// by a little, because a bond that breaks changes the deformation gradient of its points.
+/// A notched plate tears: the crack runs from the notch, and the energy balance closes. The fracture energy
+/// is never negative. It can decrease slightly, because a breaking bond changes the deformation gradients of
+/// its two points.
 #[test]
 fn a_notched_plate_tears_and_its_energy_balances() {
     let text = format!(

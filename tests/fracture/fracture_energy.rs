@@ -469,8 +469,9 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     }
 }
 
-/// Return the deck of [`text`] with two bodies that meet at the cut; `rule` applies to bonds between them only.
-/// `own` has the keys of `[damage.own.…]`, the damage law of the bodies; `None` for bodies without damage.
+/// Return the deck of [`text`] with two bodies that meet at the cut; `rule` applies to bonds between them
+/// only. `own` has the keys of `[damage.own.…]`, the damage law of the bodies; `None` for bodies without
+/// damage.
 fn pair_text(dimension: &str, ratio: u32, law: &str, rule: &str, own: Option<&str>) -> String {
     let whole = text(dimension, ratio, law, rule);
     let (before, body) = whole.split_once("[body.block]").unwrap();
@@ -700,8 +701,8 @@ fn between_bodies_of_different_horizons_by_energy() {
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         assert!((0.8..1.2).contains(&inside), "{case}");
         // At the border, the spacings on both sides differ. A sum over bonds is then not a midpoint rule, so
-        // its error is larger than inside. With correspondence, the cost also varies by some per cent with the
-        // order in which bonds break.
+        // its error is larger than inside. With correspondence, the cost also varies by some per cent with
+        // the order in which bonds break.
         assert!((border / inside - 1.0).abs() < 0.12, "{case}");
     }
 }

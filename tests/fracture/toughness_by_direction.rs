@@ -1,5 +1,5 @@
-//! Toughness by direction of the bond: opening costs the fracture energy of its direction, and cracks follow the weak
-//! direction.
+//! Toughness by direction of the bond: opening costs the fracture energy of its direction, and cracks follow
+//! the weak direction.
 
 use crate::support::equilibria::same_on_ranks;
 use crate::support::{displace, problem, simulate};
@@ -9,7 +9,7 @@ use fissure::solver::calibration::separation_energy_ratio;
 /// Fracture energy of cracks along the direction, J/m².
 const ALONG: f64 = 2.0;
 
-/// A body of unit spacing that breaks by a rule with these keys.
+/// Return the deck of a block of unit spacing, with a damage rule and the keys of this rule.
 fn deck(dimension: &str, horizon: u32, law: &str, rule: &str, keys: &str) -> String {
     let corner = if dimension == "3d" { "9, 9, 9" } else { "9, 9" };
     format!(
@@ -31,13 +31,13 @@ fn directed(ratio: f64, axis: &str) -> String {
     )
 }
 
-/// Energy of opening along y, divided by the fracture energy of this direction.
+/// Return the computed energy of an opening along y, divided by the fracture energy of this direction.
 fn cost(text: &str) -> f64 {
     separation_energy_ratio(&problem(text), 0, 0.0).expect("the block separates")
 }
 
-/// The cost of opening in units of the fracture energy of its direction is that of an isotropic body within the error that
-/// the lattice makes in the directions of bonds.
+/// The cost of an opening, divided by the fracture energy of its direction, equals the cost in an isotropic
+/// body. The bounds allow for the few directions of the bonds of a lattice.
 #[test]
 fn opening_costs_the_fracture_energy_of_its_direction() {
     let pmb = "pmb = { density = 2, youngs_modulus = 1e6 }";
@@ -55,7 +55,7 @@ fn opening_costs_the_fracture_energy_of_its_direction() {
             0.08,
         ),
     ] {
-        // In correspondence, the order in which bonds break changes the energy too.
+        // With correspondence, the energy also depends on the order in which bonds break.
         let laws = [
             (pmb, "critical_stretch", bound),
             (pmb, "energy", bound),
@@ -79,7 +79,8 @@ fn opening_costs_the_fracture_energy_of_its_direction() {
     }
 }
 
-/// The threshold of each bond has the ratio that its direction says.
+/// The breaking strain of a bond, divided by that of an isotropic body, depends on the direction of the bond
+/// as w_c does.
 #[test]
 fn bonds_along_the_direction_break_last() {
     let law = "pmb = { density = 2, youngs_modulus = 1e6 }";
@@ -90,7 +91,7 @@ fn bonds_along_the_direction_break_last() {
         "critical_stretch",
         &directed(1.9, "[3, 0]"),
     );
-    // The largest ratio with k = 1: w_c = (0.1 + 2.7 (n·a)²) w.
+    // 1.9 is the largest ratio with the exponent k = 1: w_c = (0.1 + 2.7 (n·a)²) w.
     let isotropic = deck(
         "plane-stress",
         2,
@@ -131,7 +132,7 @@ fn bonds_along_the_direction_break_last() {
     );
 }
 
-/// Two bodies with fibres in different directions, which are torn apart.
+/// Two bodies with fibres in different directions are torn apart.
 #[test]
 fn ranks_change_no_bit() {
     for (law, rule) in [
@@ -163,8 +164,8 @@ fn ranks_change_no_bit() {
     }
 }
 
-/// Angle (degrees) of the crack that grows from a notch along x under tension along y: of the points that have lost 40 % of
-/// their bonds, 6 to 14 spacings ahead of the notch.
+/// Return the angle to x (degrees) of a crack that grows from a notch along x under tension along y. The
+/// angle is a mean over the points, 6 to 14 spacings ahead of the notch, that have lost 40 % of their bonds.
 fn angle_of_crack(law: &str, damage: &str) -> f64 {
     let text = format!(
         "dimension = 'plane-stress'
@@ -202,7 +203,8 @@ fn angle_of_crack(law: &str, damage: &str) -> f64 {
     })
 }
 
-/// Fibres at 30° turn the crack, by some degrees more than that: the strengths of bonds differ more than the energies.
+/// Fibres at 30° turn the crack by about 30° or some degrees more, because the thresholds of bonds depend
+/// more on the direction than the fracture energy of cracks.
 #[test]
 fn a_crack_follows_the_weak_direction() {
     let pmb = "pmb = { density = 2, youngs_modulus = 5 }";

@@ -332,7 +332,8 @@ fn all_bonds_across_an_area_take_the_fracture_energy_and_the_largest_stress_is_t
         for curve in CURVES {
             let keys = [("tensile_strength", strength), ("fracture_energy", energy)];
             let law = concrete(dimension, curve, keys);
-            // Energy that both ends of a bond of length r dissipate, summed over the bonds that cross a unit area.
+            // Energy that both ends of a bond of length r dissipate, summed over the bonds that cross a unit
+            // area.
             let (horizon, cells) = (0.03, 600_u32);
             let step = horizon / f64::from(cells);
             let middle = |k: u32| (f64::from(k) + 0.5) * step;

@@ -1,6 +1,7 @@
-//! The theorems of Emmrich & Weckner 2006 about the linear equation of motion, sections 2 and 3, for the discrete
-//! equation: the energy inequality, the a priori estimate (theorem 3.2) and the stability against a perturbed kernel
-//! (theorem 3.3). One half of the plate has Gauss points, the other midpoints, as section 4 of the paper allows.
+//! Theorems of Emmrich & Weckner 2006 (sections 2 and 3) about the linear equation of motion, checked for the
+//! discretized equation. They are the energy inequality, the a priori estimate of the displacement (theorem
+//! 3.2), and the bound on the effect of a perturbed kernel (theorem 3.3). One half of the plate has Gauss
+//! points and the other half has midpoints, the two quadratures of section 4.
 
 use crate::support::history::row;
 use crate::support::simulate;
@@ -12,8 +13,9 @@ const HORIZON: f64 = 3.0;
 const END: f64 = 2.0;
 const STEPS: usize = 400;
 
-/// Return the deck of a plate of 8 × 4 cells with damping r = `damping` (1/s) and the body force `push` sin(2t)
-/// along x (N/m³). Initial displacements and velocities are mainly translations.
+/// Return the deck of a plate of 8 × 4 cells with the kernel function `lambda`, λ(r). The damping is r =
+/// `damping` (1/s), the body force `push` sin(2t) along x (N/m³). The initial displacements and velocities
+/// are nearly uniform.
 fn deck(lambda: &str, damping: f64, push: f64) -> String {
     let step = END / STEPS as f64;
     format!(
@@ -47,7 +49,7 @@ fn deck(lambda: &str, damping: f64, push: f64) -> String {
     )
 }
 
-/// Return the norm in L²: √(∫ |v|² dV).
+/// Return the L² norm of a vector field: √(∫ |v|² dV).
 fn norm(simulation: &Simulation<2>, values: &[Vec<f64>; 2]) -> f64 {
     let volume = &simulation.model.volume;
     let points = 0..simulation.model.owned();
@@ -69,13 +71,13 @@ fn displacements(lambda: &str, damping: f64, push: f64) -> Vec<[Vec<f64>; 2]> {
     })
 }
 
-/// Return a bound of the L² norm of the operator v ↦ ∫ K (v' − v) dV' with K = λ ξ⊗ξ/ρ: κ + κ₀ of proposition
-/// 3.1 with p = q = 2.
+/// Return the upper bound κ + κ₀ of the L² norm of the operator v ↦ ∫ K (v' − v) dV', with K = λ ξ⊗ξ/ρ. The
+/// bound is that of proposition 3.1 with p = q = 2.
 fn bound(simulation: &Simulation<2>, lambda: impl Fn(f64) -> f64) -> f64 {
     let model = &simulation.model;
     let (mut kappa, mut kappa_0) = (0.0, 0.0_f64);
     for i in 0..model.owned() {
-        // The entries xx, xy, yy of K₀.
+        // Entries xx, xy and yy of K₀ = ∫ K dV' at point i.
         let mut sum = [0.0; 3];
         for j in (0..model.owned()).filter(|j| *j != i) {
             let [here, there] = [i, j].map(|k| model.position(k));
@@ -96,7 +98,8 @@ fn bound(simulation: &Simulation<2>, lambda: impl Fn(f64) -> f64) -> f64 {
     kappa.sqrt() + kappa_0
 }
 
-/// Compute ∫ e^{−r(t−s)/2} sinh((t − s) w)/w f(s) ds over the first `count` steps, by the trapezoidal rule.
+/// Compute ∫ e^{−r(t−s)/2} sinh((t − s) w)/w f(s) ds from 0 to t by the trapezoidal rule. t is the end of
+/// step `count`, r is `damping`, and `values` returns f at a step.
 fn response(count: usize, damping: f64, w: f64, values: impl Fn(usize) -> f64) -> f64 {
     let step = END / STEPS as f64;
     let at = |k: usize| {
@@ -109,8 +112,8 @@ fn response(count: usize, damping: f64, w: f64, values: impl Fn(usize) -> f64) -
 
 #[test]
 fn the_a_priori_estimate_holds() {
-    // The plate is so soft that the motion is mainly a translation. The displacement is then close to the
-    // bound.
+    // The plate is so soft that it mainly translates. The norm of the displacement is then close to the
+    // estimate.
     let (damping, push) = (0.6, 2e-3);
     let lambda = |length: f64| 2e-3 / length.powi(3);
     let text = "2e-3/r^3";
@@ -172,8 +175,8 @@ fn a_perturbed_kernel_changes_the_motion_as_much_as_allowed() {
 
 #[test]
 fn the_energy_inequality_holds() {
-    // Inequality after eq. 8 of the paper, for a force that varies in time. It holds for every ν > 0, a
-    // parameter of the inequality (not Poisson's ratio).
+    // The inequality after eq. 8 of the paper, for a force that varies in time. It holds for every value of
+    // its parameter ν > 0, which is not Poisson's ratio.
     let push = 2e-3;
     simulate::<2, _>(&deck("2e-2/r^3", 0.0, push), |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();

@@ -67,7 +67,7 @@ fn values_of_a_file_are_those_of_expressions() {
             assert!(found.as_ref() == Ok(&expected), "{name} on {ranks} ranks");
         }
     }
-    // The file has no values for the points left of the set.
+    // `right.txt` has no rows for points outside the set `right`.
     for ranks in 1..5 {
         let error = start(&folder, "initial.push.file = 'right.txt'", ranks).unwrap_err();
         assert!(

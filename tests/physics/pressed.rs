@@ -25,8 +25,8 @@ fn load_steps<const D: usize>(deck: &str, names: &[&str]) -> Vec<Vec<f64>> {
     })
 }
 
-/// Return a deck with a spacing of 1 m, E = 5 Pa and bonds between nearest neighbours only, which is a chain of
-/// springs. The method is a relaxation with 4 load steps.
+/// Return a deck with a spacing of 1 m, E = 5 Pa and bonds between nearest neighbours only, which is a chain
+/// of springs. The method is a relaxation with 4 load steps.
 fn bars(bodies: &str) -> String {
     format!(
         "dimension = '1d'
@@ -111,7 +111,8 @@ fn two_blocks_pressed_together_and_pulled_apart() {
         assert!((row[1] - force).abs() < 1e-6, "{row:?} for {force}");
         assert!((row[2] + force).abs() < 1e-6, "{row:?} for {force}");
     }
-    // The contact opens within the last load step, so the work of the trapezoid rule is inaccurate in this step.
+    // The contact opens within the last load step, so the work of the trapezoid rule is inaccurate in this
+    // step.
     assert_balance(&rows[..3], 3, rows[0][4].abs());
 }
 

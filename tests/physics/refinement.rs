@@ -255,7 +255,8 @@ fn least_energy_at_rest(bonds: &str) -> f64 {
 #[test]
 fn patches_lose_less_with_bonds_of_mean_horizons() {
     let [own, mean] = ["own", "average"].map(least_energy_at_rest);
-    // A wave, whose energy is half kinetic, loses 17.1 and 8.2 % in such a patch (docs/src/verification/dipasquale.md).
+    // A wave, whose energy is half kinetic, loses 17.1 and 8.2 % in such a patch
+    // (docs/src/verification/dipasquale.md).
     assert!(own < 0.75, "{own}");
     assert!((0.78..0.9).contains(&mean), "{mean}");
 }

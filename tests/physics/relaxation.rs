@@ -201,7 +201,7 @@ fn failure<const D: usize>(mut simulation: Simulation<D>) -> String {
     }
 }
 
-/// The message with which the set-up fails on each rank.
+/// Return the error message of the set-up on each rank.
 fn refusals<const D: usize>(ranks: usize, deck: &str) -> Vec<String> {
     let problem = problem(deck);
     threads::run(ranks, |comm: &dyn Communicator| {
@@ -229,7 +229,8 @@ fn a_body_that_nothing_holds_says_so() {
     }
 }
 
-/// A bar with a weight that acts in the second of four load steps.
+/// Return the deck of a bar with a body force, N/m³, that acts in the second of four load steps only. `hold`
+/// is a further condition.
 fn weighed_bar(method: &str, weight: f64, hold: &str) -> String {
     format!(
         "dimension = '1d'

@@ -349,7 +349,7 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
     assert!(printed.contains("complete already"), "{printed}");
     assert_eq!(difference(&before, &datasets(&result(&out))), None);
 
-    // An end before the checkpoint leaves no step to make.
+    // If the new end is before the checkpoint, the run makes no further step.
     let earlier = ["--restart", "--set", "end=5e-6"];
     let printed = succeed(&mut run(1, &deck, &out, &earlier));
     assert!(!printed.contains(" to go, after "), "{printed}");

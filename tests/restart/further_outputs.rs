@@ -257,7 +257,7 @@ fn an_overwritten_run_leaves_no_results_of_outputs_that_the_deck_no_longer_has()
     let first = deck(&folder, "deck.toml", &[FURTHER, crack]);
     let out = folder.join("out");
     succeed(&mut run(1, &first, &out, &["--set", "end=4e-7"]));
-    // A renamed result and files of the user.
+    // A result that a restart has renamed, and files of the user, must not be removed.
     let copy = |name: &str| std::fs::copy(out.join("result_once.vtkhdf"), out.join(name)).unwrap();
     copy("result_once_until_step_20.vtkhdf");
     folder.write("out/result_mine.vtkhdf", "not a result");

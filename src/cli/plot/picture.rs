@@ -177,7 +177,8 @@ enum Range {
     Values((f64, f64)),
 }
 
-/// Values at the ends of the colour bar (`shown`), and smallest and largest value (`all`).
+/// Range of the drawn values. `shown` are the values at the ends of the colour bar; `all` are the smallest
+/// and the largest value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     shown: [f64; 2],
@@ -243,7 +244,7 @@ impl Limits {
 /// Settings that all frames of a film share.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
-    /// The drawn box.
+    /// Box that all frames show, m.
     pub bounds: Bounds,
     /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
@@ -266,8 +267,8 @@ impl Frame {
 /// lattice differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
-/// Most combinations of coordinates of a lattice with n points, divided by n^1.5. Scattered points have more
-/// combinations.
+/// Largest number of combinations of coordinates of a lattice with n points, divided by n^1.5. Scattered
+/// points have more combinations; see [`scattered_bodies`].
 const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Settings of all pictures of a result.
@@ -276,7 +277,7 @@ pub struct Painter<'a> {
     arguments: &'a PictureArguments,
     dimension: usize,
     title: String,
-    /// The drawn quantity.
+    /// Field and component of the drawn values, with label and unit.
     pub quantity: Quantity,
     has_displacement: bool,
     section: f64,
@@ -294,7 +295,7 @@ pub struct Painter<'a> {
 struct Points {
     positions: Vec<[f64; 3]>,
     sizes: Vec<f64>,
-    /// Whether the body of a point has scattered points; empty if no body has.
+    /// For each point, whether its body has scattered points; empty if no body has scattered points.
     scattered: Vec<bool>,
     values: Vec<f64>,
     lines: Vec<(usize, Vec<[f64; 3]>)>,
@@ -409,7 +410,8 @@ impl<'a> Painter<'a> {
         Ok(step.unwrap_or(1.0) * power)
     }
 
-    /// Read the points of an output in blocks; of a slice only those that it shows.
+    /// Read the points of an output, block by block. If the view is a slice, keep only the points in the
+    /// slice.
     fn points(&self, index: usize) -> Result<Points> {
         let mut found = Points::default();
         let count = self.result.points(index);
@@ -449,7 +451,7 @@ impl<'a> Painter<'a> {
         Ok(found)
     }
 
-    /// Positions as they are drawn, m.
+    /// Return the drawn positions, m: reference positions plus displacements times the deformation factor.
     fn moved<'b>(
         &'b self,
         places: &'b [[f64; 3]],
@@ -478,7 +480,8 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// For each of some points whether it belongs to a body with scattered points; empty if there is no such body.
+    /// Return for each of these points whether its body has scattered points; empty if no body has scattered
+    /// points.
     fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
         if !self.scattered.contains(&true) {
             return Ok(Vec::new());
@@ -500,8 +503,8 @@ impl<'a> Painter<'a> {
         Limits::of(scene.drawn_values(), range)
     }
 
-    /// Return the frame of an output, for the union of the frames of all outputs; `None` if no point is
-    /// drawn.
+    /// Return the frame that encloses an output; `None` if no point is drawn. A film uses the union of the
+    /// frames of its outputs.
     ///
     /// # Errors
     /// If the result is damaged.
@@ -517,8 +520,8 @@ impl<'a> Painter<'a> {
         }))
     }
 
-    /// Draw an output with the text of its time. `frame` gives box and limits; without `frame`, the output
-    /// sets both.
+    /// Draw an output; `time` is the text of its time. Box and limits come from `frame`, or from the output
+    /// if `frame` is `None`.
     ///
     /// # Errors
     /// If the result is damaged.
@@ -592,11 +595,13 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// The points that are nearest to the vertices of lines, and their displacements.
+/// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of its
+/// nearest point.
 struct NearestPoints<'a> {
-    /// Each line with the number of its file.
+    /// The lines, each with the index of its file.
     lines: Vec<(usize, &'a Line)>,
-    /// Distance of the nearest point so far from each vertex of all lines, and its displacement, m.
+    /// For each vertex of all lines, in order: distance of the nearest point found so far, and displacement
+    /// of this point, m.
     nearest: Vec<(f64, [f64; 2])>,
 }
 
@@ -612,7 +617,7 @@ impl<'a> NearestPoints<'a> {
         }
     }
 
-    /// Compare with further points.
+    /// Search a block of points. `displacements` has three components per point, m.
     fn look(&mut self, positions: &[[f64; 3]], displacements: &[f64]) {
         let vertices = self.lines.iter().flat_map(|(_, line)| line.iter());
         for (place, nearest) in vertices.zip(&mut self.nearest) {
@@ -625,7 +630,8 @@ impl<'a> NearestPoints<'a> {
         }
     }
 
-    /// The lines to draw, with the numbers of their files. Each vertex is displaced with its nearest point.
+    /// Return the lines to draw, each with the index of its file. Each vertex is moved by the displacement of
+    /// its nearest point times `factor`.
     fn moved(&self, factor: f64) -> Vec<(usize, Vec<[f64; 3]>)> {
         let mut nearest = self.nearest.iter();
         let mut moved = |place: &[f64; 2]| {
@@ -639,16 +645,16 @@ impl<'a> NearestPoints<'a> {
     }
 }
 
-/// Number of points that are read at once.
+/// Number of points that are read at once; limits the memory of a picture.
 const BLOCK: usize = 1 << 18;
 
-/// The ranges of points that are read at once.
+/// Divide `points` points into ranges of at most [`BLOCK`] points.
 fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
     let block = move |first: usize| first..(first + BLOCK).min(points);
     (0..points).step_by(BLOCK).map(block)
 }
 
-/// Whether all values of a field are 0 at an output.
+/// Test whether all values of a field are 0 at an output.
 fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool> {
     for points in blocks(result.points(index)) {
         let values = result.field_of(field, index, points)?;
@@ -659,15 +665,16 @@ fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool> {
     Ok(true)
 }
 
-/// Which bodies have scattered points at an output, by number.
+/// Return for each body whether its points are scattered at an output; empty for bars.
 ///
-/// The n points of a lattice share coordinates, with about n combinations of different coordinates. Scattered
-/// points have n² combinations in the plane. Bodies with few points do not count as scattered.
+/// The number of combinations is the product of the numbers of different x, y and z. For n points of a
+/// lattice, it is about n. For n scattered points in the plane, it is n². A body with few points does not
+/// count as scattered.
 fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Result<Vec<bool>> {
     if dimension < 2 || result.times()?.is_empty() {
         return Ok(Vec::new());
     }
-    // Number of points of each body, and of combinations of their coordinates.
+    // Number of points of each body.
     let mut points_of: Vec<usize> = Vec::new();
     for points in blocks(result.points(index)) {
         for body in result.field_of("block", index, points)? {
@@ -678,7 +685,7 @@ fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Re
     }
     let mut combinations = vec![1.0; points_of.len()];
     for d in 0..dimension {
-        // One direction after the other, for the memory.
+        // Store the coordinates of one direction at a time, to limit the memory.
         let of_body = points_of.iter().map(|points| Vec::with_capacity(*points));
         let mut along: Vec<Vec<f64>> = of_body.collect();
         for points in blocks(result.points(index)) {

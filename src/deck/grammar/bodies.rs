@@ -14,8 +14,8 @@ use crate::deck::spanned::Spanned;
 pub struct Body {
     /// Name of the material.
     pub material: Text,
-    /// Name of the damage law. Without one, bonds never break. Exceptions are bonds of `softening_pmb`, and pairs of
-    /// bodies with their own damage law.
+    /// Name of the damage law. Without one, bonds never break. Exceptions are bonds of `softening_pmb`, and
+    /// pairs of bodies with their own damage law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
@@ -27,7 +27,8 @@ pub struct Body {
     /// Lattice spacing of this body in m; the spacing of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
-    /// Positions of the points in a cell of this body: `"midpoint"` or `"gauss"`; the value of `[grid]` if not given.
+    /// Positions of the points in a cell of this body: `"midpoint"` or `"gauss"`; the value of `[grid]` if
+    /// not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<Spanned<Quadrature>>,
     /// Horizon of this body in m; the horizon of `[grid]` if not given.
@@ -35,8 +36,8 @@ pub struct Body {
     pub horizon: Option<Number>,
 }
 
-/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are `x y [z]
-/// volume block`, separated by commas or spaces, unless a header names other columns.
+/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are `x
+/// y [z] volume block`, separated by commas or spaces, unless a header names other columns.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {

@@ -7,23 +7,23 @@ use super::{Tables, Text};
 use crate::deck::number::Number;
 use crate::deck::spanned::Spanned;
 
-/// Contact between points that no bond joins, in different bodies or in the same body (such as the faces of a crack).
-/// With this section, bodies are bonded to one another only if `[interface]` requests it.
+/// Contact between points that no bond joins, in different bodies or in the same body (such as the faces of a
+/// crack). With this section, bodies are bonded to one another only if `[interface]` requests it.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon. `"short-range"`:
-    /// short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`: contact only between pairs
-    /// with their own rule.
+    /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon.
+    /// `"short-range"`: short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`:
+    /// contact only between pairs with their own rule.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of both materials in series. With
-    /// `"short-range"`, the spring constant in Pa; by default 15 times the smaller bulk modulus.
+    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of both materials in
+    /// series. With `"short-range"`, the spring constant in Pa; by default 15 times the smaller bulk modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Distance in m at which contact begins. The default is the mean edge of the two cells, or 1.35 times this edge
-    /// with `"short-range"`. For points that start closer, contact begins below their initial distance (0.9 of it with
-    /// `"short-range"`).
+    /// Distance in m at which contact begins. The default is the mean edge of the two cells, or 1.35 times
+    /// this edge with `"short-range"`. For points that start closer, contact begins below their initial
+    /// distance (0.9 of it with `"short-range"`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
@@ -32,8 +32,8 @@ pub struct Contact {
     /// Coefficient of static friction; `friction` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// Relative speed of two points after a collision, divided by the speed before it; from 0.01 to 1. The default is 1
-    /// (no damping).
+    /// Relative speed of two points after a collision, divided by the speed before it; from 0.01 to 1. The
+    /// default is 1 (no damping).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
     /// Pairs of bodies with their own rule, by a freely chosen name.

@@ -16,28 +16,29 @@ pub struct Grid {
     pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded.
     pub horizon: Number,
-    /// Position in m of a corner of a lattice cell. The default in each direction follows from the first body that is a
-    /// whole number of cells long between flat faces: 0 if cells from 0 fill it exactly, otherwise its lower face.
-    /// Without such a body, the default is 0.
+    /// Position in m of a corner of a lattice cell. The default in each direction follows from the first body
+    /// that is a whole number of cells long between flat faces: 0 if cells from 0 fill it exactly, otherwise
+    /// its lower face. Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
-    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"` or `"none"`. The default is
-    /// `"exact"` if all points are centres of square or cubic cells, otherwise `"none"`.
+    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"` or `"none"`. The default
+    /// is `"exact"` if all points are centres of square or cubic cells, otherwise `"none"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_correction: Option<Spanned<VolumeCorrection>>,
     /// Positions of the points in a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
-    /// Largest random displacement of the points of shapes from their cell centres in each direction, in spacings;
-    /// below 0.5. Points are not displaced if this is not given.
+    /// Largest random displacement of the points of shapes from their cell centres in each direction, in
+    /// spacings; below 0.5. Points are not displaced if this is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter: Option<Number>,
     /// Seed of the random displacements of `jitter`; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
-    /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid; points from a file
-    /// can form one. `"list"` works for any points. `"auto"` uses a lattice where possible. Bonds between bodies on
-    /// different grids are always stored in lists. The choice changes results by rounding only.
+    /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid; points
+    /// from a file can form one. `"list"` works for any points. `"auto"` uses a lattice where possible. Bonds
+    /// between bodies on different grids are always stored in lists. The choice changes results by rounding
+    /// only.
     #[serde(default = "automatic")]
     pub family: Spanned<Family>,
 }
@@ -64,7 +65,8 @@ pub enum Family {
 pub enum VolumeCorrection {
     /// No correction: points within the horizon have their full volume.
     None,
-    /// The factor on the volume is clamp((δ + dx/2 − |ξ|)/dx, 0, 1), also for points beyond the horizon (PA-HHB).
+    /// The factor on the volume is clamp((δ + dx/2 − |ξ|)/dx, 0, 1), also for points beyond the horizon
+    /// (PA-HHB).
     Linear,
     /// As `linear`, without points beyond the horizon (LAMMPS; Dipasquale et al. 2014, eq. 1 with eq. 10).
     LinearInside,
@@ -87,9 +89,10 @@ pub enum Quadrature {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interface {
-    /// Constants of the bonds between blocks. `"own"`: each end exerts its half of the force with its own modulus and
-    /// horizon. `"average"` and `"minimum"`: both ends use the mean or the smaller modulus and horizon. `"none"`:
-    /// blocks are not bonded, whatever their distance. The default is `"own"`, or `"none"` with `[contact]`.
+    /// Constants of the bonds between blocks. `"own"`: each end exerts its half of the force with its own
+    /// modulus and horizon. `"average"` and `"minimum"`: both ends use the mean or the smaller modulus and
+    /// horizon. `"none"`: blocks are not bonded, whatever their distance. The default is `"own"`, or `"none"`
+    /// with `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
     /// Pairs of bodies with their own rule or damage law, by a freely chosen name.
@@ -106,13 +109,13 @@ pub struct Pair {
     /// As in `[interface]`; the rule of `[interface]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"` these bonds
-    /// never break. If neither this nor `strength` is given, the bonds break at the smaller threshold of the two
-    /// bodies.
+    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
+    /// these bonds never break. If neither this nor `strength` is given, the bonds break at the smaller
+    /// threshold of the two bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
-    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch follows from
-    /// it.
+    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch
+    /// follows from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strength: Option<Number>,
 }

@@ -178,13 +178,13 @@ pub struct CriticalStretch {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`: their normal is perpendicular to it.
+    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`: their normal is parallel to it.
+    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
-    /// Fibres, or the normal of layers, in the undeformed body; a vector of any length.
+    /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
     /// The critical stretch s0 itself.
@@ -193,7 +193,8 @@ pub struct CriticalStretch {
     /// α in the criterion s ≥ s0 − α s_min. The default 0 gives a constant critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
-    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
+    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
+    /// given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weibull_modulus: Option<Number>,
     /// Seed of the random strengths of `weibull_modulus`; 0 if not given.
@@ -214,34 +215,35 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`: their normal is perpendicular to it.
+    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`: their normal is parallel to it.
+    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
-    /// Fibres, or the normal of layers, in the undeformed body; a vector of any length.
+    /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
-    /// How the critical work follows from the toughness. "energy": breaking all bonds across an area dissipates the
-    /// fracture energy. "opening": separating a block of the body costs the fracture energy; this is computed before
-    /// the run. "willberg2022": eq. 16 and 18 of Willberg et al. (2022). "perilab": as PeriLab computes it; 2-D and
-    /// 3-D. "peridigm2021": as Peridigm computed it in 2021; 2-D.
+    /// How the critical work follows from the toughness. "energy": breaking all bonds across an area
+    /// dissipates the fracture energy. "opening": separating a block of the body costs the fracture energy;
+    /// this is computed before the run. "willberg2022": eq. 16 and 18 of Willberg et al. (2022). "perilab":
+    /// as PeriLab computes it; 2-D and 3-D. "peridigm2021": as Peridigm computed it in 2021; 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
-    /// Whether only bonds that are longer than initially can break. Otherwise compressed bonds break too, as in a shear
-    /// crack.
+    /// Whether only bonds that are longer than initially can break. Otherwise compressed bonds break too, as
+    /// in a shear crack.
     #[serde(default = "yes")]
     pub tension_only: bool,
-    /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside surfaces have
-    /// fewer bonds, so each bond stores more energy at the same strain and the body breaks at its surfaces first. With
-    /// 1, the critical work of these bonds is larger by the same factor.
+    /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
+    /// surfaces have fewer bonds, so each bond stores more energy at the same strain and the body breaks at
+    /// its surfaces first. With 1, the critical work of these bonds is larger by the same factor.
     #[serde(default = "nothing")]
     pub family_correction: Number,
     /// α: the threshold is computed for the stretch s0 − α s_min instead of s0; 0 if not given.
     #[serde(default = "nothing")]
     pub alpha: Number,
-    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
+    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
+    /// given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weibull_modulus: Option<Number>,
     /// Seed of the random strengths of `weibull_modulus`; 0 if not given.
@@ -263,7 +265,8 @@ pub struct Stress {
     /// Whether only bonds that are longer than initially can break.
     #[serde(default = "yes")]
     pub tension_only: bool,
-    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
+    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
+    /// given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weibull_modulus: Option<Number>,
     /// Seed of the random strengths of `weibull_modulus`; 0 if not given.

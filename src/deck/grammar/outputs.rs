@@ -139,8 +139,8 @@ pub enum Precision {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct History {
-    /// Simulated time between rows in s. If neither `every` nor `every_steps` is given, rows are 1/500 of the run
-    /// apart, and at least 20 steps if the whole run is explicit.
+    /// Simulated time between rows in s. If neither `every` nor `every_steps` is given, rows are 1/500 of the
+    /// run apart, and at least 20 steps if the whole run is explicit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between rows. Together with `every`, rows are only written at multiples of this number of steps.
@@ -152,10 +152,12 @@ pub struct History {
     /// Forces of supports along a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether the number of fragments and the mass of the fragment with the most points are recorded; false if not given.
+    /// Whether the number of fragments and the mass of the fragment with the most points are recorded; false
+    /// if not given.
     #[serde(default)]
     pub fragments: bool,
-    /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not given.
+    /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not
+    /// given.
     #[serde(default)]
     pub angular_momentum: Spanned<bool>,
     /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
@@ -194,15 +196,16 @@ pub struct Checkpoint {
     pub every_time: Option<Number>,
 }
 
-/// Points are rebalanced when rank loads drift apart. The ranks' times in the loops over bonds are compared at regular
-/// intervals. Results do not depend on the rebalancing.
+/// Points are rebalanced when rank loads drift apart. The ranks' times in the loops over bonds are compared
+/// at regular intervals. Results do not depend on the rebalancing.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Balance {
     /// Steps between comparisons of the ranks' times; 500 if not given.
     #[serde(default = "default_look")]
     pub every_steps: Spanned<Count>,
-    /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced; 1.2 if not given.
+    /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced; 1.2 if not
+    /// given.
     #[serde(default = "default_imbalance")]
     pub imbalance: Number,
 }
@@ -225,8 +228,8 @@ pub struct SupportForce {
     pub direction: Vector,
 }
 
-/// A crack path: the centre lines of the damaged region that is connected to a start position, one line for each
-/// branch. In 3-D the area and the front of this region.
+/// A crack path: the centre lines of the damaged region that is connected to a start position, one line for
+/// each branch. In 3-D the area and the front of this region.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
@@ -246,8 +249,8 @@ pub struct CrackPath {
 pub struct Probe {
     /// Position in m; the probe records the nearest point.
     pub at: Vector,
-    /// Names of output fields, such as `"stress"` and `"strain"`, that are recorded in addition to displacement and
-    /// velocity.
+    /// Names of output fields, such as `"stress"` and `"strain"`, that are recorded in addition to
+    /// displacement and velocity.
     #[serde(default)]
     pub fields: Vec<Text>,
 }
@@ -258,8 +261,8 @@ pub struct Probe {
 pub struct FieldStatistics {
     /// Name of an output field.
     pub field: Text,
-    /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or `"principal_1"`.
-    /// The magnitude of a vector if not given.
+    /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
+    /// `"principal_1"`. The magnitude of a vector if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// A set or a body; all points if not given.
@@ -303,16 +306,16 @@ pub struct Front {
     pub radius: Option<Number>,
     /// Name of an output field.
     pub field: Text,
-    /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or `"principal_1"`.
-    /// The magnitude of a vector if not given.
+    /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
+    /// `"principal_1"`. The magnitude of a vector if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// Threshold that the absolute value of the field must exceed, in the unit of the field.
     pub threshold: Number,
 }
 
-/// A crack tip: the farthest point of a set in one direction whose damage exceeds a threshold. The position is then
-/// interpolated as for a [`Front`].
+/// A crack tip: the farthest point of a set in one direction whose damage exceeds a threshold. The position
+/// is then interpolated as for a [`Front`].
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {

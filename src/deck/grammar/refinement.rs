@@ -7,22 +7,22 @@ use super::{Count, Tables};
 use crate::deck::number::Number;
 use crate::deck::spanned::Spanned;
 
-/// Refinement of bodies given as shapes: around selected points, new points are inserted at half the spacing, level by
-/// level. Neighbours differ by at most one level.
+/// Refinement of bodies given as shapes: around selected points, new points are inserted at half the spacing,
+/// level by level. Neighbours differ by at most one level.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
     /// The finest level; its spacing is the spacing of the grid divided by 2^levels.
     pub levels: Spanned<u64>,
-    /// How the horizon depends on the spacing: with `"delta"`, m = δ/dx is constant; with `"delta-m"`, m rises with the
-    /// level.
+    /// How the horizon depends on the spacing: with `"delta"`, m = δ/dx is constant; with `"delta-m"`, m
+    /// rises with the level.
     #[serde(default)]
     pub rule: HorizonRule,
     /// With `"delta-m"`: m of each level from 1 on. If not given, m rises by 1 from level to level.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
-    /// Factor on the horizon of points with a coarser level inside their horizon, so that their families do not lose
-    /// volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
+    /// Factor on the horizon of points with a coarser level inside their horizon, so that their families do
+    /// not lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
     /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with
@@ -37,8 +37,9 @@ pub struct Refinement {
     pub trigger: Option<Spanned<Trigger>>,
 }
 
-/// Triggers of refinement: all points within the horizon of a trigger point are refined, one level at a time. A point
-/// is a trigger if it fulfils any of the given `energy`, `damage` and `where`; at least one must be given.
+/// Triggers of refinement: all points within the horizon of a trigger point are refined, one level at a time.
+/// A point is a trigger if it fulfils any of the given `energy`, `damage` and `where`; at least one must be
+/// given.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trigger {

@@ -7,8 +7,8 @@ use super::Shape;
 use crate::deck::number::{Number, Vector};
 use crate::deck::spanned::Spanned;
 
-/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when its distance
-/// to the surface is half the edge of its cell, or its initial distance if that is smaller.
+/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when its
+/// distance to the surface is half the edge of its cell, or its initial distance if that is smaller.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
@@ -33,8 +33,8 @@ pub struct Rigid {
     /// Force at the centre of a free body in N: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Vector>,
-    /// Young's modulus in Pa of the layer between points and surface, which is half a horizon thick. The modulus of the
-    /// points' material if not given.
+    /// Young's modulus in Pa of the layer between points and surface, which is half a horizon thick. The
+    /// modulus of the points' material if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// As in `[contact]`.

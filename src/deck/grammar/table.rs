@@ -7,8 +7,8 @@ use super::Text;
 use crate::deck::number::{Number, default_number};
 use crate::deck::spanned::Spanned;
 
-/// A value over time, linear between rows. Expressions of `t` may use its name. The rows come from a file or from this
-/// table.
+/// A value over time, linear between rows. Expressions of `t` may use its name. The rows come from a file or
+/// from this table.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {

@@ -19,8 +19,8 @@ pub struct Time {
     /// Automatic step as a fraction of the stable step.
     #[serde(default = "default_safety")]
     pub safety: Number,
-    /// Solution method: `"explicit"` integrates the equation of motion; `"relaxation"` and `"static"` compute one
-    /// equilibrium per load step.
+    /// Solution method: `"explicit"` integrates the equation of motion; `"relaxation"` and `"static"` compute
+    /// one equilibrium per load step.
     #[serde(default = "explicit")]
     pub method: Spanned<Method>,
     /// Settings of the relaxation.
@@ -29,7 +29,8 @@ pub struct Time {
     /// Settings of Newton's method.
     #[serde(rename = "static", skip_serializing_if = "Option::is_none")]
     pub newton: Option<Spanned<Static>>,
-    /// Factor on the density in the equation of motion; a factor above 1 permits larger steps during slow loading.
+    /// Factor on the density in the equation of motion; a factor above 1 permits larger steps during slow
+    /// loading.
     #[serde(default = "default_density_scale")]
     pub density_scale: Number,
     /// Settings of a step that adapts to the number of bonds that break in it.
@@ -117,7 +118,8 @@ impl Method {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a smaller dt.
+    /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a
+    /// smaller dt.
     #[serde(default = "default_most_broken")]
     pub most_broken: Count,
     /// Largest number of bonds of one point that break in a calm step.
@@ -204,8 +206,8 @@ pub struct Static {
     /// Number of load steps; the value of the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions. The value of the
-    /// relaxation if not given.
+    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions. The value of
+    /// the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Number>,
     /// Largest number of iterations of a load step.
