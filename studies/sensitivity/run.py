@@ -43,7 +43,7 @@ The study file is TOML:
   keep = ["history.csv"]          files of a complete run that are kept [all files]
 
   [design.morris]                 a Morris design
-  trajectories = 5
+  trajectories = 5                each of k + 1 runs for k parameters
   levels = 4                      number of values of each parameter, even
   seed = 1
                                   instead of [design.morris], a table of values:
