@@ -1,8 +1,8 @@
-"""Checks that h5py and VTK's reader return equal data of a result file.
+"""Checks that h5py and VTK's reader read equal data from a result file.
 
 usage: check_result.py RESULT.h5
 
-Compares all steps, fields, points and times. The side-car .xdmf, if present, must be well-formed and
+Compares all steps, fields, points and times. If the result has an .xdmf file, the file must be well-formed XML and
 refer to datasets of the declared shape. Prints one line and exits with 0, or prints the first
 difference and exits with 1.
 """

@@ -1,10 +1,12 @@
 """Compares restarted runs with uninterrupted ones, bit for bit.
 
-Each small deck tests one feature with a state. It runs once uninterrupted on one rank. Then it runs in parts: a signal
-stops each part, or one of its ranks is killed. The next part restarts on other numbers of ranks and threads and with
-another instruction set. All datasets of the result and history.csv must equal those of the uninterrupted run.
+Each small deck tests one feature whose state must survive a restart. The deck first runs without interruption on one
+rank. Then it runs in parts: each part is stopped by a signal, or one of its ranks is killed, and the next part restarts
+on other numbers of ranks and threads and with another instruction set. The last part runs to the end. All datasets of
+the result and history.csv must equal those of the uninterrupted run.
 
-The instruction sets are those of this machine, chosen by FISSURE_INSTRUCTIONS. If there is only one, a note is printed.
+The instruction set is chosen with FISSURE_INSTRUCTIONS, among those of this machine. A note is printed if the machine
+has only one.
 
 The binary is $FISSURE, or target/release/fissure, or else target/debug/fissure.
 """
@@ -265,7 +267,7 @@ def changes(whole, column):
 
 
 def layouts(most, sets):
-    """Yield ranks, threads and instruction sets without end; consecutive numbers of ranks differ."""
+    """Yield an endless sequence of (ranks, threads, instruction set); consecutive numbers of ranks differ."""
     before = 1
     number = random.randrange(len(sets))
     while True:
@@ -308,9 +310,9 @@ def test(program, folder, name, sets, most, trials):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--full", action="store_true", help="10 trials a deck, up to 7 ranks instead of 3")
-    parser.add_argument("--trials", type=int, help="trials a deck (1; with --full 10)")
-    parser.add_argument("--seed", type=int, default=1, help="of the random choices (1)")
+    parser.add_argument("--full", action="store_true", help="10 trials of each deck instead of 1, on up to 7 ranks instead of 3")
+    parser.add_argument("--trials", type=int, help="trials of each deck [1; with --full 10]")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the random choices [1]")
     parser.add_argument("--only", choices=DECKS, nargs="+", help="run these decks only")
     arguments = parser.parse_args()
     trials, most = arguments.trials or (10 if arguments.full else 1), 7 if arguments.full else 3

@@ -1,32 +1,33 @@
-"""Model of the time per step and of the limits on many ranks, with given inputs.
+"""Model of the time per step and of the first resource limits on many ranks, with given inputs.
 
-A rank has the points of a cube and exchanges a layer of one horizon with its neighbours. The time per
-step, with the interior overlapping the messages, is
+The points of a rank are assumed to fill a cube. The rank exchanges the points of a layer one horizon thick with its
+neighbours. The bonds of interior points are computed while the messages are under way, so the time per step is
 
     border bonds + packing + max(interior bonds, messages · latency + bytes / bandwidth)
 
-For comparison: METIS partitions of 64³ points on 8 and 27 ranks have 1.04 and 1.00 times the ghosts of cubes.
+To check the assumption of cubes: METIS partitions of 64³ points have 1.04 times the ghosts of cubes on 8 ranks, and
+1.00 times on 27 ranks.
 """
 
 import math
 
 INPUTS = {
     # name: (default, unit, meaning)
-    "points": (1e6, "", "points of a rank (weak scaling)"),
-    "total": (1e9, "", "points in all (strong scaling)"),
-    "cores": (8, "", "cores of a rank"),
-    "rate": (None, "/s", "bond updates of a core; the measured ones if not given"),
-    "neighbours": (122, "", "neighbours of a point"),
+    "points": (1e6, "", "points of each rank (weak scaling)"),
+    "total": (1e9, "", "points of all ranks together (strong scaling)"),
+    "cores": (8, "", "cores of each rank"),
+    "rate": (None, "/s", "bond updates of one core; the measured rate if not given"),
+    "neighbours": (122, "", "neighbours of each point"),
     "layers": (3, "", "horizon over spacing, rounded down"),
     "passes": (1, "", "passes over the bonds in a step"),
-    "values": (3, "", "numbers sent for a point in a step"),
-    "latency": (2e-6, "s", "of one message"),
-    "bandwidth": (3e9, "B/s", "of the network for one rank"),
-    "memory_bandwidth": (2e10, "B/s", "of the memory for one rank; packing goes through it twice"),
-    "imbalance": (1.05, "", "points of the largest rank over the mean"),
-    "history": (100, "", "steps between rows of the history"),
-    "memory": (4e9, "B", "of a rank"),
-    "patience": (60, "s", "for the set-up"),
+    "values": (3, "", "numbers sent in a step for each point of the exchanged layer"),
+    "latency": (2e-6, "s", "latency of one message"),
+    "bandwidth": (3e9, "B/s", "network bandwidth for one rank"),
+    "memory_bandwidth": (2e10, "B/s", "memory bandwidth for one rank; packing and unpacking each read and write every value"),
+    "imbalance": (1.05, "", "points of the largest rank, divided by the mean"),
+    "history": (100, "", "steps between two rows of the history"),
+    "memory": (4e9, "B", "available memory of each rank"),
+    "patience": (60, "s", "acceptable time of the set-up"),
 }
 RANKS = [10**3, 10**4, 10**5]
 
@@ -87,15 +88,15 @@ def limits(given, ranks, points):
     cells = min(points / given["layers"] ** 3, max(1e5, 2000 * ranks), max(4e6, 64 * ranks))
     own = points / ranks
     found = [
-        ("cells on every rank: points and owner of each, B", CELL_BYTES * cells, given["memory"]),
+        ("points and owner of every cell, on each rank: memory, B", CELL_BYTES * cells, given["memory"]),
         ("METIS on rank 0: memory of the graph, B", GRAPH_BYTES * cells, given["memory"]),
         ("METIS on rank 0: time, s", METIS_SECONDS * cells, given["patience"]),
-        ("METIS on rank 0: cells that 32-bit edges allow", cells, GRAPH_CELLS),
-        ("adding up the points of cells: time, s", 2 * 8 * cells / given["bandwidth"], given["patience"]),
-        ("lists by rank in swaps between all, B", 4 * 24 * ranks, given["memory"]),
-        ("telling all ranks sizes, in each swap: time, s", ranks * given["latency"], 0.01 * given["patience"]),
-        ("local index of 32 bits: points of a rank", own, 2**31),
-        ("global ids of 64 bits", points, 2**63),
+        ("METIS on rank 0: cells, limited by edges numbered with 32 bits", cells, GRAPH_CELLS),
+        ("sum of the points of every cell over all ranks: time, s", 2 * 8 * cells / given["bandwidth"], given["patience"]),
+        ("lists with an entry per rank in all-to-all exchanges: memory, B", 4 * 24 * ranks, given["memory"]),
+        ("message sizes in each all-to-all exchange: time, s", ranks * given["latency"], 0.01 * given["patience"]),
+        ("points of a rank, limited by local indices of 32 bits", own, 2**31),
+        ("points of all ranks, limited by global ids of 64 bits", points, 2**63),
     ]
     return sorted(found, key=lambda row: row[1] / row[2], reverse=True)
 
@@ -114,7 +115,7 @@ def report(given):
         rows = predict(given, points_of)
         predicted[kind] = rows
         lines.append(title)
-        lines.append("     ranks  points/rank  messages    sent/step  bonds     halo      of that seen  efficiency")
+        lines.append("     ranks  points/rank  messages    sent/step  bonds     halo      not hidden    efficiency")
         for row in rows:
             halo = row["packing"] + row["wire"]
             lines.append(
@@ -124,7 +125,7 @@ def report(given):
             )
     for ranks in RANKS:
         points = ranks * given["points"]
-        lines.append(f"what breaks first on {ranks} ranks, {points:.3g} points")
+        lines.append(f"limits that are reached first on {ranks} ranks with {points:.3g} points")
         for what, amount, limit in limits(given, ranks, points):
             share = amount / limit
             if share > 0.02:

@@ -1,15 +1,17 @@
 """Compares results with values printed by Peridigm, PeriLab and LAMMPS.
 
-tests/decks/verification/values.toml lists the problems: the deck, the source of the values, the tolerance of each field
-and its reason, and the values, each with field, component, time and place. Each deck runs once, on one thread.
-If the other code defines a quantity differently, its value is multiplied by the `factor` of the field, or of the field and
-component; the reason explains the factor.
-The error of a field is the largest difference from the values, divided by the largest of these values.
-In a problem with `departs`, the other code computes fields by another formula. The error of these fields must be between the
-two given fractions. `formulas` names two functions of this script: the first must give the values of the other code, the
-second those of the run.
+tests/decks/verification/values.toml lists the problems. For each problem it has the deck, the source of the values, the
+tolerance of each field with a reason, and the values, each with field, component, time and position. Each deck runs
+once, on one thread. If the other code defines a quantity differently, its value is multiplied by the `factor` of the
+field, or of the field and component; the reason explains the factor. The error of a field is the largest difference
+between Fissure and the listed values, divided by the largest absolute listed value.
 
-The binary is $FISSURE, or `fissure` on the path.
+In some problems, the other code computes fields by another formula than Fissure. Such a problem has `departs` with two
+fractions for each of these fields, and the error must be between them. `formulas` names two functions of this script:
+the results of the first must equal the values of the other code, and the results of the second must equal those of the
+run of Fissure.
+
+The tested program is $FISSURE, or `fissure` on the path.
 """
 
 import argparse

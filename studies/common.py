@@ -1,7 +1,7 @@
-"""What the studies share: arguments, the packages and the program that they need, decks, runs and histories.
+"""Functions of all studies: arguments, preparation of packages and program, decks, runs and histories.
 
-`--help` and wrong arguments need nothing but Python. With right arguments, `start` installs what is missing, builds
-the program and starts the study again with the packages.
+Printing `--help` or an error about the arguments needs only Python. With valid arguments, `start` installs missing
+packages, builds the program, and starts the study again in an environment with these packages.
 """
 
 import argparse
@@ -14,13 +14,13 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# Pictures are files.
+# Draw into files, without windows.
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# Set for the second start of a study, in which its packages are there.
+# Set for the second start of a study, whose environment has the packages.
 STARTED = "FISSURE_STUDY_STARTED"
 
-# The working directory stays that of the user.
+# The study runs in the user's working directory.
 PREPARE = """\
 set -euo pipefail
 root=$1 target=$2
@@ -54,9 +54,9 @@ pyplot = Package("matplotlib.pyplot")
 
 
 def parser(path, description, epilog=None, output=None):
-    """The parser of the study with this `run.py`, with the arguments --binary and --output.
+    """Return the parser of the study whose `run.py` is at `path`, with the arguments --binary and --output.
 
-    `output` describes another default of the latter, for which it is None.
+    If `output` is given, --output defaults to None and its help text names `output` as the default.
     """
     name = pathlib.Path(path).resolve().parent.name
     found = argparse.ArgumentParser(
@@ -66,15 +66,15 @@ def parser(path, description, epilog=None, output=None):
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     default = None if output else ROOT / "out" / name
-    found.add_argument("--output", type=pathlib.Path, default=default, metavar="DIR", help=f"[{output or f'out/{name}'}]")
-    found.add_argument("--binary", type=pathlib.Path, metavar="PATH", help="the program [$FISSURE, or built from here]")
+    found.add_argument("--output", type=pathlib.Path, default=default, metavar="DIR", help=f"output folder [{output or f'out/{name}'}]")
+    found.add_argument("--binary", type=pathlib.Path, metavar="PATH", help="program fissure [$FISSURE; if not set, it is built]")
     return found
 
 
 def start(found, target="--bin fissure", check=None):
-    """Parse the arguments; on the first start, prepare everything and start again.
+    """Parse the arguments; on the first start, install packages, build the program and start again.
 
-    `target` is what cargo builds; `check` returns what is wrong with the arguments, if anything.
+    `target` are the arguments of `cargo build`; `check` returns an error message about the arguments, or None.
     """
     options = found.parse_args()
     if check is not None and (wrong := check(options)):
@@ -90,7 +90,7 @@ def start(found, target="--bin fissure", check=None):
 
 
 def several_of(known):
-    """The type of an argument that is a list of names, separated by commas."""
+    """Return the argparse type of a list of names from `known`, separated by commas."""
 
     def parse(text):
         names = text.split(",")
@@ -102,14 +102,14 @@ def several_of(known):
 
 
 def replace_once(text, old, new, deck):
-    """A text with another part, which it must have once; `deck` is named if it does not."""
+    """Replace the only occurrence of `old` in a text; exit with an error that names `deck` if it is not the only one."""
     if text.count(old) != 1:
         sys.exit(f"error: {deck} has {text.count(old)} times `{old.strip()}`, and should have it once")
     return text.replace(old, new)
 
 
 def run(options, folder, text, assignments=()):
-    """Write a deck into a folder and run it there, with `--set` for each assignment."""
+    """Write the text of a deck into a folder and run it, with the results in the folder and `--set` for each assignment."""
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / "deck.toml"
     written.write_text(text)
@@ -124,13 +124,13 @@ def run(options, folder, text, assignments=()):
 
 
 def history(folder):
-    """The columns of a history as arrays, by name."""
+    """Return the columns of a history as arrays, by name."""
     table = fissure.read_history(folder)
     return {name: numpy.array(table[name]) for name in table}
 
 
 def branches(path):
-    """The branches of the crack in a `crack_NAME.csv` as arrays of positions (m), longest first."""
+    """Return the branches of the crack in a `crack_NAME.csv` as arrays of positions (m), longest first."""
     with open(path, newline="") as file:
         head, *rows = csv.reader(file)
     if head[0] != "branch":

@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 """Crack branching on adaptively refined and on uniform grids (Dipasquale et al. 2014, §4).
 
-Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 finer spacings (with --twice, also with two levels).
-Runs the same plate on the coarse grid and on uniform fine grids, one run after the other on one core.
+Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 fine spacings; --twice adds runs with two levels of
+refinement. Runs the same plate on the uniform coarse grid and on uniform fine grids, one run after the other on one
+core.
 
-Prints for each run: points, run time, fracture energy and crack length. For a refined grid, it prints the largest
-distance of its crack from two other cracks, in coarse spacings: the crack on the uniform fine grid, and the crack on
-a uniform grid with the points of the refined grid. Both distances are printed for all branches, and for the branches
-that reach the right side. The cracks are drawn into the output folder.
+Prints for each run: points, run time, fracture energy and crack length. For a refined grid, it also prints the
+largest distance between its crack and two cracks on uniform grids, in coarse spacings. The first is the crack on the
+uniform fine grid. The second is the crack on a uniform fine grid with the points of the refined grid ("same places").
+Each distance is printed twice: for all branches ("all"), and for the branches that reach the right side ("through").
+A picture of each crack is written to the output folder.
 
-With --shifts N, runs the refined and the uniform fine grid on N shifted lattices each. Prints mean and standard
-deviation of the branching point and of the heights of the outermost branches at the right side. Also prints Welch's t
-for the difference of the means; an absolute value above 2.1 is significant at 5 % for 12 shifts.
+With --shifts N, instead runs the refined and the uniform fine grid with N different shifts of the lattice each. Prints
+mean and standard deviation of the x of the branching point, and of the heights of the outermost branches at the right
+side. Also prints Welch's t for the difference of the means between the two grids; an absolute value above 2.1 is
+significant at the 5 % level for 12 shifts.
 """
 
 import pathlib
@@ -35,12 +38,12 @@ def deck(spacing):
 
 
 def value(text, key):
-    """Return the first number of a key of a deck."""
+    """Return the first number assigned to a key in the text of a deck."""
     return float(re.search(rf"(?m)^{key} = (\S+)", text)[1])
 
 
 def with_value(text, key, number):
-    """Return a deck with another first number of a key."""
+    """Return the text of a deck in which the first number assigned to a key is replaced."""
     return re.sub(rf"(?m)^{key} = \S+", f"{key} = {number}", text, count=1)
 
 
@@ -51,9 +54,9 @@ def uniform(spacing, ratio):
 
 
 def same_places(coarse, ratio):
-    """Return the deck with a uniform fine grid.
+    """Return the deck with a uniform fine grid that contains the points of the refined grid.
 
-    Its points are at and half-way between the points of the coarse grid, except on the notch.
+    Its points are the points of the coarse grid and points half-way between them, except on the notch.
     """
     text = uniform(coarse / 2, ratio)
     shift = coarse / 4
@@ -72,19 +75,19 @@ def same_places(coarse, ratio):
 
 
 def refined(coarse, ratio):
-    """Return the deck with one refined level; the horizon is in finer spacings."""
+    """Return the deck with one level of refinement and a horizon of `ratio` fine spacings."""
     return with_value(deck(coarse), "m", ratio)
 
 
 def refined_twice(coarse):
-    """Return the deck with two refined levels and the same ratio on all levels."""
+    """Return the deck with two levels of refinement and the same ratio of horizon to spacing on all levels."""
     text = re.sub(r"(?m)^levels = 1", "levels = 2", deck(coarse))
     text = re.sub(r'(?m)^rule = .*\n^m = \["m"\]\n', 'rule = "delta"\n', text)
     return re.sub(r"(?m)^interface_factor = .*\n", "", text)
 
 
 def cases(arguments):
-    """Return name and deck of each run, and the uniform grids to compare with."""
+    """Yield for each run its name, its deck and the names of the uniform runs to compare it with."""
     coarse = arguments.dx
 
     def asked(text):
@@ -104,7 +107,7 @@ def cases(arguments):
 
 
 def run(arguments, name, text):
-    """The folder of the result, and the run time, s."""
+    """Run a deck; return the folder of the result and the shortest run time, s."""
     folder = arguments.output / re.sub(r"\W+", "_", name)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.toml").write_text(text)
@@ -119,12 +122,12 @@ def run(arguments, name, text):
 
 
 def lines(out):
-    """The branches of the final crack, each an array of positions, m."""
+    """Return the branches of the final crack, each an array of positions, m."""
     return common.branches(out / "crack_notch.csv")
 
 
 def distance(places, branches):
-    """Return the largest distance of positions beyond the notch from the nearest line, m."""
+    """Return the largest distance, m, from a position beyond the notch to its nearest branch."""
     places = places[places[:, 0] > BEYOND_THE_NOTCH]
     nearest = numpy.full(len(places), numpy.inf)
     for branch in branches:
@@ -141,7 +144,7 @@ def has_grown(branches):
 
 
 def apart(one, other):
-    """Return the Hausdorff distance of two cracks, m; NaN without a crack."""
+    """Return the Hausdorff distance of two cracks, m; NaN if one of them has not grown."""
     if not has_grown(one) or not has_grown(other):
         return numpy.nan
     return max(distance(numpy.concatenate(one), other), distance(numpy.concatenate(other), one))
@@ -155,7 +158,7 @@ def through(branches):
 def shifted(text, coarse, number):
     """Return the deck with its lattice shifted by a fraction of the coarse spacing in both directions.
 
-    The shifts are a low-discrepancy sequence (Roberts 2018) in the unit square.
+    The pairs of fractions are a low-discrepancy sequence (Roberts 2018) in the unit square.
     """
     shift = [coarse * ((0.5 + number * step) % 1) for step in (0.7548776662, 0.5698402910)]
     return replace_once(text, "[grid]\n", f"[grid]\norigin = {shift}\n", DECK)
@@ -164,7 +167,7 @@ def shifted(text, coarse, number):
 def figures(branches):
     """Return the x of the branching point and the heights of the outermost branches at the right side, m.
 
-    Values are NaN without branches.
+    A value is NaN if the crack has no branch there.
     """
     places = numpy.concatenate(branches)
     apart = places[numpy.abs(places[:, 1]) > 2e-3]
@@ -203,13 +206,13 @@ def statistics(arguments):
 
 def main():
     parser = common.parser(__file__, __doc__)
-    parser.add_argument("--dx", type=float, default=value(DECK.read_text(), "dx"), help="spacing of the coarse grid, m [the deck's]")
-    parser.add_argument("--m", type=int, nargs="+", default=[3, 4, 5, 6], help="finer spacings in a horizon [3 4 5 6]")
-    parser.add_argument("--energy", type=float, help="share of the largest energy density that is refined [the deck's]")
-    parser.add_argument("--every", type=int, help="steps from one look to the next [the deck's]")
-    parser.add_argument("--twice", action="store_true", help="also a grid that is refined twice, beside a uniform one")
-    parser.add_argument("--repeat", type=int, default=1, help="runs of each case, of which the fastest counts [1]")
-    parser.add_argument("--shifts", type=int, help="number of shifted lattices of the refined and of the fine grid")
+    parser.add_argument("--dx", type=float, default=value(DECK.read_text(), "dx"), help="spacing of the coarse grid, m [as in the deck]")
+    parser.add_argument("--m", type=int, nargs="+", default=[3, 4, 5, 6], help="horizons, in fine spacings [3 4 5 6]")
+    parser.add_argument("--energy", type=float, help="refine where the energy density exceeds this fraction of its maximum [as in the deck]")
+    parser.add_argument("--every", type=int, help="time steps between two checks of the refinement [as in the deck]")
+    parser.add_argument("--twice", action="store_true", help="also run a grid with two levels of refinement, and a uniform grid of its finest spacing")
+    parser.add_argument("--repeat", type=int, default=1, help="runs of each case; the shortest run time is printed [1]")
+    parser.add_argument("--shifts", type=int, help="compare refined and uniform fine grids over this number of shifted lattices")
     arguments = common.start(parser)
     if arguments.shifts:
         statistics(arguments)

@@ -2,8 +2,8 @@
 """Edge-on impact on ALON in the three limits of Diehl & Schweitzer (2016), figures 8 to 10.
 
 Runs `inputs/eoi_alon.toml` with several laws, prints a table of the speeds of the wave front and of the damage
-front, and draws them beside the measured ones. The table also has the speeds of a long wave on the same lattice,
-in the bulk and in a tile of this thickness with free faces.
+front, and draws these speeds beside the measured speeds. The table also contains the computed speeds of a long wave
+on the same lattice: in the bulk, and in a tile of the same thickness with free faces.
 """
 
 import json
@@ -16,20 +16,29 @@ from common import ROOT, numpy, pyplot, replace_once  # noqa: E402
 
 EXAMPLES = """\
 examples:
-  studies/eoi/run.py --small             spacings down to 1.25 mm; some minutes on 2 cores
-  studies/eoi/run.py                     down to 0.5 mm, the paper's finest; half an hour on 2 cores
+  studies/eoi/run.py --small             spacings down to 1.25 mm; 2 to 3 minutes on two cores
+  studies/eoi/run.py                     spacings down to 0.5 mm, the finest of the paper; half an hour on two cores
   studies/eoi/run.py --limits local --laws pmb,energy
 
-limits: `local`, horizon of three spacings, both to 0; `continuum`, horizon of 7.5 mm, spacing to 0;
-`discrete`, the spacing fixed, the horizon to two spacings.
-laws: `pmb`, the prototype law; `energy` and `diehl2016`, the two forms of the normalised law. In the first limit
-down to 1 mm only: `pmb-exact`, the prototype law with the exact volumes of the paper; `ordinary`, which the paper's
-conclusion asks for; `printed`, the normalised law with the constant of eq. 15 in the force of eq. 4 as printed,
-too soft by a factor |bond|.
+limits:
+  local      the horizon is three spacings, and the spacing decreases
+  continuum  the horizon is 7.5 mm, and the spacing decreases
+  discrete   the spacing is fixed, and the horizon decreases to two spacings
 
-The speed of a front is the slope of its position over time, by least squares, while the wave is between 30 and
-90 mm, the damage between 20 and 50 mm. There is no front if it covers less than 15 mm there, or jumps by more than
-10 mm between two rows, as scattered damage does. The mean speed is the position at the end divided by the duration.
+laws:
+  pmb        the prototype law
+  energy     the normalised law, form `energy`
+  diehl2016  the normalised law, form `diehl2016`
+The other laws are run only in the limit `local`, with spacings of 1 mm and more:
+  pmb-exact  the prototype law with the exact volumes of the paper
+  ordinary   the ordinary law; the conclusion of the paper proposes it
+  printed    the normalised law as the paper prints it: the constant of eq. 15 in the force of eq. 4; its bonds are too
+             soft by a factor of the bond length in metres
+
+The speed of a front is the slope of its position over time, by least squares. For the wave front, the positions
+between 30 and 90 mm are used; for the damage front, those between 20 and 50 mm. The table has `none` if the front
+covers less than 15 mm in this range, or jumps by more than 10 mm between two rows of the history, as scattered damage
+does. The mean speed is the position of the wave front at the end divided by the duration of the run.
 
 Writes eoi_alon.md (the table), eoi_alon.png and eoi_alon.json into the output folder.
 """
@@ -46,7 +55,7 @@ THEORY = (1.8 * BULK_MODULUS / DENSITY) ** 0.5
 PLATE = (1.6 * BULK_MODULUS / DENSITY) ** 0.5
 
 LAWS = ["pmb", "energy", "diehl2016", "pmb-exact", "ordinary", "printed"]
-# Laws of the first limit only, down to 1 mm.
+# Laws that are run only in the limit `local`, with spacings of 1 mm and more.
 ADDED = ("pmb-exact", "ordinary", "printed")
 LIMITS = {
     "local": "horizon 3 dx, dx to 0",
@@ -59,16 +68,16 @@ FIXED_HORIZON = 7.5e-3  # m
 def arguments():
     parser = common.parser(__file__, __doc__, EXAMPLES)
     add = parser.add_argument
-    add("--small", action="store_true", help="coarse lattices only")
-    add("--laws", type=common.several_of(LAWS), default=LAWS, metavar="LIST", help="[all]")
-    add("--limits", type=common.several_of(LIMITS), default=list(LIMITS), metavar="LIST", help="[all]")
-    add("--reuse", action="store_true", help="reuse the histories of earlier runs")
+    add("--small", action="store_true", help="run the coarse lattices only")
+    add("--laws", type=common.several_of(LAWS), default=LAWS, metavar="LIST", help="laws, separated by commas [all]")
+    add("--limits", type=common.several_of(LIMITS), default=list(LIMITS), metavar="LIST", help="limits, separated by commas [all]")
+    add("--reuse", action="store_true", help="do not repeat runs whose history is complete in the output folder")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
     return common.start(parser)
 
 
 def grids(limit, small):
-    """Return the pairs (spacing in m, horizon in spacings) of a limit, from coarse to fine."""
+    """Return the pairs (spacing in m, horizon in spacings) of a limit, in the order in which they are run."""
     if limit == "local":
         return [(dx, 3.0) for dx in ([2.5e-3, 2e-3, 1.25e-3] if small else [2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3])]
     if limit == "continuum":
@@ -92,9 +101,9 @@ def deck(law, dx):
     elif law == "ordinary":
         replace(table, "[material.alon.ordinary]\npoisson_ratio = 0.25")
     elif law == "printed":
-        # c = 9K/(4πδ³/3) of eq. 15 is the prototype's 18K'/(πδ⁴) for K' = 3Kδ/8, with δ in metres. Eq. 17 with
-        # this c and the tile's thickness gives the critical stretch. The automatic step of this soft material
-        # would be too long.
+        # The constant c = 9K/(4πδ³/3) of eq. 15 equals the prototype's constant 18K'/(πδ⁴) for a bulk modulus
+        # K' = 3Kδ/8, with δ in metres. Eq. 17 with this c and the tile's thickness gives the critical stretch. The
+        # automatic step of this soft material would be too long.
         replace("bulk_modulus = 210e9", 'bulk_modulus = "210e9*0.375*m*dx"')
         stretch = "sqrt(15)/4*2e6/(210e9*sqrt(27/(4*pi)*thickness))"
         replace("fracture_toughness = 2e6", f'critical_stretch = "{stretch}"')
@@ -112,8 +121,9 @@ def offsets(ratio):
 
 
 def long_waves(law, dx, ratio):
-    """Return the speeds (m/s) of long waves along a lattice axis: in the bulk, and in the tile with free lateral
-    displacement of its layers. `None` for `pmb-exact`, whose volume correction is not implemented here."""
+    """Return the speeds (m/s) of long waves along a lattice axis: in the bulk, and in the tile, whose layers may move
+    freely in the direction of the thickness. Both are None for `pmb-exact`, whose volume correction is not implemented
+    here."""
     if law == "pmb-exact":
         return None, None
     steps, lengths = offsets(ratio)
@@ -158,7 +168,10 @@ def long_waves(law, dx, ratio):
 
 
 def long_waves_of_ordinary(steps, lengths, dx):
-    """As `long_waves`, for the ordinary law with ω = 1 and ν = 1/4: W = K θ²/2 + 15 G/(2 m) Σ ε_d² V."""
+    """Return the speeds of `long_waves` for the ordinary law with ω = 1 and ν = 1/4.
+
+    Its energy density is W = K θ²/2 + 15 G/(2 m) Σ ε_d² V, with the weighted volume m and deviatoric extensions ε_d.
+    """
     volume, shear = dx**3, 0.6 * BULK_MODULUS
     layers = round(THICKNESS / dx)
     level = numpy.round(steps[:, 2] / dx).astype(int)
@@ -270,7 +283,7 @@ def draw(results, path):
                 continue
             place = [result["ratio"] if limit == "discrete" else result["dx"] * 1e3 for result in chosen]
             for kind, marker, fill in (("wave", "o", "full"), ("damage", "^", "none")):
-                # Omit fronts that have not started.
+                # A front that has not started is drawn at speed 0.
                 speeds = [result[kind] or 0.0 for result in chosen]
                 label = f"{names[law]}: {kind}" if axis is axes[0][0] else None
                 axis.plot(place, speeds, marker=marker, fillstyle=fill, color=colours[law], linewidth=0.8, label=label)
@@ -310,7 +323,7 @@ def main():
     (options.output / "eoi_alon.json").write_text(json.dumps(results, indent=1) + "\n")
     (options.output / "eoi_alon.md").write_text(table(results))
     draw(results, options.output / "eoi_alon.png")
-    print(f"\n{table(results)}\ntable and picture in {options.output}")
+    print(f"\n{table(results)}\ntable and picture are in {options.output}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""Draws the separation energy of a body by angle, from opening to sliding, for each law and criterion.
+"""Draws the energy that separates a body, by direction from opening to sliding, for each law and damage criterion.
 
-Runs examples/parting.rs, which separates the halves of a small block, and draws its table.
+Builds and runs examples/parting.rs, which separates the two halves of a small block. Prints the separation energies as
+fractions of the fracture energy, at increasing angles between the direction of separation and the normal of the crack.
+Draws them into the output folder.
 """
 
 import csv
@@ -18,12 +20,12 @@ STYLES = {"stretch": "C0o--", "work of pulled bonds": "C1s:", "work": "C2D-"}
 LABELS = {
     "stretch": "critical stretch",
     "work of pulled bonds": "energy, tension only",
-    "work": "energy, pressed bonds too",
+    "work": "energy, compressed bonds too",
 }
 
 
 def table(program):
-    """Return the rows of the table: law, ratio, criterion, separation energies by angle (degrees)."""
+    """Yield the rows of the table: law, Poisson's ratio, criterion, and pairs of angle (degrees) and separation energy."""
     printed = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     head, *rows = csv.reader(printed.splitlines())
     angles = [float(angle) for angle in head[3:]]
@@ -46,9 +48,9 @@ def main():
         panel.set_ylim(0, 1.6)
         panel.set_xticks(range(0, 91, 15))
     for panel in axes[1]:
-        panel.set_xlabel("angle to the normal of the crack, degrees (90: sliding)")
+        panel.set_xlabel("angle between separation and normal of the crack, degrees (90: sliding)")
     for panel in axes[:, 0]:
-        panel.set_ylabel("cost / fracture energy")
+        panel.set_ylabel("separation energy / fracture energy")
     axes[0, 0].legend(fontsize=8, loc="lower left")
     picture = arguments.output / "parting.png"
     figure.savefig(picture, dpi=110)

@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
 """The effect of a refined patch on a plane wave, beside table 3 of Dipasquale et al. (2014).
 
-Runs inputs/plane_wave_refined.toml without refinement and with levels 1 to 3 for both rules of convergence. Compares
-the energy densities when the crest of the wave is in the patch, and the largest displacement of a node that only a
-reflected wave reaches.
+Runs inputs/plane_wave_refined.toml without refinement, and with 1 to 3 levels for both rules of convergence (`delta`
+and `delta-m`). Compares two quantities of the refined and the uniform grid: the energy densities when the crest of the
+wave is in the patch, and the largest displacement of a node that only a reflected wave reaches.
 
 Four interpretations of the paper are run:
-- patches with two horizons per level, refined nodes only (caption of table 3), each end of a bond with its own horizon;
-- the same with one horizon per level, and all nodes in the patch;
-- the second one with the mean of both horizons for bonds between levels;
-- the second one without the enlarged horizon at interfaces (figure 5b).
+1. Each level is two horizons wide, the energies of refined nodes are compared (caption of table 3), and each end of a
+   bond uses the horizon of its own level.
+2. Each level is one horizon wide, and the energies of all nodes in the patch are compared.
+3. As 2, but bonds between levels use the mean of the two horizons.
+4. As 2, but without the enlarged horizon at interfaces (figure 5b); only for the rule `delta`.
 """
 
 import pathlib
@@ -23,7 +24,7 @@ from common import numpy as np  # noqa: E402
 
 DECK = ROOT / "inputs" / "plane_wave_refined.toml"
 
-# Table 3: largest loss and gain of energy density and reflected displacement, in percent.
+# Table 3: largest loss of energy density, largest gain of energy density, and reflected displacement, in percent.
 PAPER = {
     ("delta", 1): (9.83, 5.86, 0.24),
     ("delta", 2): (11.00, 5.23, 0.31),
@@ -32,7 +33,7 @@ PAPER = {
     ("delta-m", 2): (18.96, 6.25, 0.87),
     ("delta-m", 3): (20.81, 7.27, 1.03),
 }
-# Largest loss in figure 5b, without the enlarged horizon, in percent.
+# Largest loss of energy density in figure 5b, without the enlarged horizon, in percent.
 PAPER_UNCORRECTED = 37.4
 
 AMPLITUDE = 0.1  # of each half of the wave, m
@@ -54,7 +55,7 @@ def horizons(rule, level):
 def deck(rule, levels, margin, factor, bonds, seen, end):
     """Return the text of the deck with an output at the time `seen`; 0 levels mean no refinement.
 
-    The patch of each level has the radius of `margin` horizons of the next coarser level.
+    The patch of each level has a radius of `margin` horizons of the next coarser level.
     """
     text = DECK.read_text()
     text = re.sub(r"(?m)^end = 0\.17 .*$", f"end = {end}", text)
@@ -76,7 +77,7 @@ def deck(rule, levels, margin, factor, bonds, seen, end):
 
 
 def run(arguments, name, text):
-    """The result of a deck."""
+    """Run a deck and return its result."""
     folder = arguments.output / name
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "deck.toml"
@@ -85,7 +86,7 @@ def run(arguments, name, text):
 
 
 class Energy:
-    """Total energy density (J/m³) of the second output by position, the positions, and the time."""
+    """Positions, total energy densities (J/m³) and time of the second output of a result."""
 
     def __init__(self, result):
         self.places = result.points[:, :2]
@@ -96,14 +97,14 @@ class Energy:
         self.time = result.times[1]
 
     def profile(self):
-        """Return the density along the row of nodes through the patch; without a patch all rows are equal."""
+        """Return x and energy density along the row of nodes through the centre of the patch."""
         row = np.abs(self.places[:, 1] - CENTRE[1]) < 1e-3 * DX
         order = np.argsort(self.places[row, 0])
         return self.places[row, 0][order], self.density[row][order]
 
 
 def columns(result, *names):
-    """Return columns of the history of a result."""
+    """Return the named columns of the history of a result."""
     history = result.history
     return [np.array(history[name]) for name in names]
 

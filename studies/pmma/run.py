@@ -2,8 +2,8 @@
 """Mixed-mode fracture of a PMMA plate: the experiment of Réthoré (2018) and the computation of Willberg,
 Hesse & Heinecke (2022).
 
-Runs `inputs/pmma_mixed_mode.toml` with one or several laws on the same grid. Draws the crack path beside the
-measured path, and force and crack length over the displacement of the plate's right side.
+Runs `inputs/pmma_mixed_mode.toml` with one or several laws on the same grid. Draws the computed crack path beside the
+measured path, and the force and the crack length over the displacement of the plate's right side.
 """
 
 import argparse
@@ -19,20 +19,21 @@ from common import ROOT, fissure, history, numpy, pyplot  # noqa: E402
 
 EXAMPLES = """\
 examples:
-  studies/pmma/run.py --small                       2 mm, to see that it runs; seconds
-  studies/pmma/run.py --dx 1e-3                     a coarse grid
+  studies/pmma/run.py --small                       spacing 2 mm, a test that the study runs; seconds
+  studies/pmma/run.py --dx 1e-3                     spacing 1 mm
   studies/pmma/run.py --laws correspondence --dx 0.31e-3
-                                             the paper's grid; eight minutes of two cores
+                                             grid of the 2022 paper; 8 minutes on two cores
   studies/pmma/run.py --set fracture_energy=100 --set family_correction=0 --set damage.brittle.energy.calibration=energy
-                                             as in the paper, see docs/src/verification/pmma.md
-  studies/pmma/run.py --relaxation 60               from equilibrium to equilibrium, in 60 load steps
-  studies/pmma/run.py --set speed=0.01              another parameter of the deck; may be repeated
-  studies/pmma/run.py --reuse                       tables and pictures of runs that are there
+                                             damage as in the 2022 paper, see docs/src/verification/pmma.md
+  studies/pmma/run.py --relaxation 60               without inertia: 60 load steps, each relaxed to equilibrium
+  studies/pmma/run.py --set speed=0.01              another value of a parameter of the deck; may be repeated
+  studies/pmma/run.py --reuse                       table and pictures of runs that are in the output folder
 
-Initiation is the displacement at which the crack has become one horizon long. The deviation of a path is
-the largest distance, up or down, of its main branch from the measured path, between the first measured
-place it reaches and its tip. A crack at the hole's right side is damage beyond the deck's threshold right
-of the hole's centre.
+All displacements in the table are those of the plate's right side. Initiation is the displacement at which the crack is
+one horizon long. The deviation of the path is the largest vertical distance between the main branch of the crack and the
+measured path, over the x that both cover. The column "as far left as x" has the smallest x of this comparison. The
+column "crack right of the hole from" has the displacement at which damage right of the hole's centre first exceeds the
+deck's threshold; `none` means that it does not.
 
 Writes pmma.md (the table), pmma.json, pmma_path.png and pmma_curves.png into the output folder.
 """
@@ -64,7 +65,7 @@ INITIATION = 0.43e-3  # m, the paper's section 6.3
 HOLE = (0.095, 0.035, 0.015)  # centre and radius, m
 CRACKED = 0.35  # the deck's damage_threshold
 
-# Replacements of keys for relaxation: no inertia, and a row of the history at each equilibrium.
+# Replacements in the deck for relaxation: no inertia, and a row of the history at each equilibrium.
 RELAXED = {
     r'(?m)^end = "end_displacement/speed"$': """\
 end = "end_displacement/speed"
@@ -74,7 +75,7 @@ relaxation = {{ load_steps = {steps}, tolerance = 1e-4 }}""",
     r'every = "end_displacement/speed/700"': "every_steps = 1",
 }
 
-# Tables of material and damage for each law; None for the tables of the deck.
+# The tables [material] and [damage] of each law; None stands for the tables of the deck.
 LAWS = {
     "correspondence": None,
     "ordinary": """\
@@ -90,7 +91,7 @@ no_failure = ["left", "right"]
 
 """,
 }
-# Parameter of the deck that only damage by work uses.
+# Parameter of the deck that only damage by energy uses.
 OF_WORK = "family_correction"
 COLOURS = ("#1b6ca8", "#d1495b", "#66a182", "#8d6a9f")
 
@@ -119,12 +120,12 @@ def arguments():
         return int(text)
 
     add = parser.add_argument
-    add("--laws", type=common.several_of(LAWS), default=list(LAWS), metavar="LIST", help="[all]")
-    add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
-    add("--small", action="store_true", help="2 mm and a fast press")
-    add("--relaxation", type=load_steps, metavar="STEPS", help="relaxation with this number of load steps [explicit]")
-    add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
-    add("--reuse", action="store_true", help="reuse existing runs")
+    add("--laws", type=common.several_of(LAWS), default=list(LAWS), metavar="LIST", help="laws: correspondence,ordinary [all]")
+    add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing, m [0.5e-3]")
+    add("--small", action="store_true", help="spacing 2 mm and fast loading (0.2 m/s)")
+    add("--relaxation", type=load_steps, metavar="STEPS", help="solve by relaxation, with this number of load steps [explicit time steps]")
+    add("--set", action="append", default=[], metavar="NAME=VALUE", help="set a parameter or a key of the deck; may be repeated")
+    add("--reuse", action="store_true", help="do not repeat runs whose results are in the output folder")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
     options = common.start(parser)
     if options.small:
@@ -153,7 +154,7 @@ def deck(law, load_steps):
 
 
 def run(options, law):
-    """Run the deck with a law; return its folder."""
+    """Run the deck with a law; return the folder of the result."""
     way = "-relaxed" if options.relaxation else ""
     folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
     if options.reuse and (folder / "crack_main.csv").exists():
@@ -166,18 +167,17 @@ def run(options, law):
 
 
 def metres(places):
-    """Places in mm as an array of places in m."""
+    """Convert positions in mm to an array of positions in m."""
     return 1e-3 * numpy.array(places)
 
 
 def branches(folder):
-    """The branches of the crack as arrays of positions (m), longest first."""
+    """Return the branches of the crack as arrays of positions (m), longest first."""
     return common.branches(folder / "crack_main.csv")
 
 
 def deviation(path):
-    """Largest distance (m) of a path from the measured one, and the leftmost x (m) of the comparison."""
-    # From left to right; where the path turns back, its last part counts.
+    """Return the largest vertical distance (m) between a path and the measured path, and the smallest x (m) compared."""
     along, up = metres(MEASURED).T
     left = max(path[:, 0].min(), along[-1])
     places = numpy.linspace(left, min(path[:, 0].max(), along[0]), 400)
@@ -188,7 +188,7 @@ def deviation(path):
 
 
 def damage(folder):
-    """Return positions (m), damage at each output, and times (s)."""
+    """Return positions (m) of the points, damage by output and point, and times (s) of the outputs."""
     with fissure.open(folder) as result:
         return result.points, result["damage"], result.times
 
@@ -305,7 +305,7 @@ def main():
     (options.output / "pmma.md").write_text(table(results))
     draw_path(runs, options.output / "pmma_path.png")
     draw_curves(runs, options.output / "pmma_curves.png")
-    print(f"{table(results)}\ntable and pictures in {options.output}")
+    print(f"{table(results)}\ntable and pictures are in {options.output}")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Runs a deck for many values of its parameters: a table, or a Morris design.
+"""Runs a deck for many values of its parameters, given by a table or a Morris design.
 
-Each row of the design is a separate run; the runs are executed in parallel on this machine or as a Slurm
-array. The same command continues an interrupted study: complete rows are kept, other rows restart from their
-checkpoints. The requested numbers are collected from the histories into a table. For a Morris design, μ* and σ
-of each parameter are computed and drawn. The crack paths of all runs are drawn in one picture.
+Each row of the table or design is one run of the deck. The runs are executed in parallel on this machine or as
+a Slurm array. The same command continues an interrupted study: complete rows are kept, other rows restart from
+their checkpoints. After the runs, the outputs that the study file defines are collected from the histories into
+results.csv. For a Morris design, μ* (the mean of the absolute elementary effects) and σ (their standard
+deviation) of each parameter are computed and drawn. The crack paths of all runs are drawn in one picture.
 """
 
 import argparse
@@ -29,43 +30,51 @@ from common import ROOT, branches, numpy, pyplot  # noqa: E402
 
 EXAMPLES = """\
 examples:
-  studies/sensitivity/run.py studies/pmma/morris.toml             here, a run a core
+  studies/sensitivity/run.py studies/pmma/morris.toml             on this machine, one run per core
   studies/sensitivity/run.py study.toml --jobs 2 --threads 4      two runs at a time, four threads each
-  studies/sensitivity/run.py study.toml --rows 1-10,13            some rows only
-  studies/sensitivity/run.py study.toml --slurm --time=02:00:00   as a job array; options after it are sbatch's
-  studies/sensitivity/run.py study.toml --collect                 table and pictures of what is there
+  studies/sensitivity/run.py study.toml --rows 1-10,13            only these rows
+  studies/sensitivity/run.py study.toml --slurm --time=02:00:00   as a job array; passes --time to sbatch
+  studies/sensitivity/run.py study.toml --collect                 tables and pictures of existing results
 
-A study is a TOML file:
+The study file is TOML:
 
-  deck = "../plate.toml"          relative to the study
-  fixed = { dx = 1e-3 }           parameters of the deck that all runs share
-  keep = ["history.csv"]          files of a complete run that stay; all, if not given
+  deck = "../plate.toml"          path relative to the study file
+  fixed = { dx = 1e-3 }           values of parameters of the deck that are the same in all runs
+  keep = ["history.csv"]          files of a complete run that are kept [all files]
 
-  [design.morris]                 or design.rows = [{ tension = 18e6 }, …]
-  trajectories = 5                or design.table = "loads.txt", as slurm/array.sbatch takes it
-  levels = 4
+  [design.morris]                 a Morris design
+  trajectories = 5                each of k + 1 runs for k parameters
+  levels = 4                      number of values of each parameter, even
   seed = 1
+                                  instead of [design.morris], a table of values:
+                                  design.rows = [{ tension = 18e6 }, …], or
+                                  design.table = "loads.txt", in the format of slurm/array.sbatch
 
-  [parameter.tension]             of a Morris design: its ranges
-  lower = 18e6                    or mean and range: mean − range to mean + range
+  [parameter.tension]             range of a parameter in a Morris design
+  lower = 18e6
   upper = 22e6
+                                  instead of lower and upper: `mean` and `range`,
+                                  for mean − range to mean + range
+  label = "T"                     name in pictures [name of the parameter]
 
-  [output.reaction]               a number from each history: where `column` has the value `at`, by
-  column = "reaction_top"         linear interpolation, or pick = "last", "first", "max", "min"
+  [output.reaction]               one number from the history of each run
+  column = "reaction_top"         the column that has the number
   at = { column = "time", value = 20e-6 }
-  scale = 1e-3                    a factor and its unit for tables and pictures
-  unit = "kN"
+                                  take it where the column `time` has this value, by linear
+                                  interpolation; instead of `at`: pick = "last", "first", "max" or "min"
+  scale = 1e-3                    factor on the number in tables and pictures [1]
+  unit = "kN"                     unit of the scaled number, for tables and pictures
 
-  [paths]                         a heat map of the paths of a [history.crack.NAME] over all runs
-  file = "crack_NAME.csv"
-  lower = [0, 0]                  the part of the plane that is shown, m
-  upper = [0.1, 0.04]
-  cell = 0.5e-3
-  reference = [[0, 0], [0.1, 0]]  a path to compare with, m
+  [paths]                         heat map of the crack paths of all runs
+  file = "crack_NAME.csv"         file that [history.crack.NAME] of the deck writes
+  lower = [0, 0]                  lower corner of the drawn part of the plane, m
+  upper = [0.1, 0.04]             upper corner, m
+  cell = 0.5e-3                   size of a cell of the map, m
+  reference = [[0, 0], [0.1, 0]]  a path that is drawn for comparison, m
 
-Writes table.txt (the design), row_K/ (the runs), results.csv, morris.csv, morris.png and paths.png into the
-output folder. Exit codes: 0 done, 1 runs failed, 2 the study or the arguments are wrong, 75 stopped by a
-signal; the same command continues.
+Writes table.txt (the table of parameter values), row_K/ (the run of row K), results.csv, morris.csv, morris.png
+and paths.png into the output folder. Exit codes: 0 all done; 1 some runs failed; 2 the study file or the
+arguments are wrong; 75 stopped by a signal, and the same command continues the study.
 """
 
 STOPPED = 75
@@ -82,7 +91,7 @@ KEYS = {
 
 
 class Wrong(Exception):
-    """An error in the study or in its arguments."""
+    """An error in the study file or in the arguments."""
 
 
 class Study:
@@ -118,7 +127,7 @@ class Study:
         self.names, self.rows = self.design()
 
     def wrong(self, key, message):
-        """Return an error at a key, with the line of its last word."""
+        """Return an error about a key such as `output.NAME.pick`, with the line on which its last part is set."""
         word = re.escape(key.rsplit(".", 1)[-1])
         pattern = re.compile(rf"^\s*(\[[^\]]*\b{word}\]|[^#]*\b{word}\s*=)")
         lines = (number for number, line in enumerate(self.text.splitlines(), 1) if pattern.search(line))
@@ -206,7 +215,7 @@ class Study:
             raise self.wrong("paths.cell", "must be above 0")
 
     def design(self):
-        """Return the names of the varied parameters, and their values by row, as texts."""
+        """Return the names of the varied parameters, and for each row their values, as text."""
         design = self.values.get("design", {})
         self.check_keys("design", design)
         ranges = self.tables("parameter")
@@ -293,16 +302,16 @@ PICKS = {
 
 
 def arguments():
-    parser = common.parser(__file__, __doc__, EXAMPLES, output="out/ and the study's name")
+    parser = common.parser(__file__, __doc__, EXAMPLES, output="out/NAME for a study file NAME.toml")
     cores = len(os.sched_getaffinity(0))
     add = parser.add_argument
     add("study", type=pathlib.Path, help="the study file")
-    add("--jobs", type=int, metavar="N", help="runs at a time [cores / threads]")
+    add("--jobs", type=int, metavar="N", help="number of runs at a time [cores divided by threads]")
     add("--threads", type=int, default=1, metavar="N", help="threads of each run [1]")
-    add("--rows", metavar="LIST", help="only these rows, such as 1-10,13")
-    add("--overwrite", action="store_true", help="replace another study in the output folder")
-    add("--collect", action="store_true", help="run nothing; make table and pictures of existing results")
-    add("--slurm", nargs=argparse.REMAINDER, metavar="OPTION", help="submit an array; further options are sbatch's")
+    add("--rows", metavar="LIST", help="run only these rows, such as 1-10,13")
+    add("--overwrite", action="store_true", help="replace the results of another study in the output folder")
+    add("--collect", action="store_true", help="run nothing; write tables and pictures of existing results")
+    add("--slurm", nargs=argparse.REMAINDER, metavar="OPTION", help="submit a Slurm array; all options after --slurm are passed to sbatch")
     options = common.start(parser, check=are_positive)
     options.jobs = options.jobs or max(1, cores // options.threads)
     options.output = (options.output or ROOT / "out" / options.study.stem).resolve()
@@ -310,7 +319,7 @@ def arguments():
 
 
 def are_positive(options):
-    """What is wrong with the numbers of the arguments, if anything."""
+    """Return an error message if --jobs or --threads is below 1."""
     if options.threads < 1 or (options.jobs is not None and options.jobs < 1):
         return "--jobs and --threads must be at least 1"
     return None
@@ -332,14 +341,14 @@ def chosen_rows(text, count):
 def prepare(study, options):
     """Create the output folder; fail if it contains another study."""
     table = options.output / "table.txt"
-    # Common values are part of the design.
+    # The values of `fixed` are part of the table, so a change of them makes another study.
     shared = "".join(f"# {name} = {value}\n" for name, value in study.fixed.items())
     wanted = f"# {study.deck.name}\n{shared}{study.table()}"
     if table.exists() and table.read_text() != wanted:
         if not options.overwrite:
             raise Wrong(
-                f"{table} is of another study, or of this one before it was changed; "
-                "--overwrite replaces it and its runs, --output DIR writes elsewhere"
+                f"{table} belongs to another study, or to this one before it was changed; "
+                "--overwrite deletes its runs and replaces it, --output DIR writes elsewhere"
             )
         for folder in options.output.glob("row_*"):
             shutil.rmtree(folder)
@@ -441,7 +450,7 @@ def history(folder):
 
 
 def value_of(study, name, output, columns):
-    """Return the value of an output from a run's history; NaN if the history ends before."""
+    """Return the value of an output from a run's history; NaN if the history does not reach the value of `at`."""
 
     def column(wanted):
         if wanted not in columns:
@@ -482,16 +491,16 @@ def collect(study, options):
         writer.writerow(["row", *study.names, *heads])
         for row, (values, found) in enumerate(zip(study.rows, results), 1):
             writer.writerow([row, *values, *("" if math.isnan(value) else repr(float(value)) for value in found)])
-    print(f"{complete} of {len(study.rows)} rows are complete; {options.output / 'results.csv'}")
+    print(f"{complete} of {len(study.rows)} rows are complete; results are in {options.output / 'results.csv'}")
     for k, name in enumerate(names):
         missing = [str(row) for row in range(1, len(study.rows) + 1) if math.isnan(results[row - 1, k])]
         if missing and len(missing) < len(study.rows):
-            print(f"{name}: not reached by the rows {', '.join(missing)}")
+            print(f"{name}: no value in the rows {', '.join(missing)}, which failed or ended too early")
     return results
 
 
 def sensitivities(study, results):
-    """Return mean, μ*, its 95 % confidence and σ of each parameter by output; only complete trajectories are used."""
+    """Return by output the mean, μ*, the 95 % confidence of μ*, and σ of each parameter, from complete trajectories."""
     from SALib.analyze import morris as analysis
 
     problem, levels = study.morris
@@ -501,10 +510,10 @@ def sensitivities(study, results):
     for name, own in zip(study.outputs, results.T):
         whole = numpy.isfinite(own).reshape(-1, length).all(axis=1)
         if whole.sum() < 2:
-            print(f"{name}: {whole.sum()} whole trajectories are too few")
+            print(f"{name}: no sensitivities, because only {whole.sum()} trajectories are complete and two are needed")
             continue
         if not whole.all():
-            print(f"{name}: from {whole.sum()} of {len(whole)} trajectories, the others are not whole")
+            print(f"{name}: sensitivities are from {whole.sum()} of {len(whole)} trajectories; the others are incomplete")
         rows = numpy.repeat(whole, length)
         found[name] = analysis.analyze(problem, values[rows], own[rows], num_levels=levels, seed=0)
     return found
@@ -556,7 +565,7 @@ def covered(lines, centres, reach):
 
 
 def heat_map(study, options):
-    """Return for each cell the number of runs whose crack crosses it."""
+    """Draw for each cell of the map the number of runs whose crack is within one cell size of its centre."""
     rule = study.paths
     cell = rule["cell"]
     xs, ys = (numpy.arange(low + cell / 2, high, cell) for low, high in zip(rule["lower"], rule["upper"]))
@@ -575,7 +584,7 @@ def heat_map(study, options):
     image = axis.imshow(
         counts, origin="lower", extent=extent, cmap=colours, vmin=0.5, vmax=max(1, runs), interpolation="nearest"
     )
-    figure.colorbar(image, ax=axis, label=f"of {runs} runs with a crack")
+    figure.colorbar(image, ax=axis, label=f"number of runs, of {runs} with a crack")
     if reference := rule.get("reference"):
         axis.plot(*(1e3 * numpy.array(reference).T), color="#009e73", linewidth=1.5, label="reference")
         axis.legend(loc="best", fontsize=8)
@@ -599,7 +608,7 @@ def main():
         runner = Runner(study, options)
         failed = runner.all(rows)
         if runner.stopped:
-            print("stopped; the same command continues", file=sys.stderr)
+            print("stopped; the same command continues the study", file=sys.stderr)
             return STOPPED
     results = collect(study, options)
     if study.morris and study.outputs:
