@@ -21,6 +21,7 @@ mod elastic_plastic_pmb;
 mod force_state;
 mod influence;
 mod linear_microelastic;
+mod monomials;
 mod normalised;
 mod ordinary;
 mod ordinary_plastic;

@@ -2,6 +2,7 @@
 
 use nalgebra::SMatrix;
 
+use super::Bond;
 use crate::lanes::Lanes;
 
 /// Diagonal and mixed entries of eight tensors. Space has three mixed entries. In the plane the second mixed
@@ -54,14 +55,16 @@ pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f6
     }
 }
 
-/// Exponents of x, y and z in the monomials of a degree, in the order of the sums.
-pub fn exponents(degree: usize) -> impl Iterator<Item = [usize; 3]> {
-    (0..=degree).flat_map(move |z| (0..=degree - z).map(move |y| [degree - z - y, y, z]))
-}
-
-/// Return the number of tensor components that have these exponents.
-pub fn multiplicity(exponents: [usize; 3]) -> f64 {
-    let factorial = |n: usize| (1..=n).product::<usize>();
-    let all = factorial(exponents.iter().sum());
-    (all / exponents.map(factorial).iter().product::<usize>()) as f64
+/// Return n·T n for eight bonds of direction n.
+#[inline(always)]
+pub fn quadratic_form<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
+    let xi = &bond.reference;
+    let mut sum = diagonal[0] * (xi[0] * xi[0]);
+    for d in 1..D {
+        sum += diagonal[d] * (xi[d] * xi[d]);
+    }
+    for (k, (a, b)) in mixed::<D>().enumerate() {
+        sum += others[k] * (xi[a] * xi[b] * 2.0);
+    }
+    sum * (bond.inverse * bond.inverse)
 }

@@ -17,7 +17,8 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
-use super::symmetric::{Symmetric, exponents, mixed, multiplicity, to_entries};
+use super::monomials::{exponents, index_of, least_squares, multiplicity, write_monomials};
+use super::symmetric::{Symmetric, mixed, quadratic_form, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
@@ -80,20 +81,6 @@ impl Described for TensorPmb {
     }
 }
 
-/// Return n·H n.
-#[inline(always)]
-fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
-    let xi = &bond.reference;
-    let mut sum = diagonal[0] * (xi[0] * xi[0]);
-    for d in 1..D {
-        sum += diagonal[d] * (xi[d] * xi[d]);
-    }
-    for (k, (a, b)) in mixed::<D>().enumerate() {
-        sum += others[k] * (xi[a] * xi[b] * 2.0);
-    }
-    sum * (bond.inverse * bond.inverse)
-}
-
 /// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc from its exponents.
 fn isotropic(exponents: [usize; 3]) -> f64 {
     let odd = exponents.iter().any(|exponent| exponent % 2 == 1);
@@ -107,11 +94,6 @@ fn isotropic(exponents: [usize; 3]) -> f64 {
 /// Fit H of a point in `D` dimensions: the least-squares solution of ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (…).
 /// `sums` are the sums of |ξ| Ṽ times the monomials of degree 6 of n.
 fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> SMatrix<f64, D, D> {
-    let place = |wanted: [usize; 3]| {
-        exponents(6)
-            .position(|one| one == wanted)
-            .expect("a monomial")
-    };
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
@@ -121,18 +103,12 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
         let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
         let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();
-        0.5 * micromodulus * sums[place(both)] * weight
+        0.5 * micromodulus * sums[index_of(both)] * weight
     });
     let wanted = DVector::from_fn(rows.len(), |r, _| {
         shear_modulus * isotropic(rows[r]) * multiplicity(rows[r]).sqrt()
     });
-    // The decomposition of a matrix with NaN or infinity would not terminate.
-    if matrix.iter().chain(wanted.iter()).any(|x| !x.is_finite()) {
-        return SMatrix::zeros();
-    }
-    let decomposition = matrix.svd(true, true);
-    let limit = RANK * decomposition.singular_values.max();
-    let Ok(solution) = decomposition.solve(&wanted, limit) else {
+    let Some(solution) = least_squares(matrix, &wanted, RANK) else {
         return SMatrix::zeros();
     };
     let mut tensor = SMatrix::zeros();
@@ -179,17 +155,8 @@ impl<const D: usize> Law<D> for TensorPmb {
     #[inline(always)]
     fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; MONOMIALS] {
         let mut sums = [Lanes::splat(0.0); MONOMIALS];
-        for (sum, exponents) in sums.iter_mut().zip(exponents(6)) {
-            if exponents[D..].iter().any(|exponent| *exponent > 0) {
-                continue;
-            }
-            *sum = bond.length;
-            for d in 0..D {
-                for _ in 0..exponents[d] {
-                    *sum = *sum * (bond.reference[d] * bond.inverse);
-                }
-            }
-        }
+        let directions = bond.reference.map(|xi| xi * bond.inverse);
+        write_monomials(6, directions, bond.length, &mut sums);
         sums
     }
 
@@ -200,13 +167,17 @@ impl<const D: usize> Law<D> for TensorPmb {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
-        let micromodulus = along(bond, end) * self.micromodulus;
+        let micromodulus = quadratic_form(bond, end) * self.micromodulus;
         Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
     }
 
     #[inline(always)]
     fn bond_energy(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Lanes {
-        bond.stretch * bond.stretch * bond.length * along(bond, end) * (0.5 * self.micromodulus)
+        bond.stretch
+            * bond.stretch
+            * bond.length
+            * quadratic_form(bond, end)
+            * (0.5 * self.micromodulus)
     }
 
     /// Spring constant with the largest absolute row sum of H, an upper bound on the eigenvalues.
@@ -233,8 +204,8 @@ impl<const D: usize> Law<D> for TensorPmb {
         if !self.is_scaled || !other.is_scaled {
             return Lanes::splat(1.0);
         }
-        let micromodulus =
-            along(bond, here) * self.micromodulus + along(bond, there) * other.micromodulus;
+        let micromodulus = quadratic_form(bond, here) * self.micromodulus
+            + quadratic_form(bond, there) * other.micromodulus;
         let whole = 0.5 * (self.micromodulus + other.micromodulus);
         (Lanes::splat(whole) / micromodulus).sqrt()
     }
