@@ -10,6 +10,7 @@ use crate::material::{Law, PlasticState, ShapeTensor};
 use crate::solver::model::Model;
 
 use super::Forces;
+use super::broken_moments::{MomentSums, Moments};
 use super::interaction::Interaction;
 use super::kernel::Kernel;
 use super::measures;
@@ -117,13 +118,13 @@ impl<const D: usize> Forces<D> {
         columns.swap_remove(0)
     }
 
-    /// Compute the sums of `BrokenMoments` for each owned point. In 3-D only.
-    pub fn broken_moments(&mut self, model: &Model<D>) -> [Vec<f64>; 14] {
+    /// Compute the moments of each owned point. In 3-D only.
+    pub fn broken_moments(&mut self, model: &Model<D>) -> Vec<Moments> {
         let columns = self.measure(model.owned(), 14, |interaction, sums, source| {
-            let kernel = &measures::BrokenMoments;
-            sweep_all(&mut interaction.bonds, sums, kernel, source);
+            sweep_all(&mut interaction.bonds, sums, &MomentSums, source);
         });
-        columns.try_into().expect("fourteen columns")
+        let of_point = |point| Moments(std::array::from_fn(|k| columns[k][point]));
+        (0..model.owned()).map(of_point).collect()
     }
 
     /// Sum D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.

@@ -7,7 +7,7 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, FamilyShare, Law, family_sha
 use super::kernel::{Group, Kernel};
 
 /// Request every bond quantity; these kernels are not in the step loop.
-const fn wanted(linear: bool) -> Wanted {
+pub(super) const fn wanted(linear: bool) -> Wanted {
     Wanted {
         linear,
         stretch: true,
@@ -116,7 +116,7 @@ impl<const D: usize> Kernel<D> for Softened {
 }
 
 /// Index pairs of the entries of a symmetric tensor: xx, yy, zz, xy, yz, xz.
-const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+pub(super) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 /// Add the tensor entries of the intact bonds to a symmetric tensor.
 #[inline(always)]
@@ -271,48 +271,6 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
         for k in 0..FamilyShare::<D>::COUNT {
             let sum = sums.get_mut(k);
             *sum = simd.multiply_add(share.get(k), weight, *sum);
-        }
-    }
-}
-
-/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D, with ω as in
-/// [`FamilyTensors`]. The sums are:
-///
-/// - 0: Σ ω Ṽ over all bonds, m³;
-/// - 1 to 3: Σ ω ξ Ṽ over all bonds, m⁴;
-/// - 4 to 9: Σ ω ξ⊗ξ Ṽ over all bonds, m⁵, in the order of `PAIRS`;
-/// - 10: Σ ω Ṽ over the broken bonds, m³;
-/// - 11 to 13: Σ ω ξ Ṽ over the broken bonds, m⁴.
-#[derive(Clone, Copy)]
-pub struct BrokenMoments;
-
-impl<const D: usize> Kernel<D> for BrokenMoments {
-    type Sums = [Lanes; 14];
-    type Broken = [Lanes; 0];
-    type Point = [Lanes; 0];
-    type BondHistory = [Lanes; 0];
-    type Rotation = [Lanes; 0];
-    const EXISTS: bool = D == 3;
-    const READS_BROKEN: bool = true;
-    const ISA_SET: IsaSet = IsaSet::Avx2;
-    const WANTED: Wanted = wanted(true);
-
-    #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 14]) {
-        let xi = &group.bond.reference;
-        let volume = group.weighted_by_volume(Lanes::splat(1.0));
-        let whole = simd.keep(volume, group.whole);
-        let broken = simd.keep(volume, group.whole & !group.intact);
-        sums[0] += whole;
-        sums[10] += broken;
-        for d in 0..D {
-            sums[1 + d] += whole * xi[d];
-            sums[11 + d] += broken * xi[d];
-        }
-        for (k, (a, b)) in PAIRS.into_iter().enumerate() {
-            if a < D && b < D {
-                sums[4 + k] += whole * xi[a] * xi[b];
-            }
         }
     }
 }

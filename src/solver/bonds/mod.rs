@@ -11,6 +11,7 @@
 
 mod bond_inputs;
 mod broken;
+mod broken_moments;
 mod evaluate;
 mod force;
 mod grid_points;
@@ -49,6 +50,7 @@ use sweep::{PointData, sweep_from};
 
 pub use bond_inputs::BondInputs;
 pub use broken::Broken;
+pub use broken_moments::Moments;
 pub use evaluate::{Acting, ForceTimes};
 pub use force::BondUpdate;
 pub use interaction::{BlockLaws, Interaction, PairReads};

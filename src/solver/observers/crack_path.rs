@@ -6,15 +6,11 @@ use crate::comm::all_gather_many;
 use crate::error::Result;
 use crate::problem;
 use crate::solver::Simulation;
-use crate::solver::conditions::{members, not_empty};
 
 use super::centre_line::{Branch, Damaged, Reach, branches};
+use super::crack_points::{link, points_of, spacings};
 
-/// Distance, in horizons, up to which damaged points are connected. It bridges a gap of one point in a row,
-/// but branches soon separate.
-const LINK: f64 = 2.0 / 3.0;
-
-/// Minimum of this distance in spacings, so that diagonal neighbours are connected for any horizon.
+/// Minimum of the distance up to which damaged points are connected, in spacings, so that diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.5;
 
 /// A crack whose path is tracked.
@@ -42,15 +38,10 @@ impl CrackPath {
         simulation: &Simulation<'_, D>,
         rule: &problem::CrackPath,
     ) -> Result<Self> {
-        let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
-        let points = members(problem, model, rule.set);
-        let key = format!("[history.crack.{}] set", rule.name);
-        not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
-        let volumes = (0..model.owned()).map(|point| model.volume[point]);
-        let mut largest = [volumes.fold(0.0, f64::max)];
-        comm.max(&mut largest);
-        let spacing = problem.dimension.edge(largest[0]);
-        let link = (LINK * problem.horizon).max(DIAGONAL * spacing);
+        let problem = simulation.problem;
+        let points = points_of(simulation, rule)?;
+        let [_, largest] = spacings(simulation);
+        let link = link(problem, DIAGONAL * largest);
         let reach = Reach {
             link,
             section_length: problem.horizon.max(link),

@@ -12,7 +12,7 @@
 //! counts once.
 
 use bytemuck::{Pod, Zeroable};
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::comm::all_gather_many;
 use crate::comm::sum::{ExactSum, reduce};
@@ -22,37 +22,19 @@ use crate::points::distance_squared;
 use crate::problem;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
-use crate::solver::conditions::{members, not_empty};
 use crate::solver::connected::Pieces;
 
+use super::crack_edge::Edge;
+use super::crack_points::{link, points_of, spacings};
 use super::snapshot::Snapshot;
 
 type Vector = Vector3<f64>;
 
-/// Distance, in horizons, up to which damaged points are connected; the same as in 2-D.
-const LINK: f64 = 2.0 / 3.0;
-
-/// Minimum of this distance in spacings, so that diagonal neighbours are connected for any horizon.
+/// Minimum of the distance up to which damaged points are connected, in spacings, so that diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.8;
 
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
-
-/// Fraction of the trace of C that is added to the diagonal of C, so that C of a single layer of points is
-/// invertible.
-const LAYER: f64 = 1e-9;
-
-/// Threshold, in horizons, of the distance between the mean of the damaged points around a point and the mean
-/// of its family. Points of the front are above the threshold. The distance is 0.4 on a straight front, and
-/// 0.05 at an edge of the body.
-const ONE_SIDED: f64 = 0.2;
-
-/// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged
-/// point.
-const CONE: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
-/// Sine of 14°, the largest angle between the plane of the crack and the bond to an undamaged point ahead.
-const IN_PLANE: f64 = 0.25;
 
 /// Largest damage of an undamaged point ahead, as a fraction of the threshold. At an oblique surface of the
 /// body, the damage falls below the threshold before the crack ends, but stays above this fraction.
@@ -100,18 +82,10 @@ impl CrackSurface {
         simulation: &Simulation<'_, D>,
         rule: &problem::CrackPath,
     ) -> Result<Self> {
-        let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
-        let points = members(problem, model, rule.set);
-        let key = format!("[history.crack.{}] set", rule.name);
-        not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
-        let volumes = (0..model.owned()).map(|point| model.volume[point]);
-        let mut extremes = [0.0, -f64::MAX];
-        for volume in volumes {
-            extremes = [extremes[0].max(volume), extremes[1].max(-volume)];
-        }
-        comm.max(&mut extremes);
-        let spacing = |volume| problem.dimension.edge(volume);
-        let link = (LINK * problem.horizon).max(DIAGONAL * spacing(extremes[0]));
+        let problem = simulation.problem;
+        let points = points_of(simulation, rule)?;
+        let [smallest, largest] = spacings(simulation);
+        let link = link(problem, DIAGONAL * largest);
         // A rank has all points within the length of the longest bond from its owned points.
         let known = cutoffs(problem).into_iter().fold(0.0, f64::max);
         Ok(Self {
@@ -119,7 +93,7 @@ impl CrackSurface {
             points,
             link: (link * (1.0 + TOLERANCE)).min(known),
             radius: (problem.horizon * (1.0 + TOLERANCE)).min(known),
-            front_spacing: 0.5 * spacing(-extremes[1]),
+            front_spacing: 0.5 * smallest,
         })
     }
 
@@ -143,11 +117,10 @@ impl CrackSurface {
         let damage = self.damage(simulation, snapshot);
         let damaged = self.damaged(simulation, &damage);
         let moments = simulation.forces.broken_moments(&simulation.model);
-        let moments = |point: usize| Moments(moments.each_ref().map(|column| column[point]));
         let mut gradient = [0; 3].map(|_| vec![0.0; simulation.model.volume.len()]);
         for point in 0..simulation.model.owned() {
-            if moments(point).has_broken() {
-                let of_point = moments(point).gradient();
+            if moments[point].has_broken() {
+                let of_point = moments[point].gradient();
                 (0..3).for_each(|d| gradient[d][point] = of_point[d]);
             }
         }
@@ -194,7 +167,7 @@ impl CrackSurface {
             let others = around.iter().filter(|other| **other != point);
             let bonds = others.map(|other| Vector::from(model.position(*other)) - own);
             let bonds: Vec<Vector> = bonds.collect();
-            let Some(edge) = self.edge(&bonds, normals, moments(point).mean()) else {
+            let Some(edge) = Edge::find(self.radius, &bonds, normals, moments[point].mean()) else {
                 continue;
             };
             // If no undamaged point is ahead, the crack has reached the surface of the body, so the point is
@@ -268,37 +241,6 @@ impl CrackSurface {
         damaged
     }
 
-    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region.
-    ///
-    /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
-    /// ⊗ g over these points and the point itself, 1/m². `mean` is the mean ξ̄ of the point's family, m.
-    ///
-    /// At the edge, the damaged points lie on one side of the family, and no damaged point lies in the cone
-    /// ahead.
-    fn edge(&self, bonds: &[Vector], normals: Matrix3<f64>, mean: Vector) -> Option<Edge> {
-        if bonds.is_empty() {
-            return None;
-        }
-        let count = bonds.len() as f64;
-        let middle = bonds.iter().sum::<Vector>() / count;
-        let normals = SymmetricEigen::new(normals);
-        let normal = normals.eigenvectors.column(normals.eigenvalues.imax());
-        let normal: Vector = normal.into_owned();
-        let ahead = mean - middle;
-        let ahead = ahead - ahead.dot(&normal) * normal;
-        let length = ahead.norm();
-        if length <= ONE_SIDED * self.radius {
-            return None;
-        }
-        let edge = Edge {
-            to_middle: middle.dot(&normal) * normal,
-            ahead: ahead / length,
-            normal,
-        };
-        let is_free = !bonds.iter().any(|bond| edge.is_in_cone(bond));
-        is_free.then_some(edge)
-    }
-
     /// Sort the points of the front by id, and remove points that are too close to an earlier point. Such
     /// points lie, for example, on the other face of the crack.
     fn thinned(&self, mut front: Vec<FrontPoint>) -> Vec<[f64; 3]> {
@@ -319,60 +261,5 @@ impl CrackSurface {
         let kept = places.into_iter().zip(is_kept);
         kept.filter_map(|(place, is_kept)| is_kept.then_some(place))
             .collect()
-    }
-}
-
-/// Edge of the damaged region at a damaged point.
-struct Edge {
-    /// Vector from the point to the mid-plane of the crack, m.
-    to_middle: Vector,
-    /// Unit vector in the plane of the crack that points away from the damaged points.
-    ahead: Vector,
-    /// Unit normal of the crack.
-    normal: Vector,
-}
-
-impl Edge {
-    fn is_in_cone(&self, bond: &Vector) -> bool {
-        bond.dot(&self.ahead) > CONE * bond.norm()
-    }
-
-    /// Whether a bond lies in the cone ahead and close to the plane of the crack.
-    fn is_ahead(&self, bond: &Vector) -> bool {
-        self.is_in_cone(bond) && bond.dot(&self.normal).abs() <= IN_PLANE * bond.norm()
-    }
-}
-
-/// Sums of a point from [`broken_moments`](crate::solver::bonds::Forces::broken_moments).
-struct Moments([f64; 14]);
-
-impl Moments {
-    fn vector(&self, first: usize) -> Vector {
-        Vector::from_fn(|d, _| self.0[first + d])
-    }
-
-    /// Whether a bond of the point is broken.
-    fn has_broken(&self) -> bool {
-        self.0[10] > 0.0
-    }
-
-    /// Mean ξ̄ of the family, m; 0 for a point without a family.
-    fn mean(&self) -> Vector {
-        match self.0[0] {
-            0.0 => Vector::zeros(),
-            volume => self.vector(1) / volume,
-        }
-    }
-
-    /// Gradient g of H at the point, 1/m.
-    fn gradient(&self) -> Vector {
-        let mean = self.mean();
-        let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);
-        let all = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        let spread = all - self.0[0] * mean * mean.transpose();
-        let spread = spread + LAYER * spread.trace() * Matrix3::identity();
-        let broken = self.vector(11) - self.0[10] * mean;
-        let inverse = spread.try_inverse();
-        inverse.map_or(Vector::zeros(), |inverse| inverse * broken)
     }
 }

@@ -4,7 +4,9 @@
 mod centre_line;
 mod columns;
 mod contact;
+mod crack_edge;
 mod crack_path;
+mod crack_points;
 mod crack_surface;
 mod cracked;
 mod fragments;

@@ -1,0 +1,92 @@
+//! Moments of the families of points and of their broken bonds, in 3-D.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::lanes::{IsaSet, Lanes, Simd};
+use crate::material::bond::Wanted;
+
+use super::kernel::{Group, Kernel};
+use super::measures::{PAIRS, wanted};
+
+type Vector = Vector3<f64>;
+
+/// Fraction of the trace of C that is added to the diagonal of C, so that C of a single layer of points is
+/// invertible.
+const LAYER: f64 = 1e-9;
+
+/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D, with ω as in
+/// [`FamilyTensors`](super::measures::FamilyTensors). The sums are:
+///
+/// - 0: Σ ω Ṽ over all bonds, m³;
+/// - 1 to 3: Σ ω ξ Ṽ over all bonds, m⁴;
+/// - 4 to 9: Σ ω ξ⊗ξ Ṽ over all bonds, m⁵, in the order of `PAIRS`;
+/// - 10: Σ ω Ṽ over the broken bonds, m³;
+/// - 11 to 13: Σ ω ξ Ṽ over the broken bonds, m⁴.
+#[derive(Clone, Copy)]
+pub struct MomentSums;
+
+impl<const D: usize> Kernel<D> for MomentSums {
+    type Sums = [Lanes; 14];
+    type Broken = [Lanes; 0];
+    type Point = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
+    type Rotation = [Lanes; 0];
+    const EXISTS: bool = D == 3;
+    const READS_BROKEN: bool = true;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const WANTED: Wanted = wanted(true);
+
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 14]) {
+        let xi = &group.bond.reference;
+        let volume = group.weighted_by_volume(Lanes::splat(1.0));
+        let whole = simd.keep(volume, group.whole);
+        let broken = simd.keep(volume, group.whole & !group.intact);
+        sums[0] += whole;
+        sums[10] += broken;
+        for d in 0..D {
+            sums[1 + d] += whole * xi[d];
+            sums[11 + d] += broken * xi[d];
+        }
+        for (k, (a, b)) in PAIRS.into_iter().enumerate() {
+            if a < D && b < D {
+                sums[4 + k] += whole * xi[a] * xi[b];
+            }
+        }
+    }
+}
+
+/// The sums of [`MomentSums`] of a point, in the same order.
+pub struct Moments(pub(super) [f64; 14]);
+
+impl Moments {
+    fn vector(&self, first: usize) -> Vector {
+        Vector::from_fn(|d, _| self.0[first + d])
+    }
+
+    /// Whether a bond of the point is broken.
+    pub fn has_broken(&self) -> bool {
+        self.0[10] > 0.0
+    }
+
+    /// Mean ξ̄ of the family, m; 0 for a point without a family.
+    pub fn mean(&self) -> Vector {
+        match self.0[0] {
+            0.0 => Vector::zeros(),
+            volume => self.vector(1) / volume,
+        }
+    }
+
+    /// Gradient of a function that is 1 at the neighbours with a broken bond and 0 at the other neighbours, 1/m.
+    /// It is that of a linear function, fitted by least squares with the weights ω Ṽ.
+    pub fn gradient(&self) -> Vector {
+        let mean = self.mean();
+        let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);
+        let all = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let spread = all - self.0[0] * mean * mean.transpose();
+        let spread = spread + LAYER * spread.trace() * Matrix3::identity();
+        let broken = self.vector(11) - self.0[10] * mean;
+        let inverse = spread.try_inverse();
+        inverse.map_or(Vector::zeros(), |inverse| inverse * broken)
+    }
+}

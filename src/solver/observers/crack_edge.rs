@@ -1,0 +1,75 @@
+//! Edge of a crack in 3-D: damaged points that have damaged points on one side only.
+
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+type Vector = Vector3<f64>;
+
+/// Threshold, in horizons, of the distance between the mean of the damaged points around a point and the mean
+/// of its family. Points of the front are above the threshold. The distance is 0.4 on a straight front, and
+/// 0.05 at an edge of the body.
+const ONE_SIDED: f64 = 0.2;
+
+/// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged
+/// point.
+const CONE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Sine of 14°, the largest angle between the plane of the crack and the bond to an undamaged point ahead.
+const IN_PLANE: f64 = 0.25;
+
+/// Edge of the damaged region at a damaged point.
+pub struct Edge {
+    /// Vector from the point to the mid-plane of the crack, m.
+    pub to_middle: Vector,
+    /// Unit vector in the plane of the crack that points away from the damaged points.
+    ahead: Vector,
+    /// Unit normal of the crack.
+    normal: Vector,
+}
+
+impl Edge {
+    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region.
+    ///
+    /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
+    /// ⊗ g over these points and the point itself, 1/m². `mean` is the mean ξ̄ of the point's family, m.
+    /// `radius` is the radius of the family, m.
+    ///
+    /// At the edge, the damaged points lie on one side of the family, and no damaged point lies in the cone
+    /// ahead.
+    pub fn find(
+        radius: f64,
+        bonds: &[Vector],
+        normals: Matrix3<f64>,
+        mean: Vector,
+    ) -> Option<Self> {
+        if bonds.is_empty() {
+            return None;
+        }
+        let count = bonds.len() as f64;
+        let middle = bonds.iter().sum::<Vector>() / count;
+        let normals = SymmetricEigen::new(normals);
+        let normal = normals.eigenvectors.column(normals.eigenvalues.imax());
+        let normal: Vector = normal.into_owned();
+        let ahead = mean - middle;
+        let ahead = ahead - ahead.dot(&normal) * normal;
+        let length = ahead.norm();
+        if length <= ONE_SIDED * radius {
+            return None;
+        }
+        let edge = Self {
+            to_middle: middle.dot(&normal) * normal,
+            ahead: ahead / length,
+            normal,
+        };
+        let is_free = !bonds.iter().any(|bond| edge.is_in_cone(bond));
+        is_free.then_some(edge)
+    }
+
+    fn is_in_cone(&self, bond: &Vector) -> bool {
+        bond.dot(&self.ahead) > CONE * bond.norm()
+    }
+
+    /// Whether a bond lies in the cone ahead and close to the plane of the crack.
+    pub fn is_ahead(&self, bond: &Vector) -> bool {
+        self.is_in_cone(bond) && bond.dot(&self.normal).abs() <= IN_PLANE * bond.norm()
+    }
+}

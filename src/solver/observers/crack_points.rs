@@ -1,0 +1,42 @@
+//! Points among which a crack is searched, in 2-D and 3-D.
+
+use crate::error::Result;
+use crate::problem::{CrackPath, Problem};
+use crate::solver::Simulation;
+use crate::solver::conditions::{members, not_empty};
+
+/// Distance, in horizons, up to which damaged points are connected. It bridges a gap of one point in a row,
+/// but branches soon separate.
+const LINK: f64 = 2.0 / 3.0;
+
+/// Find the owned points of the set of a crack. Collective.
+///
+/// # Errors
+/// If the set is empty; the error is the same on all ranks.
+pub fn points_of<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    rule: &CrackPath,
+) -> Result<Vec<u32>> {
+    let (problem, comm) = (simulation.problem, simulation.comm);
+    let points = members(problem, &simulation.model, rule.set);
+    let key = format!("[history.crack.{}] set", rule.name);
+    not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
+    Ok(points)
+}
+
+/// Smallest and largest spacing of all points, m. Collective.
+pub fn spacings<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; 2] {
+    let model = &simulation.model;
+    let mut extremes = [-f64::MAX, 0.0];
+    for volume in (0..model.owned()).map(|point| model.volume[point]) {
+        extremes = [extremes[0].max(-volume), extremes[1].max(volume)];
+    }
+    simulation.comm.max(&mut extremes);
+    let [smallest, largest] = extremes;
+    [-smallest, largest].map(|volume| simulation.problem.dimension.edge(volume))
+}
+
+/// Distance up to which damaged points are connected, m, but at least `least` (m).
+pub fn link(problem: &Problem, least: f64) -> f64 {
+    (LINK * problem.horizon).max(least)
+}
