@@ -155,7 +155,7 @@ impl Observer for Log {
             Message::Removed(paths) if self.prints => {
                 let paths = paths.iter().map(|path| path.display().to_string());
                 let paths: Vec<String> = paths.collect();
-                outln!("removed of the earlier run: {}", paths.join(", "));
+                outln!("removed files of the earlier run: {}", paths.join(", "));
             }
             Message::Decided(decisions) if self.prints && self.verbose => {
                 outln!("decided");

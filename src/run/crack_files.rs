@@ -9,12 +9,6 @@ use crate::error::{Error, Result};
 use crate::points::distance_squared;
 use crate::solver::observers::{Branch, Surface};
 
-/// Headings of the tables: of crack paths (2-D) and of crack fronts (3-D).
-const HEADS: [&str; 2] = [
-    "branch,x [m],y [m],length [m]",
-    "x [m],y [m],z [m],distance [m]",
-];
-
 /// Name of a crack, and its table as CSV text.
 type Table = (String, String);
 
@@ -45,14 +39,6 @@ pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[Table]) -> Result
     agree(comm, written)
 }
 
-/// Test by the heading whether a file is the table of a crack.
-pub fn is_table(path: &Path) -> bool {
-    let text = fs::read_to_string(path).unwrap_or_default();
-    text.lines()
-        .next()
-        .is_some_and(|head| HEADS.contains(&head))
-}
-
 /// Format the tables of crack paths. Each row is a vertex of a branch, with the length of the crack up to
 /// this vertex.
 pub fn of_paths(cracks: Vec<(&str, Vec<Branch>)>) -> Vec<Table> {
@@ -64,7 +50,7 @@ pub fn of_paths(cracks: Vec<(&str, Vec<Branch>)>) -> Vec<Table> {
 /// of the crack.
 pub fn of_surfaces(cracks: Vec<(&str, [f64; 3], Surface)>) -> Vec<Table> {
     let table = |(name, from, surface): (&str, [f64; 3], Surface)| {
-        let mut text = format!("{}\n", HEADS[1]);
+        let mut text = "x [m],y [m],z [m],distance [m]\n".to_owned();
         for place in surface.front {
             let [x, y, z] = place;
             let distance = distance_squared(from, place).sqrt();
@@ -76,7 +62,7 @@ pub fn of_surfaces(cracks: Vec<(&str, [f64; 3], Surface)>) -> Vec<Table> {
 }
 
 fn of_branches(branches: &[Branch]) -> String {
-    let mut text = format!("{}\n", HEADS[0]);
+    let mut text = "branch,x [m],y [m],length [m]\n".to_owned();
     for (number, branch) in branches.iter().enumerate() {
         for vertex in branch {
             let [x, y, _] = vertex.place;

@@ -124,8 +124,8 @@ impl EnergyWatch {
         ))
     }
 
-    /// Check the last row of a run. Return a warning if the energy balance does not close. `is_quasi_static`:
-    /// whether the run has load steps.
+    /// Check the last row of a run. Return a warning if the energy balance does not close, unless
+    /// [`Self::check`] has reported a gain. `is_quasi_static`: whether the last stage has load steps.
     pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
         let Energies {
             kinetic,
@@ -145,7 +145,8 @@ impl EnergyWatch {
             row.first_energy,
         ];
         let largest = all.map(f64::abs).into_iter().fold(self.floor, f64::max);
-        if error.abs() <= MAX_FINAL_ERROR * largest {
+        let is_reported = self.warned && error > 0.0;
+        if is_reported || error.abs() <= MAX_FINAL_ERROR * largest {
             return None;
         }
         let (size, percent) = (error.abs(), 100.0 * error.abs() / largest);
@@ -191,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_balance_that_does_not_close_is_reported() {
-        let watch = EnergyWatch {
+        let mut watch = EnergyWatch {
             floor: 1e-3,
             input: 0.0,
             warned: false,
@@ -200,14 +201,14 @@ mod tests {
             suspected: false,
             steps: String::new(),
         };
+        let energies = |work: f64, error: f64| Energies {
+            work,
+            strain: work + error,
+            error,
+            ..Energies::default()
+        };
         let of = |work: f64, error: f64, is_quasi_static: bool| {
-            let energies = Energies {
-                work,
-                strain: work + error,
-                error,
-                ..Energies::default()
-            };
-            watch.check_end(&row(energies), is_quasi_static)
+            watch.check_end(&row(energies(work, error)), is_quasi_static)
         };
         assert_eq!(of(2.0, 0.4, false), None);
         assert_eq!(of(2.0, -0.4, true), None);
@@ -226,5 +227,8 @@ mod tests {
             let text = of(2.0, error, is_quasi_static).unwrap();
             assert!(text.contains(words), "{text}");
         }
+        watch.warned = true;
+        assert_eq!(watch.check_end(&row(energies(2.0, 0.8)), false), None);
+        assert!(watch.check_end(&row(energies(2.0, -0.8)), false).is_some());
     }
 }

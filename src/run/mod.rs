@@ -379,8 +379,10 @@ impl<'a> Job<'a> {
             }
         }
         self.warn_of_overshoot(recorder);
+        let last = self.problem.all_stages().pop();
+        let ends_quasi_static = last.is_some_and(|stage| stage.time.is_quasi_static());
         if let (Some(energy), Some(row)) = (&energy, &recorder.last_row)
-            && let Some(text) = energy.check_end(row, is_quasi_static)
+            && let Some(text) = energy.check_end(row, ends_quasi_static)
         {
             self.observer.message(&Message::Warning(text));
         }
@@ -407,11 +409,13 @@ impl<'a> Job<'a> {
         };
         let checkpoints = CheckpointWriter::new(simulation, &self.files, self.physics.clone())?;
         let metadata = self.metadata(simulation);
+        let stale = match creation {
+            Creation::Truncate => self.stale_files()?,
+            Creation::Exclusive => Vec::new(),
+        };
         let starts = vec![Start::New(creation); self.files.results().count()];
         let mut recorder = Recorder::new(simulation, &self.files, (&starts, 0), &metadata)?;
-        if creation == Creation::Truncate {
-            self.remove_stale_files()?;
-        }
+        self.remove_stale_files(stale)?;
         recorder.record(stepper, self.observer)?;
         Ok((checkpoints, recorder))
     }
@@ -517,15 +521,24 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// Remove the files of an earlier run that this run does not replace, and report their paths. Collective.
-    fn remove_stale_files(&mut self) -> Result<()> {
-        let removed = match self.comm.rank() {
-            0 => stale_files::remove(self.problem, &self.files.folder),
+    /// Find the files of an earlier run that this run does not replace. Collective.
+    fn stale_files(&self) -> Result<Vec<PathBuf>> {
+        let found = match self.comm.rank() {
+            0 => stale_files::find(self.problem, &self.files),
             _ => Ok(Vec::new()),
         };
-        let removed = self.paths_of_rank_0(&agree(self.comm, removed)?);
-        if !removed.is_empty() {
-            self.observer.message(&Message::Removed(removed));
+        Ok(self.paths_of_rank_0(&agree(self.comm, found)?))
+    }
+
+    /// Remove the files of an earlier run that this run does not replace, and report their paths. Collective.
+    fn remove_stale_files(&mut self, paths: Vec<PathBuf>) -> Result<()> {
+        let removed = match self.comm.rank() {
+            0 => stale_files::remove(&paths),
+            _ => Ok(()),
+        };
+        agree(self.comm, removed)?;
+        if !paths.is_empty() {
+            self.observer.message(&Message::Removed(paths));
         }
         Ok(())
     }

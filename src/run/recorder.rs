@@ -321,7 +321,7 @@ pub fn reasons_for_new_results<const D: usize>(
                 }
                 None => {
                     let there = || {
-                        let text = "the checkpoint does not know of it".to_owned();
+                        let text = "the checkpoint does not contain this output".to_owned();
                         Ok(is_taken(path).then_some(text))
                     };
                     let there = found_by_root(simulation.comm, there)?;

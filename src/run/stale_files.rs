@@ -1,61 +1,83 @@
-//! Removal of files of an earlier run from the output folder: results of outputs and tables of cracks that
-//! the deck no longer has.
+//! Files of an earlier run in the output folder that a new run does not replace: results of outputs and tables
+//! of cracks that the deck no longer has.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::output::ResultReader;
 use crate::problem::Problem;
 
-use super::crack_files;
+use super::files::Files;
 
-/// Remove the further results, with their side-cars, and the tables of cracks that a run of this problem does
-/// not replace. Return the paths of the removed results and tables. A file with such a name but other content
-/// is kept. Called on rank 0.
+/// Longest heading of a history file that is searched, bytes.
+const LONGEST_HEADING: u64 = 1 << 20;
+
+/// Find the further results, with their side-cars, and the tables of cracks that a run of this problem does not
+/// replace. Files with such names that the earlier run has not written are omitted. The names of the earlier
+/// cracks are read from the history file, so the function is called on rank 0 before that file is replaced.
 ///
 /// # Errors
-/// If a file cannot be removed.
-pub fn remove(problem: &Problem, folder: &Path) -> Result<Vec<PathBuf>> {
-    let failed = |path: &Path, error: std::io::Error| {
-        Error::run(format!("cannot remove {}: {error}", path.display()))
-    };
-    let entries = fs::read_dir(folder).map_err(|error| failed(folder, error))?;
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.retain(|path| is_stale(problem, path));
-    paths.sort();
-    for path in &paths {
-        fs::remove_file(path).map_err(|error| failed(path, error))?;
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "vtkhdf")
-        {
-            // An error is ignored, because the result may have no side-car.
-            let _ = fs::remove_file(path.with_extension("xdmf"));
+/// If the folder cannot be read.
+pub fn find(problem: &Problem, files: &Files) -> Result<Vec<PathBuf>> {
+    let folder = &files.folder;
+    let failed = |error| Error::run(format!("cannot read {}: {error}", folder.display()));
+    let entries = fs::read_dir(folder).map_err(failed)?;
+    let heading = heading(&files.history).unwrap_or_default();
+    let mut paths = Vec::new();
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let Some(file) = path.file_name().and_then(|name| name.to_str()) else {
+            continue;
+        };
+        let between = |before: &str, after: &str| file.strip_prefix(before)?.strip_suffix(after);
+        if let Some(name) = between("result_", ".vtkhdf") {
+            let mut outputs = problem.further_outputs.iter();
+            if !outputs.any(|output| output.name.as_deref() == Some(name))
+                && is_result_of(&path, name)
+            {
+                let side_car = path.with_extension("xdmf");
+                paths.extend(side_car.is_file().then_some(side_car));
+                paths.push(path);
+            }
+        } else if let Some(name) = between("crack_", ".csv") {
+            let mut cracks = problem.history.cracks.iter();
+            let column = format!("crack_{name}_");
+            if !cracks.any(|crack| crack.name == name)
+                && heading.split(',').any(|entry| entry.starts_with(&column))
+            {
+                paths.push(path);
+            }
         }
     }
+    paths.sort();
     Ok(paths)
 }
 
-fn is_stale(problem: &Problem, path: &Path) -> bool {
-    let Some(file) = path.file_name().and_then(|name| name.to_str()) else {
-        return false;
-    };
-    let between = |before: &str, after: &str| file.strip_prefix(before)?.strip_suffix(after);
-    if let Some(name) = between("result_", ".vtkhdf") {
-        let mut outputs = problem.further_outputs.iter();
-        let is_known = outputs.any(|output| output.name.as_deref() == Some(name));
-        return !is_known && is_result_of(path, name);
+/// Remove files. Called on rank 0.
+///
+/// # Errors
+/// If a file cannot be removed.
+pub fn remove(paths: &[PathBuf]) -> Result<()> {
+    for path in paths {
+        let failed = |error| Error::run(format!("cannot remove {}: {error}", path.display()));
+        fs::remove_file(path).map_err(failed)?;
     }
-    if let Some(name) = between("crack_", ".csv") {
-        let mut cracks = problem.history.cracks.iter();
-        return !cracks.any(|crack| crack.name == name) && crack_files::is_table(path);
+    Ok(())
+}
+
+/// Read the first line of a history file.
+fn heading(path: &Path) -> std::io::Result<String> {
+    let mut line = String::new();
+    // Opening a pipe would block until its other end is opened.
+    if fs::metadata(path)?.is_file() {
+        BufReader::new(File::open(path)?.take(LONGEST_HEADING)).read_line(&mut line)?;
     }
-    false
+    Ok(line)
 }
 
 /// Test whether a file is the result of a further output with this name. A result that a restart has renamed
-/// has another name in its attributes, so the file is not removed.
+/// has another name in its attributes.
 fn is_result_of(path: &Path, name: &str) -> bool {
     let attributes = ResultReader::open(path).and_then(|reader| reader.attributes());
     attributes.is_ok_and(|attributes| {

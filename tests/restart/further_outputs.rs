@@ -241,7 +241,7 @@ fn a_restart_may_change_the_further_results() {
         &["--restart", "--set", "end=2.2e-5"],
     ));
     assert!(
-        printed.contains("[output.once]: the checkpoint does not know of it"),
+        printed.contains("[output.once]: the checkpoint does not contain this output"),
         "{printed}"
     );
     assert_eq!(
@@ -261,7 +261,7 @@ fn an_overwritten_run_leaves_no_results_of_outputs_that_the_deck_no_longer_has()
     let copy = |name: &str| std::fs::copy(out.join("result_once.vtkhdf"), out.join(name)).unwrap();
     copy("result_once_until_step_20.vtkhdf");
     folder.write("out/result_mine.vtkhdf", "not a result");
-    folder.write("out/crack_mine.csv", "x,y\n");
+    std::fs::copy(out.join("crack_main.csv"), out.join("crack_mine.csv")).unwrap();
 
     let second = FURTHER.replace("output.once", "output.other");
     let second = deck(&folder, "second.toml", &[&second]);
@@ -275,10 +275,12 @@ fn an_overwritten_run_leaves_no_results_of_outputs_that_the_deck_no_longer_has()
         &out,
         &["--set", "end=4e-7", "--overwrite"],
     ));
-    let line = printed.lines().find(|line| line.starts_with("removed of"));
-    let names = ["crack_main.csv", "result_once.vtkhdf"];
+    let line = printed
+        .lines()
+        .find(|line| line.starts_with("removed files of"));
+    let names = ["crack_main.csv", "result_once.vtkhdf", "result_once.xdmf"];
     let names = names.map(|name| out.join(name).display().to_string());
-    let expected = format!("removed of the earlier run: {}", names.join(", "));
+    let expected = format!("removed files of the earlier run: {}", names.join(", "));
     assert_eq!(line, Some(&expected[..]), "{printed}");
     let mut files: Vec<String> = std::fs::read_dir(&out)
         .unwrap()
