@@ -99,7 +99,7 @@ const PRESSED: f64 = -1e-5;
 pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
     let share = text.parse().ok();
     let share = share.filter(|share| (0.0..=MOST_TOUCHING).contains(share));
-    share.ok_or_else(|| format!("must be a number from 0 to {MOST_TOUCHING}"))
+    share.ok_or_else(|| format!("must be a number, 0 to {MOST_TOUCHING}"))
 }
 
 /// Return the number of cracks across x whose faces contain the requested fraction of the points.

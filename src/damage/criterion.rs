@@ -67,11 +67,11 @@ impl StretchConversion {
     #[inline(always)]
     fn convert<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Lanes {
         let [[ii, ij], [ji, jj]] = self.ratios;
-        let takes_i = (i * ii).min(j * ij);
-        let takes_j = (i * ji).min(j * jj);
+        let critical_i = (i * ii).min(j * ij);
+        let critical_j = (i * ji).min(j * jj);
         let k_i = simd.keep(Lanes::splat(self.stiffness[0]), acting[0]);
         let k_j = simd.keep(Lanes::splat(self.stiffness[1]), acting[1]);
-        ((takes_i * takes_i * k_i + takes_j * takes_j * k_j) / (k_i + k_j)).sqrt()
+        ((critical_i * critical_i * k_i + critical_j * critical_j * k_j) / (k_i + k_j)).sqrt()
     }
 
     /// Return a lower bound on the critical stretch of all bonds.
@@ -120,6 +120,15 @@ impl Sense {
         match self {
             Self::Either => other,
             Self::Pulled => self,
+        }
+    }
+
+    /// Return the bits of the bonds that can break in this sense.
+    #[inline(always)]
+    fn select<const D: usize>(self, bits: u8, bond: &Bond<D>) -> u8 {
+        match self {
+            Self::Pulled => bits & bond.relative_square_extension.above(0.0),
+            Self::Either => bits,
         }
     }
 }
@@ -257,20 +266,14 @@ impl Criterion {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 let [i, j] = ends.weights.acting();
                 let spent = simd.at_least(work, self.threshold(simd, bond, ends)) & (i | j);
-                match rule.sense {
-                    Sense::Pulled => spent & bond.relative_square_extension.above(0.0),
-                    Sense::Either => spent,
-                }
+                rule.sense.select(spent, bond)
             }
             // The points of laws with forces along the bonds have no stress.
             Self::Stress(..) | Self::StressThresholds(_) if L::Force::CENTRAL => 0,
             Self::Stress(_, rule) | Self::StressThresholds(rule) => {
                 let (stress, acting) = simd.aside(MeanStress::new(simd, ends));
                 let reached = simd.at_least(stress, self.threshold(simd, bond, ends)) & acting;
-                match rule.sense {
-                    Sense::Pulled => reached & bond.relative_square_extension.above(0.0),
-                    Sense::Either => reached,
-                }
+                rule.sense.select(reached, bond)
             }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(_)
@@ -339,9 +342,9 @@ impl Criterion {
                     i = i * factor_i;
                     j = j * factor_j;
                 }
-                let takes_i = (i * ii).min(j * ij) * 0.5;
-                let takes_j = (i * ji).min(j * jj) * 0.5;
-                rule.sum_of_acting(simd, [takes_i, takes_j], ends)
+                let critical_i = (i * ii).min(j * ij) * 0.5;
+                let critical_j = (i * ji).min(j * jj) * 0.5;
+                rule.sum_of_acting(simd, [critical_i, critical_j], ends)
             }
         }
     }
@@ -471,19 +474,19 @@ impl WorkRule {
         ends: Ends<'_, L, P>,
     ) -> Lanes {
         let [acts_i, acts_j] = ends.weights.acting();
-        let takes_i = simd.keep(self.corrected(i, ends.limits[0]), acts_i);
-        let takes_j = simd.keep(self.corrected(j, ends.limits[1]), acts_j);
-        takes_i + takes_j
+        let critical_i = simd.keep(self.corrected(i, ends.limits[0]), acts_i);
+        let critical_j = simd.keep(self.corrected(j, ends.limits[1]), acts_j);
+        critical_i + critical_j
     }
 
     /// Return the critical work of an end from that in an untruncated family.
     #[inline(always)]
-    fn corrected(self, takes: Lanes, end: &Limits) -> Lanes {
+    fn corrected(self, critical: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {
-            return takes;
+            return critical;
         }
         let share = self.family_correction;
-        takes * (end.truncation_factors * share + Lanes::splat(1.0 - share))
+        critical * (end.truncation_factors * share + Lanes::splat(1.0 - share))
     }
 }
 

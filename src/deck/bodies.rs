@@ -375,7 +375,7 @@ fn from_file(
         GroupKey::Number(number) if u32::try_from(*number).is_ok() => Ok(*number as u32),
         written => {
             let message = format!(
-                "{key_of_points} block: must be a whole number from 0 to {}, is {written}",
+                "{key_of_points} block: must be a whole number, 0 to {}, is {written}",
                 u32::MAX
             );
             Err(scope.error(block.span(), message))

@@ -184,13 +184,15 @@ impl<'a> Directed<'a> {
         let toughness = ToughnessByDirection::new(scope.dimension, axis, ratio);
         if toughness.is_none() {
             let [least, most] = ToughnessByDirection::limits(scope.dimension);
-            let round = |ratio: f64| format_number((100.0 * ratio).round() / 100.0);
+            // The printed limits are themselves allowed.
+            let limits =
+                [(100.0 * least).ceil(), (100.0 * most).floor()].map(|limit| limit / 100.0);
             let message = format!(
                 "{key} fracture_energy_across: must be {} to {} times `fracture_energy_along`, is {} times; beyond this, \
                  bonds in the weak direction would break far from cracks",
-                round(least),
-                round(most),
-                round(ratio)
+                format_number(limits[0]),
+                format_number(limits[1]),
+                format_number((1e4 * ratio).round() / 1e4)
             );
             return Err(scope.error(across.span(), message));
         }
@@ -257,7 +259,7 @@ fn weibull(
 
 fn family_correction(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
     let (key, range) = (format!("{key} family_correction"), 0.0..1_f64.next_up());
-    scope.within(number, &key, range, "from 0 to 1")
+    scope.within(number, &key, range, "0 to 1")
 }
 
 fn no_failure(

@@ -240,7 +240,7 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     };
     let message = format!(
         "[body.{}] material: the forces of `{}` and `{}` have different directions; \
-         `rule = \"none\"` keeps the bodies apart",
+         `rule = \"none\"` omits the bonds between the bodies",
         other.name,
         law(other).name,
         law(linear).name,

@@ -45,6 +45,7 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
         warnings.push(Warning::new(message).at(&table.span()));
     }
     warnings.extend(ignored_columns(problem));
+    warnings.extend(ignored_values(problem));
     Ok(warnings)
 }
 
@@ -70,6 +71,24 @@ fn ignored_columns(problem: &Problem) -> Vec<Warning> {
                 ignored.join(", ")
             );
             warnings.push(Warning::new(message).at(span));
+        }
+    }
+    warnings
+}
+
+/// Return a warning for each file of initial values with columns that are not read.
+fn ignored_values(problem: &Problem) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    for initial in &problem.initials {
+        if let Some(file) = &initial.file
+            && !file.columns.ignored.is_empty()
+        {
+            let message = format!(
+                "[initial.{}] file: these columns are not read: {}",
+                initial.name,
+                file.columns.ignored.join(", ")
+            );
+            warnings.push(Warning::new(message).at(&file.span));
         }
     }
     warnings

@@ -172,7 +172,7 @@ fn rule(
             let given: &[Number] = ratios.get_ref();
             if given.len() != finest as usize {
                 let message = format!(
-                    "{key}: must have {finest} entries, one per level from 1 on, has {}",
+                    "{key}: must have {finest} entries, one for each level from 1 to {finest}, has {}",
                     given.len()
                 );
                 return Err(scope.error(ratios.span(), message));

@@ -131,7 +131,13 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
             _ => kinds::<Shape>(),
         };
         let words = format!(
-            "must have one key, its kind (one of {}), has {}",
+            "must have exactly one key, {} (one of {}), has {}",
+            match section {
+                "material" => "the name of the law",
+                "damage" => "the name of the criterion",
+                "crack" => "the kind of the crack",
+                _ => "the kind of the shape",
+            },
             kinds.join(", "),
             keys(place.value),
         );
@@ -252,9 +258,9 @@ fn wanted(expected: &str) -> &str {
     match expected {
         "a sequence" => "a list in brackets",
         "a string" => "text in quotes",
-        "u32" => "a whole number from 0 to 4294967295",
-        "u64" => "a whole number from 0 on",
-        "a nonzero u64" => "a whole number from 1 on",
+        "u32" => "a whole number, 0 to 4294967295",
+        "u64" => "a whole number, 0 or more",
+        "a nonzero u64" => "a whole number, 1 or more",
         "a map" | "a spanned value" | "newtype variant" | "struct variant" => "a table",
         _ if expected.starts_with("struct ") => "a table",
         _ => expected,

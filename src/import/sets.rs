@@ -133,13 +133,16 @@ fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<Stri
     let header = format!("[set.{written}]");
     if let Some(ids) = numbers(&text) {
         if let Some(zero) = ids.iter().position(|id| *id == 0) {
-            let message = format!("`{name}`: number {} is 0; points count from 1", zero + 1);
+            let message = format!(
+                "`{name}`: number {} is 0, but the first point has the number 1",
+                zero + 1
+            );
             return Err(translation.error(node.line, message));
         }
         section.set("ids", Value::Ids(ids.iter().map(|id| id - 1).collect()));
         translation
             .log
-            .taken(node, format!("{header} ids, which count from 0"));
+            .taken(node, format!("{header} ids; the first point has the id 0"));
     } else if text.contains(['<', '>', '=']) {
         let condition = translation
             .expression(&text, false)

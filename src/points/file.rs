@@ -327,12 +327,14 @@ mod tests {
     #[test]
     fn a_row_without_end_is_not_read_to_its_end() {
         let long = [b"0 0 1 1\n".to_vec(), vec![b'0'; 1 << 17]].concat();
-        let expected = "points.csv:2: is longer than 65536 bytes; is this a point file?";
+        let expected =
+            "points.csv:2: is longer than 65536 bytes; is this a file with one row per point?";
         assert_eq!(read("long", &long), Err(expected.to_owned()));
         // A row of maximum length; parts start within it.
         let spaces = |count: usize| [&b"0 0 1 1"[..], &vec![b' '; count], b"\n1 0 1 1\n"].concat();
         assert_eq!(read("longest", &spaces(65_528)), Ok(vec![0.0, 1.0]));
-        let expected = "points.csv:1: is longer than 65536 bytes; is this a point file?";
+        let expected =
+            "points.csv:1: is longer than 65536 bytes; is this a file with one row per point?";
         assert_eq!(read("longer", &spaces(65_529)), Err(expected.to_owned()));
     }
 

@@ -38,7 +38,7 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
             let id = entry.parse::<u64>().ok().filter(|id| *id >= first);
             let id = id.ok_or_else(|| {
                 format!(
-                    "{name}:{line}: must be whole numbers of points, from {first}, is {}",
+                    "{name}:{line}: must contain numbers of points, {first} or more, has {}",
                     excerpt(entry)
                 )
             })?;

@@ -182,7 +182,7 @@ fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
         {
             let message = match file {
                 None => format!(
-                    "[set.{}] ids: no point has the id {id}, counted from 0; those of the {total} points are 0 to {}",
+                    "[set.{}] ids: no point has the id {id}; the ids of the {total} points are 0 to {}",
                     set.name,
                     total - 1
                 ),
@@ -205,12 +205,12 @@ fn wrong_number(file: &IdFile, ids: &[u64], id: u64, total: u64) -> String {
     let last = total - 1 + first;
     // If the numbers are 1 to the number of points, the file only counts from another first number.
     let hint = if *first == 0 && id == total && ids[0] > 0 {
-        "; if the file counts from 1, set `first_id = 1`"
+        "; if the first point of the file has the number 1, set `first_id = 1`"
     } else {
         ""
     };
     format!(
-        "{}{line}: no point has the number {number}; those of the {total} points are {first} to {last}{hint}",
+        "{}{line}: no point has the number {number}; the numbers of the {total} points are {first} to {last}{hint}",
         path.display()
     )
 }

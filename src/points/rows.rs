@@ -67,7 +67,7 @@ pub fn for_each_row(
         let is_cut = read == LONGEST_ROW && !bytes.ends_with(b"\n");
         let found = if is_cut {
             Err(format!(
-                "is longer than {LONGEST_ROW} bytes; is this a point file?"
+                "is longer than {LONGEST_ROW} bytes; is this a file with one row per point?"
             ))
         } else if is_heading {
             Ok(())

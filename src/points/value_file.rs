@@ -29,6 +29,8 @@ pub struct ValueColumns {
     pub displacement: Vec<Option<usize>>,
     /// Column of each component of the velocity; a missing component is 0.
     pub velocity: Vec<Option<usize>>,
+    /// Names of the columns that are not read.
+    pub ignored: Vec<String>,
 }
 
 impl ValueColumns {
@@ -46,17 +48,32 @@ impl ValueColumns {
 /// Find the columns of a file by its heading; upper and lower case are equivalent.
 ///
 /// # Errors
-/// If the file cannot be read, or its heading has no column of values.
+/// If the file cannot be read, its heading has no column of values, or it has a name twice.
 pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumns, String> {
     let name = path.display();
     let found = heading(path).map_err(|error| format!("cannot read {name}: {error}"))?;
-    let known = || {
-        let names = [&DISPLACEMENT[..dimension], &VELOCITY[..dimension]].concat();
-        format!("the known names are {ID} {}", names.join(" "))
-    };
+    let mut known = vec![ID];
+    known.extend(&DISPLACEMENT[..dimension]);
+    known.extend(&VELOCITY[..dimension]);
+    let known_names = || format!("the known names are {}", known.join(" "));
     let Some(heading) = found else {
-        return Err(format!("{name}: has no heading; {}", known()));
+        return Err(format!("{name}: has no heading; {}", known_names()));
     };
+    let mut ignored = heading.names.clone();
+    ignored.retain(|name| !known.iter().any(|other| name.eq_ignore_ascii_case(other)));
+    for known in &known {
+        let mut columns = heading.names.iter();
+        if columns
+            .by_ref()
+            .any(|name| name.eq_ignore_ascii_case(known))
+            && columns.any(|name| name.eq_ignore_ascii_case(known))
+        {
+            return Err(format!(
+                "{name}:{}: has two columns `{known}`",
+                heading.line
+            ));
+        }
+    }
     let column = |name: &str| {
         let mut names = heading.names.iter();
         names.position(|other| other.eq_ignore_ascii_case(name))
@@ -68,13 +85,14 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
         id: column(ID),
         displacement: of_each(DISPLACEMENT),
         velocity: of_each(VELOCITY),
+        ignored,
     };
     if !columns.has_displacement() && !columns.has_velocity() {
         return Err(format!(
             "{name}:{}: has no column of values, its columns are {}; {}",
             heading.line,
             excerpt(&heading.names.join(" ")),
-            known()
+            known_names()
         ));
     }
     Ok(columns)
@@ -147,9 +165,10 @@ fn row(columns: &ValueColumns, entries: &[&str], total: u64) -> std::result::Res
             return Ok(0.0);
         };
         let value = entries[*column].parse::<f64>().ok();
-        value
-            .filter(|value| value.is_finite())
-            .ok_or_else(|| format!("must be a number, is {}", excerpt(entries[*column])))
+        value.filter(|value| value.is_finite()).ok_or_else(|| {
+            let entry = excerpt(entries[*column]);
+            format!("column {}: must be a number, is {entry}", column + 1)
+        })
     };
     let all = columns.displacement.iter().chain(&columns.velocity);
     Ok((id, all.map(value).collect::<std::result::Result<_, _>>()?))

@@ -150,6 +150,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let pieces = refined.points(coarse);
         between()?;
         let mut simulation = Self::of_points(problem, comm, (pieces, refined), None, between)?;
+        apply_initials(problem, comm, &simulation.model, &mut simulation.fields)?;
         simulation.begin();
         simulation.check_loads_are_held()?;
         simulation.can_bond_new_points()?;
@@ -157,9 +158,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Distribute the points of grids and create their bonds, without an evaluation of the forces. `cost` is
-    /// the computing cost of this rank's points; `None` if it is not known. `between` is the same as for
-    /// [`Self::set_up`].
+    /// Distribute the points of grids and create their bonds. Initial values are not set, and forces are not
+    /// evaluated. `cost` is the computing cost of this rank's points; `None` if it is not known. `between` is
+    /// the same as for [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -213,7 +214,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(density) = &mut fields.fictitious_density {
             *density = fictitious_density(&stiffness);
         }
-        apply_initials(problem, comm, &model, &mut fields)?;
         are_finite(problem, comm, &model, 0.0)?;
         let intact_at_start = starts_deformed(problem).then(|| {
             let mut intact = 0;

@@ -596,7 +596,8 @@ fn a_point_file_without_line_ends_is_not_read_into_memory() {
         }
         let output = finish(&mut limited);
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));
-        let words = "huge.txt:1: is longer than 65536 bytes; is this a point file?";
+        let words =
+            "huge.txt:1: is longer than 65536 bytes; is this a file with one row per point?";
         assert!(text(&output).contains(words), "{}", text(&output));
     }
 }

@@ -1465,7 +1465,7 @@ fn a_wrong_deck_names_file_and_line() {
         ),
         (
             peridigm("Left Node Set: \"1\"", "Left Node Set: \"0\""),
-            "30:5: `Left Node Set`: number 1 is 0; points count from 1",
+            "30:5: `Left Node Set`: number 1 is 0, but the first point has the number 1",
         ),
         (
             peridigm("Final Time: 4.0e-3", "Final Time: 0"),

@@ -119,6 +119,7 @@ fn bonds_along_the_direction_break_last() {
                     return strain;
                 }
                 strain *= 1.002;
+                assert!(strain < 1.0, "no bond along {angle} breaks");
             }
         })
     };

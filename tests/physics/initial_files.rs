@@ -85,7 +85,7 @@ fn a_wrong_row_is_named_with_its_line() {
         (
             "word",
             "id vx\n3 1\n\n4 fast\n",
-            ":4: must be a number, is `fast`",
+            ":4: column 2: must be a number, is `fast`",
         ),
         (
             "short",

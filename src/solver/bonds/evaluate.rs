@@ -230,8 +230,8 @@ impl<const D: usize> Forces<D> {
             let name = match self.content(turn) {
                 HaloContent::Motion if is_thermal => "displacements and thermal stretches",
                 HaloContent::Motion => "displacements",
-                HaloContent::Thresholds => "critical stretches",
-                HaloContent::PointNumbers => "sums of the law",
+                HaloContent::Thresholds => "thresholds",
+                HaloContent::PointNumbers => "point numbers, rotations and stresses",
                 HaloContent::OwnedOnly | HaloContent::None => continue,
             };
             let mut displacement = [const { Vec::new() }; D];
@@ -406,7 +406,8 @@ impl<const D: usize> Forces<D> {
                 }
                 self.numbers
                     .finish(number, points.clone(), model, blocks, plastic, keeps);
-                if number == 0 {
+                // Only evaluations in which bonds can break read the stresses.
+                if number == 0 && bond_update.is_stored() {
                     let stresses = &mut self.limits.stresses;
                     let read = StressInputs {
                         model,
