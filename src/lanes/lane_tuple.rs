@@ -27,7 +27,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Get a quantity for writing.
     fn get_mut(&mut self, quantity: usize) -> &mut Lanes;
 
-    /// Select the first [`Self::COUNT`] columns.
+    /// Select the first [`Self::COUNT`] columns, to read.
     ///
     /// # Panics
     /// If there are fewer columns.
