@@ -31,7 +31,7 @@ const CACHE_CAPACITY: usize = 256;
 /// Point data that kernels read.
 #[derive(Clone, Copy)]
 pub struct PointData<'a, const D: usize> {
-    /// Packed positions, displacements and volumes for lists; empty without lists.
+    /// Packed positions, displacements, volumes and thermal stretches for lists; empty without lists.
     pub nodes: &'a [Node],
     /// Point numbers by column, for lists.
     pub numbers: &'a [Column],
@@ -85,7 +85,7 @@ trait Runner<P: Part>: Sync {
         results: <Self::Sums as LaneTuple>::ColumnsMut<'_>,
     ) -> Vec<BrokenSums>;
 
-    /// Instruction sets for which it is compiled.
+    /// Instruction sets for which the runner is compiled.
     const ISA_SET: IsaSet;
 }
 
@@ -348,8 +348,8 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
     }
 }
 
-/// Number of lane groups that skip the fast path after a failed attempt, because large strains occur in
-/// clusters.
+/// Number of lane groups that skip the fast path after a failed attempt. The fast path is a loop without
+/// failure criterion; it fails if |x| of a bond exceeds the limit of the series. Large |x| occur in clusters.
 const FAST_PATH_BACKOFF: usize = 7;
 
 /// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates

@@ -194,8 +194,8 @@ impl PairRule {
         })
     }
 
-    /// Contact force of the second point on the first; `None` if they do not touch. If the points are
-    /// exchanged, the forces are exactly opposite.
+    /// Contact force of the second point on the first; `None` if they do not touch or if they coincide. If
+    /// the points are exchanged, the forces are exactly opposite.
     pub fn touch<const D: usize>(
         &self,
         first: &ContactPoint<D>,
