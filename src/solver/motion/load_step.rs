@@ -40,10 +40,10 @@ const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 pub struct LoadStep {
     /// Iterations made in this load step.
     pub iterations: u64,
-    /// Number of iterations since bonds broke in this load step.
+    /// Number of iterations since bonds last broke in this load step, or since its start.
     pub since_breaking: u64,
-    /// ‖f‖/(‖loads‖ + ‖reactions‖), where f is the total force on a point. It is 0 if f is round-off, and NaN
-    /// before the first load step.
+    /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
+    /// point. It is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation; NaN if all points are at rest.
     pub(super) damping: f64,
