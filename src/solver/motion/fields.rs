@@ -620,7 +620,7 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Set friction and contact damping to 0, because they do not act in a relaxation.
+    /// Set friction and contact damping to 0, because they do not act in load steps.
     pub fn clear_dissipative_contact(&mut self) {
         let forces = [&mut self.friction, &mut self.contact_damping];
         let columns = forces.into_iter().flatten().flatten();
