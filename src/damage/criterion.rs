@@ -1,7 +1,7 @@
 //! Criteria that break bonds. Points i and j of a bond decide with the same operations.
 //!
 //! - Stretches are compared by x of [`crate::material::bond`], which needs no root.
-//! - Energies are compared by the work of both force states.
+//! - Energies are compared by the work of the force states of the ends that act on the bond.
 //! - Stresses are compared by the mean of the stress measures of the ends that act on the bond.
 
 use super::{StressMeasure, StressRule, ToughnessByDirection};

@@ -393,7 +393,8 @@ impl BondLattice {
         }
     }
 
-    /// Compute the bits of all bonds, intact or broken. There is a byte for each lane group and offset.
+    /// Compute the bits of all bonds; broken bonds are included. There is a byte for each lane group and
+    /// offset.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
         let mut filled = vec![0; self.store.intact.len()];

@@ -340,7 +340,7 @@ impl<'a> Rows<'a> {
 }
 
 impl Row<'_> {
-    /// The bits of all bonds of a group, intact or broken; the bits of padding are clear.
+    /// The bits of all bonds of a group; broken bonds are included, and the bits of padding are clear.
     #[inline(always)]
     pub fn whole(&self, group: usize) -> u8 {
         let mut bits = 0;

@@ -30,7 +30,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Select the first [`Self::COUNT`] columns, to read.
     ///
     /// # Panics
-    /// If there are fewer columns.
+    /// If there are fewer columns, unless [`Self::PADDED`].
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
     /// Select the first [`Self::COUNT`] columns, to add to.

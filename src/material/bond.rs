@@ -280,8 +280,8 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// Return `near`; in marked lanes with |x| above [`NEAR`] x/(√(1 + x) + o), where `other` computes o from 1 +
-/// x.
+/// Return `near`, or in marked lanes with |x| above [`NEAR`] the quotient x/(√(1 + x) + o). `other` computes
+/// o from 1 + x.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,

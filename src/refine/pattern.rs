@@ -57,7 +57,7 @@ impl Pattern {
         self.dimension
     }
 
-    /// Refine a node and its parents, unless no node is possible at the index. Return true if the node was
+    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node was
     /// not refined before.
     pub fn refine(
         &mut self,

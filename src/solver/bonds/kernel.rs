@@ -37,7 +37,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub history: [K::BondHistory; 2],
     /// A bit for each bond that is intact.
     pub intact: u8,
-    /// A bit for each bond, broken or not; only with [`Kernel::READS_BROKEN`].
+    /// A bit for each bond, including broken bonds; only with [`Kernel::READS_BROKEN`].
     pub whole: u8,
     /// A bit for each bond that can break.
     pub breakable: u8,

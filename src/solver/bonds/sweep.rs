@@ -355,7 +355,7 @@ const FAST_PATH_BACKOFF: usize = 7;
 /// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates
 /// their time.
 struct FastPathGate {
-    /// Whether the fast path is allowed.
+    /// Whether the kernel may skip its criterion, and does not remove thermal stretches.
     is_allowed: bool,
     /// Number of lane groups that must still skip the fast path.
     skipped: usize,
@@ -438,7 +438,7 @@ struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.
     points: GridPoints<'p, K, D>,
-    /// The bits of all bonds, broken or not, if the kernel reads them.
+    /// The bits of all bonds, including broken bonds, if the kernel reads them.
     whole: Option<&'t [u8]>,
     vector: &'t mut VectorBonds<'v>,
 }
@@ -586,7 +586,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
 struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
-    /// For kernels that need them, the bits of all bonds of all lane groups, broken or not.
+    /// The bits of all bonds of all lane groups, including broken bonds; empty if the kernel does not need
+    /// them.
     whole: Vec<u8>,
 }
 

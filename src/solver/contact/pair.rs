@@ -91,7 +91,7 @@ pub(super) struct Demand {
     pub damping: f64,
 }
 
-/// The contact force between two points.
+/// The contact force between two points, or of a rigid body on a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch<const D: usize> {
     /// Repulsive force on the first point, N; it has the potential `energy`.
