@@ -222,8 +222,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let bonds_bytes = total(speed.bond_bytes);
     let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
-    // The measurement without overlap repeats the first exchange of a step only. Exchanges of further passes
-    // send less data, so the measured time is scaled by the number of bytes.
+    // `Speed::sent_without_overlap` counts only the exchange of displacements. Laws with two passes also
+    // exchange point numbers, so the measured time is multiplied by the ratio of the bytes.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let mut phases = vec![
         phase("bonds", times.forces.bonds),

@@ -1,8 +1,8 @@
 //! Criteria that break bonds. Points i and j of a bond decide with the same operations.
 //!
 //! - Stretches are compared by x of [`crate::material::bond`], which needs no root.
-//! - Energies are compared by the work of both force states.
-//! - Stresses are compared by the mean of the stress measures of points i and j.
+//! - Energies are compared by the work of the force states of the ends that act on the bond.
+//! - Stresses are compared by the mean of the stress measures of the ends that act on the bond.
 
 use super::{StressMeasure, StressRule, ToughnessByDirection};
 use crate::lanes::simd::Task;
@@ -18,8 +18,8 @@ pub enum Criterion {
     /// Bonds break at this stretch.
     Stretch(f64),
     /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
-    /// of both blocks, 0 for a block without critical stretch. A law may scale only this part of the
-    /// thresholds.
+    /// of both blocks, 0 for a block without critical stretch. A law that scales thresholds scales this part
+    /// only, and leaves the part with α unchanged.
     Thresholds([f64; 2], Directions),
     /// Same as [`Self::Stretch`], for critical stretches that belong to different horizons; ∞ for a block
     /// without critical stretch.
@@ -217,8 +217,8 @@ impl Criterion {
         matches!(*self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] above which the series are not used. Bonds below this limit do
-    /// not break by their stretch.
+    /// The |x| of [`crate::material::bond`] above which bonds are marked as beyond the series. If
+    /// [`Self::marks_all`], only marked bonds break.
     #[inline(always)]
     pub fn limit(&self) -> f64 {
         match *self {
@@ -376,9 +376,9 @@ impl Criterion {
     }
 }
 
-/// Computation of the mean stress measure of the ends of each bond (Pa), and of one bit per bond that has at least
-/// one such end. An end counts if the bond is within its horizon and its point carries stress. Points i and j
-/// compute the same bits.
+/// Computation of the mean stress measure of the ends of each bond that count (Pa), and of one bit per bond
+/// with at least one such end. An end counts if the bond is within its horizon and its point carries stress.
+/// Points i and j compute the same bits.
 struct MeanStress {
     stresses: [Lanes; 2],
     acting: [u8; 2],
@@ -464,8 +464,8 @@ impl WorkRule {
     }
 
     /// Return the critical work of bonds from the critical works of both ends in untruncated families; only
-    /// acting ends count. The sum is written out, because array methods are not always inlined. If one is
-    /// not, all data of a bond stay in memory.
+    /// acting ends count. The sum is written out, because array methods are not always inlined. Without
+    /// inlining, all data of a bond stay in memory.
     #[inline(always)]
     fn sum_of_acting<S: Simd, L, P>(
         self,
@@ -479,7 +479,7 @@ impl WorkRule {
         critical_i + critical_j
     }
 
-    /// Return the critical work of an end from that in an untruncated family.
+    /// Return the critical work of an end from its critical work in an untruncated family.
     #[inline(always)]
     fn corrected(self, critical: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {

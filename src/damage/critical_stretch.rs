@@ -1,9 +1,10 @@
-//! Stretch criterion: a bond breaks irreversibly when its stretch reaches s0 − α s_min.
+//! Stretch criterion: a bond breaks irreversibly when its stretch reaches f s0 − α s_min.
 //!
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s_min is the smallest stretch of the intact bonds
-//! of a point.
-//! The smaller threshold of points i and j holds for a bond, so that both ends agree.
-//! α = 0 is the plain critical stretch of Dipasquale et al. 2014, eq. 6. The comparison is in
+//! of a point, and f its strength (1 without scatter). If the horizons of both points are equal, the smaller
+//! threshold of points i and j holds for a bond, so that both ends agree. Otherwise
+//! [`StretchConversion`](crate::damage::StretchConversion) converts the thresholds. α = 0 is the plain
+//! critical stretch of Dipasquale et al. 2014, eq. 6. The comparison is in
 //! [`Criterion::breaking`](crate::damage::Criterion::breaking).
 
 use std::f64::consts::PI;
@@ -87,7 +88,8 @@ impl CriticalStretch {
         0.5 * (a + b)
     }
 
-    /// Return the ratio of stress to strain in tension along one direction, without transverse load, Pa.
+    /// Return the ratio of stress to strain in tension along one direction, Pa. Transverse directions have no
+    /// load, unless the dimension prevents their strain.
     pub fn tensile_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
         let (modulus, nu) = (elastic.youngs_modulus, elastic.poisson_ratio);
         match dimension {

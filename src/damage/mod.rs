@@ -28,7 +28,8 @@ pub enum DamageLaw {
 }
 
 impl DamageLaw {
-    /// Return the stretch, work (J/m⁶) or stress (Pa) at which bonds of the undeformed body break.
+    /// Return the critical stretch, the critical work (J/m⁶) or the strength (Pa), without the effects of α
+    /// and of scatter.
     pub fn critical(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.critical,

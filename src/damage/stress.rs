@@ -2,8 +2,8 @@
 //!
 //! The criterion reads a scalar measure of the Cauchy stress σ = P Fᵀ/det F of a point. F is the deformation
 //! gradient of the point's family. In plane problems, σ and det F include the direction perpendicular to the
-//! plane. The mean of the measures at points i and j is compared with the strength. Strength and horizon
-//! determine the energy per area that a growing crack dissipates.
+//! plane. The mean of the measures at the ends that act on the bond is compared with the strength. Strength
+//! and horizon determine the energy per area that a growing crack dissipates.
 
 use nalgebra::Matrix3;
 

@@ -37,8 +37,8 @@ impl GridPoint {
 /// - Up to eight grid points adjacent along x get consecutive local indices. If one of them is a border
 ///   point, all of them count as border points.
 /// - Interior points come before border points.
-/// - Both groups begin with the points that are on no grid, in their previous order. The points of each grid
-///   follow.
+/// - The interior points begin with the points that are on no grid, in their previous order; the points of
+///   each grid follow. The border points have the same order.
 pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     if frames.is_empty() {
         return;

@@ -64,8 +64,8 @@ pub(super) struct Line {
 
 /// The layout of a grid's local points, including ghosts.
 ///
-/// Holes pad the layout at both ends. Therefore a load of eight slots is in bounds at any offset from an
-/// occupied slot.
+/// Holes pad the layout at both ends. Therefore a load of eight slots is in bounds at any offset of a bond
+/// from an occupied slot.
 #[derive(Debug)]
 pub struct Grid {
     /// Origin, spacing and blocks of the grid.

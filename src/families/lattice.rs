@@ -35,7 +35,7 @@ pub struct BondLattice {
     /// Volume of i, m³.
     pub own_volume: f64,
     offsets: Vec<Offset>,
-    /// Whether some weights differ from 1, and whether the weights of i and j differ.
+    /// Whether weights may differ from 1, and whether the weights of i and j may differ.
     weighted: [bool; 2],
     /// The lane groups, sorted by local index.
     vectors: Vec<Vector>,
@@ -141,7 +141,7 @@ impl BondLattice {
         self.store.intact = intact;
     }
 
-    /// Compute the bits of the bonds of a lane group, intact or broken.
+    /// Compute the bits of all bonds of a lane group; broken bonds are included.
     fn family(&self, vector: &Vector, bits: &mut [u8]) {
         let grid = &*self.grid;
         let line = &grid.lines[vector.line as usize];
@@ -220,7 +220,7 @@ impl BondLattice {
         }
     }
 
-    /// Set the volume weights of end i (`end` = 0) or j (`end` = 1) to `weight(ξ)`, ξ in m.
+    /// Set the volume weights of both ends (`end` = 0) or only of j (`end` = 1) to `weight(ξ)`, ξ in m.
     pub fn weigh(&mut self, end: usize, weight: impl Fn([f64; 3]) -> f64) {
         for offset in &mut self.offsets {
             offset.weights[end] = weight(offset.reference);
@@ -393,7 +393,8 @@ impl BondLattice {
         }
     }
 
-    /// Compute the bits of all bonds, intact or broken. There is a byte for each lane group and offset.
+    /// Compute the bits of all bonds; broken bonds are included. There is a byte for each lane group and
+    /// offset.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
         let mut filled = vec![0; self.store.intact.len()];

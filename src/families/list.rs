@@ -24,7 +24,7 @@ pub struct BondList {
     /// Local indices of the neighbours, sorted by global id in each row. Index i pads the last group of
     /// a row.
     pub(super) neighbours: Neighbours,
-    /// State of the bonds; the bits of padding are clear.
+    /// State of the bonds; the intact bits of padding are clear.
     pub(super) store: Store,
     /// Volume weights of the ends i and j, 0 for padding. If the weights of i are `None`, all weights are 1.
     /// If only those of j are `None`, the weights of i apply to both ends.
@@ -80,7 +80,7 @@ impl BondList {
         self.points.len()
     }
 
-    /// Mean number of groups per row.
+    /// Mean number of groups per row, rounded up.
     pub fn groups_a_row(&self) -> usize {
         self.neighbours.len().div_ceil(self.points.len().max(1))
     }
@@ -110,8 +110,8 @@ impl BondList {
         }
     }
 
-    /// Set the volume weights of end i (`ends` = 1) or of i and j (`ends` = 2) to `weight(end, ξ)`, with
-    /// ξ = `offset(i, j)` in m.
+    /// Set the volume weights of the bonds to `weight(end, ξ)`, with ξ = `offset(i, j)` in m. With `ends` =
+    /// 1, the weight of end 0 (point i) applies to both ends; with `ends` = 2, each end has a weight.
     pub fn weigh(
         &mut self,
         ends: usize,
@@ -340,7 +340,7 @@ impl<'a> Rows<'a> {
 }
 
 impl Row<'_> {
-    /// The bits of all bonds of a group, intact or broken; the bits of padding are clear.
+    /// The bits of all bonds of a group; broken bonds are included, and the bits of padding are clear.
     #[inline(always)]
     pub fn whole(&self, group: usize) -> u8 {
         let mut bits = 0;

@@ -57,7 +57,8 @@ impl BlockBonds {
         with!(self, bonds => [bonds.block_i, bonds.block_j])
     }
 
-    /// Number of bonds ij, intact or broken. A bond between two owned points counts twice.
+    /// Number of bonds ij, intact or broken. A bond between two owned points of one block counts twice, as ij
+    /// and as ji.
     pub fn bonds(&self) -> u64 {
         with!(self, bonds => bonds.bonds())
     }

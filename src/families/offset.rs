@@ -23,7 +23,8 @@ pub struct Offset {
     pub(super) line: u32,
 }
 
-/// Number of spacings (m) within a length `cutoff` (m), limited by the extent of the points (m).
+/// Number of steps of length `spacing` within a length `cutoff`, limited by the extent of the points; all in
+/// m.
 pub(super) fn steps(cutoff: f64, spacing: f64, extent: f64) -> i64 {
     let limit = (extent / spacing).ceil();
     (cutoff / spacing).floor().min(limit) as i64

@@ -57,7 +57,7 @@ impl Order {
         drop(keys);
         let bins = first.windows(2).enumerate().map(|(block_j, ends)| {
             let cutoffs = cutoffs.iter().skip(block_j).step_by(blocks).copied();
-            // The shortest cutoff sets the bin size, because most points search this block with it.
+            // The shortest cutoff sets the bin size; searches with longer cutoffs visit more bins.
             let shortest = cutoffs.filter(|cutoff| *cutoff > 0.0).reduce(f64::min);
             let searched = &local[ends[0] as usize..ends[1] as usize];
             let sorted = shortest.map_or(&[][..], |_| searched).iter();
@@ -71,7 +71,7 @@ impl Order {
         }
     }
 
-    /// Find another point of a block at the same position as the point with sorted index `index`.
+    /// Find another point of a block at the same position as the point with local index `index`.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
         let sorted = self.first[block] as usize..self.first[block + 1] as usize;
         let points = self.local[sorted].iter().map(|k| *k as usize);

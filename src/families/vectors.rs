@@ -1,8 +1,8 @@
 //! Lane groups of a lattice.
 //!
-//! A lane group is a group of up to eight points of a grid that are adjacent along x. They have consecutive
-//! slots and consecutive local indices. The bonds of a lane group at one offset are computed together, one
-//! point per lane. In the code, a lane group is a `Vector`.
+//! A lane group is a group of up to eight points of a grid that are adjacent along x. Its points have
+//! consecutive slots and consecutive local indices. The bonds of a lane group at one offset are computed
+//! together, one point per lane. In the code, a lane group is a `Vector`.
 
 use std::ops::Range;
 
@@ -30,14 +30,13 @@ pub struct VectorBonds<'a> {
     pub point: usize,
     /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Range of the groups of bonds of this lane group among those of all lane groups, in the order of
-    /// `BondLattice::whole`.
+    /// Range of this lane group in the bytes of `BondLattice::whole`, which has one byte per group of bonds.
     pub bits: Range<usize>,
     /// The offsets of the lattice.
     pub offsets: &'a [Offset],
     /// State of the bonds, with one group per offset.
     pub groups: Groups<'a>,
-    /// Whether some weights differ from 1, and whether the weights of i and j differ.
+    /// Whether weights may differ from 1, and whether the weights of i and j may differ.
     pub weighted: [bool; 2],
     shifts: &'a [i32],
 }

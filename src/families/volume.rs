@@ -1,8 +1,8 @@
 //! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family.
 //!
-//! - `linear`: the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families
-//!   contain points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). In LAMMPS (Parks et
-//!   al. 2008), the factor drops from 1/2 to 0 at δ.
+//! - `linear`: the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families contain
+//!   points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). `LinearInside` is the form of
+//!   LAMMPS (Parks et al. 2008): the factor drops from 1/2 to 0 at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
 //!   Schweitzer 2016, eq. 2). It has a closed form in 1-D and 2-D, and is computed by quadrature over slices
 //!   in 3-D.
@@ -22,7 +22,8 @@ const SLICES: u32 = 256;
 /// Resolution of the offsets in the cache, in cell edges.
 const RESOLUTION: f64 = 1e-6;
 
-/// A quarter of the edge in units of [`RESOLUTION`]. Offsets on a refined grid are multiples of a quarter.
+/// A quarter of the edge in units of [`RESOLUTION`]. Offsets between points of the same or adjacent
+/// refinement levels are multiples of a quarter.
 const QUARTER: i64 = 250_000;
 
 /// Maximum number of entries of the lookup table.
@@ -37,7 +38,8 @@ fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }
 
-/// The volume correction factors for one horizon and one cell size. Several threads can use it at once.
+/// The volume correction factors for one horizon and one cell size. Several threads can use the same
+/// `CellShare` at once.
 pub struct CellShare {
     correction: VolumeCorrection,
     horizon: f64,
@@ -77,8 +79,8 @@ impl CellShare {
         share
     }
 
-    /// The longest bond (m) with a positive factor. For `exact`, the ball of radius δ then touches a corner
-    /// of the cell.
+    /// The upper limit (m) of the length of bonds with a positive factor. For `exact`, the ball of radius δ
+    /// touches a corner of a cell at this distance along its diagonal.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {

@@ -81,7 +81,7 @@ pub fn parse(text: &str) -> Result<Script, Mistake> {
     Ok(script)
 }
 
-/// Return a line without its comment.
+/// Return a line without its comment, which begins with `#` outside quotes.
 fn without_comment(row: &str) -> &str {
     let mut quote = None;
     for (index, c) in row.char_indices() {

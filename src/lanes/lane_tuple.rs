@@ -27,10 +27,10 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Get a quantity for writing.
     fn get_mut(&mut self, quantity: usize) -> &mut Lanes;
 
-    /// Select the first [`Self::COUNT`] columns.
+    /// Select the first [`Self::COUNT`] columns, to read.
     ///
     /// # Panics
-    /// If there are fewer columns.
+    /// If there are fewer columns, unless [`Self::PADDED`].
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
     /// Select the first [`Self::COUNT`] columns, to add to.

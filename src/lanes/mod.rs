@@ -20,7 +20,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Sub};
 /// Number of lanes: eight bonds are computed together.
 pub const WIDTH: usize = 8;
 
-/// One number for each of eight bonds.
+/// One number for each of eight bonds or points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes(pub [f64; WIDTH]);

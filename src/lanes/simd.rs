@@ -8,7 +8,7 @@ use super::Lanes;
 
 /// Proof that the machine has an instruction set, and the operations that depend on it.
 pub trait Simd: Copy + Send + Sync + 'static {
-    /// a b + c, rounded once.
+    /// a b + c, rounded once except by [`Portable`] without fused multiply-add.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
 
     /// Bits of the lanes in which `a` is at least as large as `b`.

@@ -163,8 +163,8 @@ impl AnyLaw {
     }
 }
 
-/// Bonds between different laws are never linear: a linear law is paired only with itself.
-/// No function is inlined; otherwise every loop would contain the code of all laws.
+/// Bonds between different laws are never linear: a linear law is paired only with itself. Functions that are
+/// called per bond are not inlined; otherwise every loop would contain the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;

@@ -53,14 +53,15 @@ pub struct Bond<const D: usize> {
     pub relative_square_extension: Lanes,
     /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|². Set for intact bonds, if [`Wanted::stretch`].
     pub stretch: Lanes,
-    /// (|Y| − |ξ|)/|Y|; undefined for linear laws. Set for intact bonds, if
+    /// (|Y| − |ξ|)/|Y|; for linear laws ξ·η/|ξ|². Set for intact bonds, if
     /// [`Wanted::extension_over_deformed`].
     pub extension_over_deformed: Lanes,
     /// η by component, m.
     pub eta: [Lanes; D],
     /// Y by component, m; for linear laws ξ.
     pub deformed: [Lanes; D],
-    /// One bit per intact bond whose |x| exceeds the limit of the series.
+    /// One bit per intact bond whose |x| exceeds the `limit` of [`deform`]; for linear laws, one bit per
+    /// intact bond.
     pub beyond_series: u8,
 }
 
@@ -178,9 +179,9 @@ pub struct Wanted {
 
 /// Compute the geometry of bonds with the relative displacement η (m).
 ///
-/// Stretches are computed for the bonds whose bit in `intact` is set.
-/// `limit`, at most [`NEAR`], is the largest |x| for which the series are used.
-/// With `ONLY_NEAR`, the stretches of bonds beyond the limit are undefined.
+/// Stretches are computed for the bonds whose bit in `intact` is set. [`Bond::beyond_series`] marks the
+/// intact bonds with |x| above `limit`, which is at most [`NEAR`]. With `ONLY_NEAR`, the stretches of bonds
+/// with |x| above [`NEAR`] are undefined.
 #[inline(always)]
 pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     simd: S,
@@ -279,7 +280,8 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// Return `near`; in lanes beyond the series x/(√(1 + x) + o), where `other` computes o from 1 + x.
+/// Return `near`, or in marked lanes with |x| above [`NEAR`] the quotient x/(√(1 + x) + o). `other` computes
+/// o from 1 + x.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,
@@ -299,7 +301,7 @@ fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     }))
 }
 
-/// Task of [`with_far`] for the lanes beyond the series. Pairs are a number and its rounding error.
+/// Task of [`with_far`] for the lanes with |x| above [`NEAR`]. Pairs are a number and its rounding error.
 struct ClosedForm<O> {
     relative_square_extension: Lanes,
     beyond_series: u8,
@@ -357,7 +359,7 @@ mod tests {
         extension_over_deformed: true,
     };
 
-    /// Bonds with ξ along x, |ξ| = 1 and exactly this x.
+    /// Return bonds with exactly these values of x, from artificial reference data.
     fn of_growth(simd: impl Simd, relative_square_extension: [f64; 8]) -> Bond<1> {
         let one = Lanes::splat(1.0);
         let reference = Reference {

@@ -44,7 +44,8 @@ pub struct Declaration {
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
     /// Check the horizon, and return an error message if it is wrong; `None` if every horizon is allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
-    /// Whether the law scales the critical stretch of each bond, with these values of its keys.
+    /// Whether the law, with these values of its keys, scales a critical stretch that follows from a fracture
+    /// energy, bond by bond.
     pub scales_thresholds: fn(&Values) -> bool,
     /// Create the law from the constants of one body.
     pub build: fn(&Given) -> Built,
@@ -102,7 +103,8 @@ impl fmt::Debug for Declaration {
 /// Invariants of a law that hold after any motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Invariants {
-    /// Forces are the gradient of the strain energy; this does not hold for bonds that yield.
+    /// Forces are the gradient of the strain energy. This holds neither for laws that dissipate energy nor
+    /// for `stress = "willberg2022"`.
     pub conservative: bool,
     /// Rotating a motion rotates the forces.
     pub objective: bool,

@@ -57,7 +57,7 @@ fn build(given: &Given) -> Built {
 /// stretch s_e.
 ///
 /// Breaking dissipates c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
-/// s0 = s_e²/(2 s_y) + s_y/2.
+/// s0 = s_e²/(2 s_y) + s_y/2 if s_e > s_y; otherwise s0 = s_e.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let elastic = bond_based_critical_stretch(given, energy);
     let limit = given.values.number(YIELD_STRETCH.name);

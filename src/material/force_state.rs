@@ -18,7 +18,7 @@ pub trait ForceState<const D: usize>: Copy {
     /// Add the force state of the other end, −T_j⟨−ξ⟩.
     fn plus(self, other: Self) -> Self;
 
-    /// Add the force density (N/m³) of the bonds whose bit is set to the sums.
+    /// Add to `sums` the force density (N/m³) of the bonds whose bit is set.
     fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]);
 
     /// Component of the symmetric part of T⊗Y, J/m⁶.

@@ -8,10 +8,9 @@
 //! - the *numbers* of point i, which the law stores per point, such as the dilatation of its family;
 //! - the *bond history*, which the law stores per bond and end, such as a plastic stretch.
 //!
-//! A law declares how many point numbers and history values it has, and computes their values.
-//! An *end* of a bond is point i or point j.
-//! An *untruncated* family is a full ball of neighbours, without surfaces or cracks. The *initial* family of
-//! a point has all its bonds before any bond breaks.
+//! A law declares how many point numbers and history values it has, and computes their values. An *end* of a
+//! bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
+//! cracks. The *initial* family of a point has the bonds of step 1 of [`Law`], before any bond breaks.
 
 mod any;
 pub mod bond;
@@ -331,8 +330,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Lanes::splat(0.0)
     }
 
-    /// Stretch F_zz across the plane in plane stress, at a displacement gradient of the plane. `None` for
-    /// Hooke's law with logarithmic strains.
+    /// Stretch F_zz across the plane in plane stress, at a displacement gradient of the plane. If `None`,
+    /// F_zz follows from Hooke's law with logarithmic strains.
     fn stretch_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -346,7 +345,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Whether a point has too few intact bonds for the law, so that it carries no force.
+    /// Whether a point carries no force, because its intact bonds are too few for the law, or because the law
+    /// has no stress at its deformation.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }

@@ -1,12 +1,11 @@
 //! Prototype microelastic material with one micromodulus per point, computed from the point's own family.
 //!
-//! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3.
-//! The micromodulus c_i scales the energy of the discrete family at unit isotropic stretch to the classical
-//! energy density W₁.
-//! With w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ.
-//! The stiffness is therefore correct at surfaces and on any lattice.
-//! A bond has the mean of both micromoduli, c_ij = (c_i + c_j)/2. Its critical stretch s_c √(c/c_ij) keeps
-//! the energy of breaking the bond.
+//! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3. The micromodulus c_i scales the energy of
+//! the discrete family at unit isotropic stretch to the classical energy density W₁. With w = c_i s²|ξ|/2,
+//! the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch is therefore
+//! correct at surfaces and on any lattice. A bond has the mean of both micromoduli, c_ij = (c_i + c_j)/2. A
+//! critical stretch s_c that follows from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy
+//! of breaking the bond.
 //!
 //! With the influence function 1/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
 
@@ -87,8 +86,8 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// Critical stretch of the printed law: eq. 16–17 in the plane; in space from the sum over the bonds that
-/// cross a plane.
+/// Critical stretch, of the printed law by eq. 16–17 in the plane, and in space from the sum over the bonds
+/// that cross a plane; otherwise that of `pmb`.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     if !as_printed(given) {
         return bond_based_critical_stretch(given, energy);

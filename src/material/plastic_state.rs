@@ -1,15 +1,16 @@
 //! Plastic state of a point, stored from step to step.
 
-/// Plastic strain, equivalent plastic strain and dissipated energy; initially 0.
+/// Plastic strain, equivalent plastic strain, energy of the unreduced control and dissipated energy;
+/// initially 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlasticState {
     /// E_p, or C_p⁻¹ − I for logarithmic strains, in the order xx, yy, zz, yz, xz, xy.
     pub strain: [f64; 6],
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,
-    /// Energy that the zero-energy control would have in an elastic body, J/m³.
+    /// Energy that the zero-energy control would have if plastic flow did not reduce the control, J/m³.
     pub control: f64,
-    /// Energy that plastic flow has dissipated, J/m³.
+    /// Energy that plastic flow and the reduction of the zero-energy control have dissipated, J/m³.
     pub work: f64,
 }
 

@@ -23,11 +23,12 @@ pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 /// fifteen.
 const MOST_ITERATIONS: usize = 40;
 
-/// R has converged if no entry changes by more than this in an iteration; the next change would be its
-/// square.
+/// R has converged if no entry changes by more than this in an iteration; the next change would be of the
+/// order of its square.
 const CONVERGED: f64 = 1e-9;
 
-/// Return R of a deformation gradient in the plane or in space; the identity if det F ≤ 0.
+/// Return R of a deformation gradient in the plane or in space. In space, the result is the identity if det F
+/// ≤ 0 or if the iteration does not converge.
 pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     let mut f = Matrix3::identity();
     f.view_mut((0, 0), (D, D)).copy_from(gradient);
@@ -37,7 +38,8 @@ pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     }
 }
 
-/// Return R in the plane. Its angle is that of the vector (F_xx + F_yy, F_yx − F_xy).
+/// Return R in the plane. Its angle is that of the vector (F_xx + F_yy, F_yx − F_xy); R is the identity if
+/// this vector is 0.
 fn in_plane(f: &Matrix3<f64>) -> Rotation {
     let (cosine, sine) = (f[(0, 0)] + f[(1, 1)], f[(1, 0)] - f[(0, 1)]);
     let length = (cosine * cosine + sine * sine).sqrt();
@@ -51,7 +53,8 @@ fn in_plane(f: &Matrix3<f64>) -> Rotation {
 
 /// Return cos(φ/2) and sin(φ/2) from cos φ and sin φ, |φ| ≤ π.
 fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
-    // The larger one follows from a square root, the smaller one from sin φ = 2 sin(φ/2) cos(φ/2).
+    // For φ up to 120°, cos(φ/2) follows from a square root; beyond, sin(φ/2) does. The other one follows
+    // from sin φ = 2 sin(φ/2) cos(φ/2).
     if cosine > -0.5 {
         let half = (0.5 * (1.0 + cosine)).sqrt();
         [half, 0.5 * sine / half]
@@ -62,7 +65,8 @@ fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
     }
 }
 
-/// Return R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986); `None` if det F ≤ 0.
+/// Return R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986); `None` if det F ≤ 0 or without
+/// convergence.
 fn orthogonal_factor(f: Matrix3<f64>) -> Option<Matrix3<f64>> {
     let mut x = f;
     for _ in 0..MOST_ITERATIONS {

@@ -222,8 +222,8 @@ fn fullness(values: &Values) -> f64 {
     }
 }
 
-/// Return the ratio of stress to strain in uniaxial tension, Pa. Under uniaxial strain the Poisson ratio is
-/// 1/4, which overrides the given ratio.
+/// Return the ratio of stress to strain in uniaxial tension, Pa. In plane strain and under uniaxial strain
+/// the Poisson ratio is 1/4, which overrides the given ratio.
 fn tensile_modulus(given: &Given) -> f64 {
     let elastic = Isotropic {
         poisson_ratio: 0.25,

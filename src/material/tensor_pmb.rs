@@ -9,11 +9,10 @@
 //! H is the least-squares fit over all components, which is independent of the axes.
 //! In an untruncated family H is nearly I. Near a surface H is larger normal to the surface than along it.
 //!
-//! A bond has the mean of both micromoduli, c_ij(n). It breaks at s_c √(c/c_ij), which keeps the energy of
-//! breaking the bond.
-//! The method generalises the surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4),
-//! which fit energies along three axes with an ellipsoid.
-//! Le & Bobaru (2018) compare other corrections.
+//! A bond has the mean of both micromoduli, c_ij(n). A critical stretch s_c that follows from a fracture
+//! energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. The method generalises the
+//! surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4), which fit energies along three
+//! axes with an ellipsoid. Le & Bobaru (2018) compare other corrections.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 

@@ -394,7 +394,8 @@ pub struct IdFile {
     pub first: u64,
 }
 
-/// The points of a named group of meshes. Their ids are known once the points have been generated.
+/// The points of a group of elements or nodes in the meshes, given by name or number. Their ids are known
+/// once the points have been generated.
 #[derive(Clone)]
 pub struct MeshSet {
     /// Name or number of the group.

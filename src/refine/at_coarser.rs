@@ -4,7 +4,7 @@ use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
-/// Test whether nodes of a level have coarser nodes within a distance.
+/// The test whether a node of a level has coarser nodes within a distance.
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,

@@ -79,7 +79,7 @@ impl<'a> Grids<'a> {
     /// parents. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
-    /// If a region has no point; the error is the same on all ranks.
+    /// If a region contains no point of a body given as a shape; the error is the same on all ranks.
     pub fn refine_regions(&mut self, comm: &dyn Communicator, coarse: &[Point]) -> Result<()> {
         let problem = self.problem;
         let Some(refinement) = &problem.refinement else {
@@ -160,16 +160,16 @@ impl<'a> Grids<'a> {
         removed
     }
 
-    /// The node that is coarsened at the point of a body at a position (m); `None` if it is not refined or is
-    /// permanent.
+    /// The node that is coarsened at the point of a body at a position (m); `None` if there is no such node,
+    /// or if it is permanent.
     pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
         let index = self.index_at(body, position)?;
         let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(index)?;
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// Suppress nodes that are new since `earlier` and whose two parents are separated. `separated` tests the
-    /// positions (m) of both parents.
+    /// Suppress nodes that are new since `earlier`, if any two of their parents are separated. `separated`
+    /// tests the positions (m) of two parents.
     pub fn suppress_separated(
         &mut self,
         earlier: &Self,
@@ -230,7 +230,8 @@ impl<'a> Grids<'a> {
         state
     }
 
-    /// Refine to a state that [`Self::state`] returned. Return whether any node was not refined before.
+    /// Refine to a state that [`Self::state`] returned. Return whether any of these nodes was not refined
+    /// before.
     pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
@@ -240,7 +241,8 @@ impl<'a> Grids<'a> {
         self.refine(refined)
     }
 
-    /// The node that is refined at the point of a block at a position (m); `None` if it has the finest level.
+    /// The node that is refined at the point of a block at a position (m); `None` if the point has the finest
+    /// level, or if its body is on no lattice.
     pub fn refining(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
         let level = self.problem.block(block).level;
         if level == self.finest {
@@ -253,14 +255,15 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// The grid index in steps of the finest level at a position (m) in a body.
+    /// The grid index in steps of the finest level at a position (m) in a body; `None` if the body is on no
+    /// lattice.
     pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
-    /// Reference position (m) of a grid index in steps of the finest level; `None` if it is not on the grid
-    /// of level 0.
+    /// Reference position (m) of a grid index in steps of the finest level; `None` if the index is not on the
+    /// grid of level 0, or if the body is on no lattice.
     pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))

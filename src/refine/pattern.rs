@@ -21,7 +21,8 @@ pub struct Node {
 /// The refined nodes of a body, by level. A node is stored as a grid index in steps of its level.
 ///
 /// - The `body` arguments test whether a cell belongs to the body.
-/// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level.
+/// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level, except
+///   next to suppressed nodes.
 /// - If a crack separates the parents of a new node, the node is suppressed. Crack faces then act like the
 ///   boundary of the body.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +57,7 @@ impl Pattern {
         self.dimension
     }
 
-    /// Refine a node and its parents, unless no node is possible at the index. Return true if the node was
+    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node was
     /// not refined before.
     pub fn refine(
         &mut self,
@@ -75,7 +76,8 @@ impl Pattern {
         true
     }
 
-    /// Coarsen a node, unless it is permanent or a parent of a refined node. Return true if it was refined.
+    /// Coarsen a node, unless it is permanent or a parent of a refined node. Return whether the node was
+    /// coarsened.
     pub fn coarsen(&mut self, level: u32, index: GridIndex) -> bool {
         let finer = level as usize + 1;
         let is_needed = self.refined.get(finer).is_some_and(|finer| {
@@ -185,7 +187,8 @@ impl Pattern {
                 all += 1;
                 if self.is_taken(coarse + 1, other) {
                     taken += 1;
-                    // Eq. 12: subtract half of the finer volume on an axis, and a quarter on a diagonal.
+                    // Eq. 12: subtract 1/2, 1/4 or 1/8 of the finer volume for a node that is offset along 1,
+                    // 2 or 3 axes.
                     volume -= cell(coarse + 1) >> halves(other);
                 }
             }

@@ -66,7 +66,7 @@ pub struct Simulation<'a, const D: usize> {
     /// twice.
     pub cut: Vec<u64>,
     /// Number of bonds of the owned points that were intact before any bond could break. A bond between two
-    /// owned points counts twice. `None` if no bond breaks at the start.
+    /// owned points counts twice. `None` if no bond can break at the start.
     pub intact_at_start: Option<u64>,
     /// Stable step with the density of the materials, s.
     pub stable_step: f64,
@@ -123,8 +123,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Create and distribute the points and bonds, and evaluate the forces at time 0.
     ///
     /// # Errors
-    /// If the points cannot be created, if a set of a condition is empty, if there is no stable step, or if
-    /// no support holds a loaded piece in load steps. The error is the same on all ranks.
+    /// If the problem cannot be run: for example, if the points cannot be created, if a set of a condition is
+    /// empty, if there is no stable step, or if no support holds a loaded piece in load steps. The error is
+    /// the same on all ranks.
     pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
@@ -284,10 +285,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending` says
-    /// whether the second half kick of the previous step must still be applied; it must be false at the
-    /// beginning of a stage. Returns whether the second half kick of this step must still be applied.
-    /// Collective.
+    /// Make one step, with or without its second half kick, or one iteration of a load step.
+    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied; it
+    /// must be false at the beginning of a stage. Returns whether the second half kick of this step must
+    /// still be applied. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);

@@ -18,7 +18,8 @@ const MOST_STEPS: f64 = 1e15;
 /// the step.
 ///
 /// # Errors
-/// If there is no stable step, or if there are more steps than can be counted.
+/// If there is no stable step, if there are more steps than can be counted, if a step is too long for viscous
+/// damping, or if the adaptive rule may repeat a step too often.
 pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     let mut start = 0.0;
     let choose = |stage: Stage| {

@@ -13,7 +13,7 @@ fn json(printed: &str) -> Value {
 #[test]
 fn the_schema_is_json_and_the_same_each_time() {
     let print = || {
-        // The schema is larger than the buffer of a pipe.
+        // `finish` would hang, because the schema is larger than the buffer of a pipe.
         let output = fissure(1).arg("schema").output().unwrap();
         assert!(output.status.success(), "{}", text(&output));
         String::from_utf8(output.stdout).unwrap()

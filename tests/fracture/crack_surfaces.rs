@@ -232,7 +232,8 @@ fn a_penny_that_grows_has_equal_bits_on_two_ranks_and_after_a_restart() {
         .collect();
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
     let penny = PI * 6e-3 * 6e-3;
-    // The bound on the excess area of a penny is 0.16 horizons per radius; the horizon is 0.75 radii.
+    // The computed area extends up to 0.08 δ beyond the rim, so the area is at most 0.16 δ/R too large,
+    // relative to πR². Here δ = 0.75 R.
     let excess = first[area] / penny - 1.0;
     assert!((0.0..0.16 * 0.75).contains(&excess), "{excess}");
     // The front lies inside the rim, because the damage near the rim is below the threshold of 0.35.

@@ -302,8 +302,8 @@ fn go_on(simulation: &mut Simulation<'_, 2>, steps: u64) -> [u64; 2] {
     change
 }
 
-/// Assert that a run is the same on 1 to 4 ranks. `least` has the smallest numbers of created and removed
-/// points.
+/// Assert that a run is the same on 1 to 4 ranks, and that it creates and removes at least the numbers of
+/// points in `least`.
 fn are_the_same(text: &str, least: [u64; 2]) {
     let states = |ranks: usize| {
         let found = simulate_on::<2, _>(ranks, text, |mut simulation| {

@@ -85,7 +85,7 @@ pub const SECTIONS: [Section; 38] = [
     Section::new("time.static", Table, Fixed),
     Section::new("stage", Array, Fixed),
     Section::new("output", TableAndNamed, Free),
-    // Definitions of history columns are compared separately.
+    // `history_differences` compares the definitions of the columns; the interval of the rows is free.
     Section::new("history", Table, Free),
     Section::new("history.force", Named, Fixed),
     Section::new("history.field", Named, Fixed),

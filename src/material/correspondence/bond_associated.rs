@@ -112,7 +112,8 @@ impl Places {
         Self::direct::<D>() + D * D
     }
 
-    /// Index of the flag for a point with too few bonds, or with a bond without stress.
+    /// Index of the flag for a point without force: K is nearly singular, the intact part is too stiff, or a
+    /// bond has no stress.
     const fn singular<const D: usize>() -> usize {
         Self::inverse::<D>() + 2 * D
     }
@@ -146,8 +147,8 @@ impl<const D: usize> Law<D> for BondAssociated {
     type BondHistory = [Lanes; 0];
     /// Diagonal and mixed entries of K (m⁵), and Σ ω Ṽ (m³).
     type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
-    /// Pass 0: K over the intact bonds, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ. Pass 1: Z Σ ω Ṽ (N m), and the number of
-    /// bonds without stress.
+    /// Pass 0: K over the intact bonds, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ. Pass 1: Z Σ ω Ṽ (N m), and Σ ω Ṽ of the
+    /// bonds without stress (m³).
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;
@@ -175,7 +176,8 @@ impl<const D: usize> Law<D> for BondAssociated {
         }
     }
 
-    /// Trace of the shape tensor of an untruncated family, divided by that of this family.
+    /// Trace of the shape tensor of an untruncated family, divided by that of this family; 1 if K is nearly
+    /// singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {

@@ -65,7 +65,7 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
-/// Return the error of constants for which the matrix of `wan2019` is indefinite.
+/// Return the error of `wan2019` with anisotropic constants for which C : I is not positive definite.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let least = hooke::least_under_dilation(values, dimension)?;
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {

@@ -25,8 +25,8 @@ pub struct Hooke {
     matrix: Matrix6<f64>,
     /// Row for the direction across the plane: factors of the strains xx, yy and 2 xy.
     ///
-    /// The product is the stress zz (Pa) in plane strain, and the strain zz in plane stress.
-    /// `None` in space, and if the constants of the deck do not determine this row.
+    /// The product is the stress zz (Pa) in plane strain, and the strain zz in plane stress. `None` in 3-D
+    /// and 1-D, and if the constants of the deck do not determine this row.
     across: Option<[f64; 3]>,
 }
 
@@ -224,7 +224,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// Return the error of a matrix that is not positive definite.
+/// Return the error of a matrix that is not finite or not positive definite.
 fn indefinite(
     matrix: &Matrix6<f64>,
     dimension: Dimension,
@@ -447,7 +447,7 @@ fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }
 
-/// Return the row of the stress zz in plane strain.
+/// Return the row of the stress zz in plane strain; `None` in other dimensions.
 fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
     let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
     is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))

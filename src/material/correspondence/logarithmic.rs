@@ -67,7 +67,7 @@ impl Trial {
 }
 
 /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
-/// state. `None` if det F ≤ 0.
+/// state. `None` if det F ≤ 0 or b_e is not positive definite.
 pub fn at<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
@@ -90,7 +90,8 @@ pub fn at<const D: usize>(
     Some((piola, 0.5 * stress.dot(&strains)))
 }
 
-/// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if det F ≤ 0.
+/// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if det F ≤ 0 or b_e is not
+/// positive definite.
 pub fn across<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,

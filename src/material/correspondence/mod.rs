@@ -111,8 +111,8 @@ impl Declared for Correspondence {
 fn invariants(values: &Values) -> Invariants {
     let stress = of_stress(values);
     let yields = values.get(plastic::YIELD_STRESS.name).is_some();
-    // In truncated families the control of Wan et al. has fixed axes, which do not rotate with the body. It
-    // then exerts a moment of the order z². Other controls have no axes.
+    // In truncated families the control of Wan et al. has fixed axes, which do not rotate with the body. The
+    // control then exerts a moment of the order z². Other controls have no axes.
     let has_axes = values.word(control::KIND.name) == "wan2019";
     Invariants {
         conservative: stress.conservative && !yields,
@@ -121,7 +121,7 @@ fn invariants(values: &Values) -> Invariants {
     }
 }
 
-/// Return the invariants of the law without its control.
+/// Return the invariants of the law without control and without plastic flow.
 fn of_stress(values: &Values) -> Invariants {
     let by_word = values.word(STRESS.name) == "willberg2022";
     Invariants {
@@ -160,7 +160,7 @@ type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// Count of the point's own numbers: W − ½ P : H (J/m³), and the flag of a singular shape tensor.
+/// Count of the point's own numbers: W − ½ P : H (J/m³), and the flag of a point without force.
 ///
 /// If a body yields and has a control, two more follow. One is ½ tr(B H K Hᵀ), the part of ½ Σ ω η·B η Ṽ that
 /// does not belong to the control (J/m³). The other is s at the start of the step.
@@ -221,8 +221,8 @@ struct Family<const D: usize> {
 
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state. `sums` are the sums of the first
-    /// pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if the family has too few
-    /// bonds, or if the law has no stress at H.
+    /// pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if K is nearly singular,
+    /// the intact part of the family is too stiff, or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],
@@ -306,7 +306,7 @@ impl<const D: usize> Law<D> for Correspondence {
         }
     }
 
-    /// Trace of K⁻¹ divided by that of an untruncated family.
+    /// Trace of K⁻¹ divided by that of an untruncated family; 1 if K is nearly singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         shape

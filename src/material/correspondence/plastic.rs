@@ -154,7 +154,7 @@ impl Plastic {
     }
 
     /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
-    /// state. `None` if a logarithmic strain does not exist, because det F ≤ 0.
+    /// state. `None` if the logarithmic strain does not exist.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -176,8 +176,8 @@ impl Plastic {
         Some((second + gradient * second, 0.5 * stress.dot(&elastic)))
     }
 
-    /// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if a logarithmic strain does
-    /// not exist.
+    /// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if the logarithmic strain
+    /// does not exist.
     pub fn across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -192,7 +192,7 @@ impl Plastic {
         Some(self.stress(&elastic)[(2, 2)])
     }
 
-    /// Return the stretch F_zz across the plane in plane stress.
+    /// Return the stretch F_zz across the plane in plane stress; `None` if its square would not be positive.
     pub fn stretch_across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -239,7 +239,7 @@ impl Plastic {
     }
 
     /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄ and the plastic work.
-    /// `None` if the stress is inside the yield surface.
+    /// `None` if the stress is inside the yield surface or not finite.
     pub fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) -> Option<Matrix3<f64>> {
         let (limit, most) = (self.limit(state), equivalent(trial));
         let surface = if self.is_logarithmic {

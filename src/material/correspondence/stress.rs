@@ -77,8 +77,8 @@ impl Stress {
         }
     }
 
-    /// Return P (Pa) and W (J/m³) at a displacement gradient H = F − I; `None` if the law has no stress
-    /// because det F ≤ 0.
+    /// Return P (Pa) and W (J/m³) at a displacement gradient H = F − I; `None` if the law has no stress:
+    /// neo-Hooke at det F ≤ 0, Willberg et al. at det F = 0.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -137,12 +137,13 @@ impl Stress {
         }))
     }
 
-    /// Return the stretch F_zz across the plane in plane stress; `None` if the constants do not determine it.
+    /// Return the stretch F_zz across the plane in plane stress; `None` if the constants do not determine
+    /// F_zz, or if no positive F_zz exists.
     pub fn stretch_across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         match self {
             Self::StVenantKirchhoff(hooke) => stretch_of(hooke.across(&strain)?),
-            // The J of this law is that of the plane.
+            // J of this law is det F in the plane, without a stretch across the plane.
             Self::Willberg2022(_) => Some(1.0),
             Self::NeoHooke(law) => {
                 let growth = growth(&(matrix(&strain) * 2.0));
@@ -227,7 +228,7 @@ impl NeoHooke {
     /// across the plane.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
         let own = libm::log1p(growth(doubled));
-        // q is the logarithm of the squared stretch across the plane.
+        // `across` is the logarithm of the squared stretch across the plane.
         let across = if self.plane_stress && D == 2 {
             self.across(own)
         } else {

@@ -106,7 +106,8 @@ fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) ->
     Some(own(&given(problem, body, None, constants)))
 }
 
-/// Create the law of a body with these constants, if its bonds break by this damage.
+/// Create the law of a body with these constants. `damage` is the damage of its bonds; `None` for bonds
+/// without damage.
 fn build(
     problem: &Problem,
     body: &Body,
@@ -128,7 +129,7 @@ fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare 
     )
 }
 
-/// The longest bond (m) of each pair of blocks, row-major.
+/// The longest bond (m) of each pair of blocks, row-major; 0 for a pair without bonds.
 pub fn cutoffs(problem: &Problem) -> Vec<f64> {
     let reach = |here: &Block, there: &Block| {
         if problem.interface.between(here.body, there.body) == InterfaceRule::None {
@@ -187,7 +188,7 @@ fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
 }
 
 /// The damage laws at the two ends of the bonds between two bodies, in the order of the bodies in the
-/// problem. `None` if the damage of the bodies applies.
+/// problem. `None` if the pair has no separate damage law.
 pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[DamageLaw; 2]> {
     let damage = pair.own_damage()?;
     let mut bodies = problem.bodies.iter().filter(|body| pair.has(body));
@@ -267,7 +268,7 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     }
 }
 
-/// Failure criterion of the bonds between two blocks: a bond breaks at the smaller threshold of its ends. A
+/// Failure criterion of the bonds between two blocks, from the damage of both blocks; see [`Criterion`]. A
 /// block without damage has no threshold.
 fn criterion(
     problem: &Problem,

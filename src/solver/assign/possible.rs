@@ -7,8 +7,8 @@ use crate::problem::{
     Toughness, VolumeCorrection,
 };
 
-/// Check the laws and the damage of all bodies. An error says that a law cannot be created, that its damage
-/// is not possible, or that the damage of two bodies is incompatible.
+/// Check the laws, the damage, the thermal expansion and the horizons of all bodies, and the damage of pairs
+/// of bodies.
 ///
 /// # Errors
 /// For problems created in Rust; most faults of decks are found when they are read.

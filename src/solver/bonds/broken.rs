@@ -1,8 +1,9 @@
 //! Consequences of broken bonds.
 //!
-//! A bond breaks in the pass that sums the forces, by the force states of both ends. The force sums exclude
-//! the bonds that break. Point numbers that follow from sums over bonds, and the forces that depend on them,
-//! are then recomputed. This is done only at the points that a broken bond affects.
+//! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends decide with the same
+//! operations. The force sums exclude the bonds that break. Point numbers that follow from sums over bonds,
+//! and the forces that depend on them, are then recomputed. This is done only at the points that a broken
+//! bond affects.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -32,7 +33,8 @@ pub struct Broken<const D: usize> {
     pub energy: f64,
     /// The point's part of the energy of these bonds above their criterion when they broke, J.
     pub overshoot: f64,
-    /// Force density that these bonds no longer exert on the point, N/m³.
+    /// Force density that the point loses, N/m³: the forces of these bonds, and the change of the forces of
+    /// other bonds.
     pub force: [f64; D],
 }
 

@@ -257,7 +257,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Copy computed or received point numbers to the grids, where lattice bonds read them.
+    /// Copy computed or received thresholds, point numbers, rotations and stress measures to the grids, where
+    /// lattice bonds read them.
     pub(super) fn update(&mut self, content: HaloContent, which: Which) {
         for grid in &mut self.grids {
             match content {

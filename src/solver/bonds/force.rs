@@ -1,4 +1,4 @@
-//! The kernel that sums bond forces and breaks bonds by the force states of both ends.
+//! The kernel that sums bond forces and breaks the bonds that meet their criterion.
 
 use crate::damage::{Criterion, Ends};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
@@ -38,7 +38,7 @@ impl BondUpdate {
 
 /// Kernel that sums the forces of the intact bonds: force density by component, N/m³.
 ///
-/// Bonds that break in this sweep are excluded. For these bonds, it sums
+/// Bonds that break in this sweep are excluded. For these bonds, the kernel sums
 ///
 /// - their number;
 /// - the energy that they release at the point, J;

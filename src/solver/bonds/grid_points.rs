@@ -58,7 +58,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Return write access to the displacements of the owned points.
+    /// Return write access to the displacements and thermal stretches of the owned points.
     pub fn owned_places(&mut self) -> OwnedPlaces<'_, D> {
         OwnedPlaces {
             grid: &self.grid,
@@ -114,7 +114,7 @@ impl<const D: usize> GridValues<D> {
     }
 }
 
-/// Write access of several threads to the displacements of a grid's owned points.
+/// Write access of several threads to the displacements and thermal stretches of a grid's owned points.
 pub struct OwnedPlaces<'a, const D: usize> {
     grid: &'a Grid,
     columns: [*mut f64; D],
@@ -297,8 +297,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// Load the bonds of a lane group at one offset. `FAST_PATH` omits the data of the criterion and, for
-    /// bonds beyond the series limit, the extensions.
+    /// Load the bonds of a lane group at one offset. `FAST_PATH` omits the data of the criterion, the
+    /// breakable bits, the thermal stretches, and the closed forms for |x| above
+    /// [`NEAR`](crate::material::bond::NEAR).
     ///
     /// # Safety
     /// The lane group must belong to the grid, and the offset to the lane group.

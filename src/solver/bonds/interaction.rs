@@ -24,7 +24,7 @@ pub struct Interaction {
 pub struct BlockLaws {
     /// Material law of the block.
     pub law: AnyLaw,
-    /// The damage law, if bonds can break.
+    /// Damage law of the block, if it has one.
     pub damage: Option<DamageLaw>,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
@@ -64,7 +64,7 @@ impl PairReads {
 }
 
 impl BlockLaws {
-    /// Whether any bond of the points can break.
+    /// Whether bonds of the points can break by the damage law of the block or of a pair of bodies.
     pub fn has_breakable_bonds(&self) -> bool {
         self.damage.is_some() || self.pairs.breaks
     }

@@ -1,7 +1,7 @@
 //! Sums over the bonds of points: forces, point numbers, energies.
 //!
-//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel serves all dimensions,
-//! laws and storages: the eight bonds belong to one point (lists) or to eight points (lattices).
+//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel serves both storages of
+//! bonds: the eight bonds belong to one point (lists) or to eight points (lattices).
 
 use crate::damage::{Criterion, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
@@ -37,7 +37,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub history: [K::BondHistory; 2],
     /// A bit for each bond that is intact.
     pub intact: u8,
-    /// A bit for each bond, broken or not; only with [`Kernel::READS_BROKEN`].
+    /// A bit for each bond, including broken bonds; only with [`Kernel::READS_BROKEN`].
     pub whole: u8,
     /// A bit for each bond that can break.
     pub breakable: u8,
@@ -103,7 +103,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Reduction of the lanes of the kernel's sums.
     const COMBINE: Combine = Combine::Add;
 
-    /// Instruction sets for which the kernel's loops are compiled. One is enough for output kernels.
+    /// Instruction sets for which the kernel's loops are compiled. The default, one version, is enough for
+    /// most outputs.
     const ISA_SET: IsaSet = IsaSet::One;
 
     /// Whether to compile a second loop for lane groups whose bonds all stay within the series limit.

@@ -191,7 +191,8 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
-    /// displacements of the last [evaluation](Self::evaluate). F is I if too few bonds are intact.
+    /// displacements of the last [evaluation](Self::evaluate). F is I if the point is
+    /// [singular](Self::singular) or its shape tensor is nearly singular.
     pub fn deformation_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
         self.gradient(model, false)
     }
@@ -221,8 +222,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// Flag singular owned points with 1, others with 0. A point is singular if too few of its bonds are
-    /// intact for its law; the law then gives no force.
+    /// Flag singular owned points with 1, others with 0. A singular point carries no force, see
+    /// [`Law::is_singular`].
     pub fn singular(&self, model: &Model<D>) -> Vec<f64> {
         let flag = |point| f64::from(u8::from(self.is_singular(model, point)));
         (0..model.owned()).map(flag).collect()

@@ -6,7 +6,7 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, FamilyShare, Law, family_sha
 
 use super::kernel::{Group, Kernel};
 
-/// Request every bond quantity; these kernels are not in the step loop.
+/// Request every bond quantity; most of these kernels run only for set-up and outputs.
 pub(super) const fn wanted(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -133,8 +133,9 @@ fn add_tensor<S: Simd, const D: usize>(
     }
 }
 
-/// Kernel that sums D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
-/// zz, xy, yz, xz. C is the sum of [`Law::stiffness`] of both ends.
+/// Kernel that sums D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy, zz,
+/// xy, yz, xz. C is the sum of [`Law::stiffness`] of both ends. An end whose law [resists displacements
+/// across](Law::resists_across) the bonds contributes its part of C times I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.

@@ -1,13 +1,14 @@
 //! Internal forces: sums over bonds in passes, with halo exchanges between them.
 //!
 //! A force evaluation is a list of passes, created once from the laws in use. Each pass is a sum over the
-//! bonds of every point. Later passes read its results at point i, or at both i and j. A pass begins with a
-//! halo exchange if it reads values that other ranks have changed: first the displacements, then thresholds
-//! or the point numbers. Point numbers are values of a point that its law computes from sums over its bonds,
-//! such as the dilatation. Interior points are processed while messages are in flight.
+//! bonds of every point. Later passes read the results of a pass at point i, or at both i and j. A pass
+//! begins with a halo exchange if it reads values that other ranks have changed: first displacements and
+//! thermal stretches, later thresholds and point numbers. Point numbers are values of a point that its law
+//! computes from sums over its bonds, such as the dilatation. Interior points are processed while messages
+//! are in flight.
 //!
-//! Bonds break in the pass that sums the forces, by the force states of both ends. Those point numbers that
-//! depend on broken bonds are then recomputed, see `broken.rs`.
+//! Bonds that meet their criterion break in the pass that sums the forces. Those point numbers that depend on
+//! broken bonds are then recomputed, see `broken.rs`.
 
 mod bond_inputs;
 mod broken;
@@ -141,8 +142,8 @@ impl<const D: usize> Forces<D> {
     /// points have thermal stretches. [`Self::find_constants`] must be called afterwards. Collective.
     ///
     /// # Errors
-    /// If no instruction set has the [requested name](Instructions::of_all); the error is the same on all
-    /// ranks.
+    /// If no instruction set has the [requested name](Instructions::of_all), or if a rank has none of the
+    /// sets. The error is the same on all ranks.
     pub fn new(
         comm: &dyn Communicator,
         model: &Model<D>,
@@ -193,8 +194,9 @@ impl<const D: usize> Forces<D> {
         })
     }
 
-    /// Compute the constants of the points from the intact bonds of their families. Call after pre-cracks
-    /// are cut and before other bonds break. Collective.
+    /// Compute the constants of the points from sums over their initial families. Also set the columns of
+    /// `limits` that are read: the truncation factors, and the thresholds unless one of them follows the
+    /// smallest stretch. Call after pre-cracks are cut and before other bonds break. Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
         if read.thresholds && !self.passes.contains(&Pass::SmallestStretch) {
@@ -306,7 +308,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Number of bonds of the owned points from each block to each block, including broken ones. A bond
-    /// between two owned points counts twice.
+    /// between two owned points of one block counts twice.
     pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
         let all = self.interactions.iter().map(|i| &i.bonds);
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))

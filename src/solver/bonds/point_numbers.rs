@@ -67,7 +67,7 @@ impl PointNumbers {
         }
     }
 
-    /// Compute the constants of some owned points from the columns of sums over their whole families. Also
+    /// Compute the constants of some owned points from the columns of sums over their initial families. Also
     /// compute their [truncation factors](Law::truncation_factor), unless that column is empty.
     pub fn set_constants<const D: usize>(
         &mut self,

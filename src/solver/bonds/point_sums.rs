@@ -7,7 +7,7 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Request the extensions of the bonds, but no other quantities of the deformed bonds.
+/// Request x of the bonds, but neither their stretch nor their extension over the deformed length.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,

@@ -31,7 +31,7 @@ const CACHE_CAPACITY: usize = 256;
 /// Point data that kernels read.
 #[derive(Clone, Copy)]
 pub struct PointData<'a, const D: usize> {
-    /// Packed positions, displacements and volumes for lists; empty without lists.
+    /// Packed positions, displacements, volumes and thermal stretches for lists; empty without lists.
     pub nodes: &'a [Node],
     /// Point numbers by column, for lists.
     pub numbers: &'a [Column],
@@ -85,7 +85,7 @@ trait Runner<P: Part>: Sync {
         results: <Self::Sums as LaneTuple>::ColumnsMut<'_>,
     ) -> Vec<BrokenSums>;
 
-    /// Instruction sets for which it is compiled.
+    /// Instruction sets for which the runner is compiled.
     const ISA_SET: IsaSet;
 }
 
@@ -348,14 +348,14 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
     }
 }
 
-/// Number of lane groups that skip the fast path after a failed attempt, because large strains occur in
-/// clusters.
+/// Number of lane groups that skip the fast path after a failed attempt. The fast path is a loop without
+/// failure criterion; it fails if |x| of a bond exceeds the limit of the series. Large |x| occur in clusters.
 const FAST_PATH_BACKOFF: usize = 7;
 
 /// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates
 /// their time.
 struct FastPathGate {
-    /// Whether the fast path is allowed.
+    /// Whether the kernel may skip its criterion, and does not remove thermal stretches.
     is_allowed: bool,
     /// Number of lane groups that must still skip the fast path.
     skipped: usize,
@@ -438,7 +438,7 @@ struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.
     points: GridPoints<'p, K, D>,
-    /// The bits of all bonds, broken or not, if the kernel reads them.
+    /// The bits of all bonds, including broken bonds, if the kernel reads them.
     whole: Option<&'t [u8]>,
     vector: &'t mut VectorBonds<'v>,
 }
@@ -586,7 +586,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
 struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
-    /// For kernels that need them, the bits of all bonds of all lane groups, broken or not.
+    /// The bits of all bonds of all lane groups, including broken bonds; empty if the kernel does not need
+    /// them.
     whole: Vec<u8>,
 }
 

@@ -35,8 +35,8 @@ const CHECK_INTERVAL: u32 = 20;
 /// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
 ///
-/// The result is `None` if the body has no fracture energy, has points from a file, or does not separate, and
-/// if its families are too large.
+/// The result is `None` if the body has no fracture energy, is on no lattice, has no possible law, has too
+/// large families, or does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;

@@ -1,4 +1,4 @@
-//! Check that loads, supports and initial values are finite at all of their points.
+//! Check that loads, supports, temperatures and initial values are finite at all of their points.
 
 use std::ops::Range;
 
@@ -14,11 +14,11 @@ use super::members;
 /// Subjects of the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
-/// Check that every condition is finite at all of its points at a time (s), and every initial value at the
-/// start. Collective.
+/// Check that every condition of the stage is finite at all of its points at a time (s), and every initial
+/// value at the start. Also check that thermal stretches are above −1. Collective.
 ///
 /// # Errors
-/// The message names the first entry of the deck that is not finite, and its point with the smallest id.
+/// The message names the first entry of the deck that fails the check, and its point with the smallest id.
 /// The error is the same on all ranks.
 pub fn are_finite<const D: usize>(
     problem: &Problem,

@@ -76,7 +76,8 @@ impl LoadFactors {
         self.settle();
     }
 
-    /// A whole number below 2⁵² that differs for different sequences of requests.
+    /// A whole number below 2⁵² that differs for different sequences of requests, up to rare coincidences of
+    /// the hash.
     pub fn fingerprint(&self) -> f64 {
         (self.requests >> 12) as f64
     }

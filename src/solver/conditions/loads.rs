@@ -15,7 +15,8 @@ pub struct Load<const D: usize> {
     /// Factor that an observer has set.
     scale: f64,
     now: [At; D],
-    /// Whether the force density must be computed: it has changed, or the caller has requested all loads.
+    /// Whether the force density must be computed: it may have changed, or the caller has requested all
+    /// loads.
     pub is_due: bool,
 }
 

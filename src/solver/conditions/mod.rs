@@ -257,8 +257,8 @@ impl<const D: usize> Conditions<D> {
         !self.loads.is_empty()
     }
 
-    /// Prepare the positions of supported points at `time` (s). `step` is the length of the last step (s), 0
-    /// at the start.
+    /// Prepare the displacements of supported points at `time` (s). `step` is the length of the last step
+    /// (s), 0 at the start.
     pub fn set_places(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
             support.set_place(time, step);

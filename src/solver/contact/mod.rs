@@ -1,10 +1,10 @@
 //! Contact: repulsion, friction and damping between points that no intact bond joins.
 //!
 //! Every owned point has a list of the points that it may touch before the next search. The list is in
-//! ascending order of ids, so the order of the force sum does not depend on the ranks. The lists are
-//! rebuilt when a point has moved by half the skin since the last search. A pair touches if its distance is
-//! below its contact distance. The contact distance never exceeds the reference distance, so a body at rest
-//! has no contact forces. Crack faces consist of points whose bonds have broken.
+//! ascending order of ids, so the order of the force sum does not depend on the ranks. The lists are rebuilt
+//! when a point has moved by half the skin since the last search. A pair touches if its distance is below its
+//! contact distance. The contact distance never exceeds the reference distance, so an undeformed body has no
+//! contact forces. Crack faces consist of points whose bonds have broken.
 //!
 //! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so their states
 //! are identical.
@@ -66,7 +66,8 @@ pub struct Contact<const D: usize> {
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
-    /// Owned points that touch a rigid body, by the last evaluation and the one before.
+    /// Owned points that touch a rigid body or will do so within the look-ahead, by the last evaluation and
+    /// the one before.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
     /// Owned points that may touch a point to which no bond joins them.
@@ -78,7 +79,8 @@ pub struct Contact<const D: usize> {
     is_stale: bool,
     /// Limits that contact sets for the time step.
     demand: StepDemand,
-    /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N².
+    /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N²; 0 if this
+    /// evaluation was not quasi-static.
     rigid_forces: ExactSum,
     /// Buffers of [`Self::add_forces`]: the points with contact forces, and the forces on each of them.
     active: Vec<u32>,
@@ -218,7 +220,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N².
+    /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N²; 0 if this
+    /// evaluation was not quasi-static.
     pub fn rigid_forces(&self) -> &ExactSum {
         &self.rigid_forces
     }
@@ -291,7 +294,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Find the owned points that have contact forces now, or had some at the last evaluation.
+    /// Find the owned points that may have contact forces now, or had some at the last evaluation.
     fn find_active(
         &mut self,
         model: &Model<D>,

@@ -91,7 +91,7 @@ pub(super) struct Demand {
     pub damping: f64,
 }
 
-/// The contact force between two points.
+/// The contact force between two points, or of a rigid body on a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch<const D: usize> {
     /// Repulsive force on the first point, N; it has the potential `energy`.
@@ -194,8 +194,8 @@ impl PairRule {
         })
     }
 
-    /// Contact force of the second point on the first; `None` if they do not touch. If the points are
-    /// exchanged, the forces are exactly opposite.
+    /// Contact force of the second point on the first; `None` if they do not touch or if they coincide. If
+    /// the points are exchanged, the forces are exactly opposite.
     pub fn touch<const D: usize>(
         &self,
         first: &ContactPoint<D>,

@@ -63,7 +63,7 @@ pub(super) struct RigidBody {
     layers: Vec<f64>,
 }
 
-/// Sums of the forces and torques of points on a body.
+/// Exact sums of the forces and torques that the points exert on a rigid body.
 pub(super) struct WrenchSums {
     /// Sums of contact, friction and damping.
     sums: [[ExactSum; WRENCH]; 3],
@@ -167,7 +167,7 @@ impl RigidBody {
         })
     }
 
-    /// Apply half a kick, and advance to a time (s) by a step (s).
+    /// Advance to a time (s) by a step (s). A free body gets half a kick first.
     pub fn drift(&mut self, time: f64, step: f64) {
         match &self.problem.motion {
             RigidMotion::Driven(displacement) => {
@@ -327,8 +327,8 @@ impl RigidBody {
     }
 
     /// Contribution of a point to the step limits; `None` if it does not touch the body and will not touch it
-    /// within a time (s) at its present approach speed. The velocities of points with a gap of more than an
-    /// edge are not needed.
+    /// within a time (s) at its present approach speed. It is also `None` for a gap of more than an edge, at
+    /// any velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -379,7 +379,7 @@ impl RigidBody {
         let largest = if self.dimension.count() == 2 {
             inverse[(2, 2)]
         } else {
-            // No eigenvalue exceeds the largest row sum.
+            // No eigenvalue exceeds the largest row sum of absolute values.
             let rows = inverse
                 .row_iter()
                 .map(|row| row.iter().map(|entry| entry.abs()).sum::<f64>());

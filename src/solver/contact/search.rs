@@ -13,12 +13,13 @@ use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
 /// Skin as a fraction of the largest contact distance. It is the distance by which two points may approach
-/// between searches. With this skin, the rows of a lattice at rest contain only nearest neighbours.
+/// between searches. With this skin and penalty contact, the rows of a lattice at rest contain only nearest
+/// neighbours.
 const SKIN: f64 = 0.4;
 
 impl<const D: usize> Contact<D> {
-    /// Repeat the search if a point has moved by more than half the skin. Returns whether all positions are
-    /// finite on all ranks. Collective.
+    /// Repeat the search if the lists are stale or if a point has moved by more than half the skin. Returns
+    /// whether all positions are finite on all ranks. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,

@@ -47,7 +47,8 @@ pub struct StepControl {
 }
 
 impl StepControl {
-    /// Start a stage in which the deck or the stable step gives this step (s).
+    /// Start a stage. `step` (s) is the time step of the stage without adaptation: the fixed step of the
+    /// deck, or the one from the stable step.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);

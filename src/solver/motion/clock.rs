@@ -1,7 +1,7 @@
 //! The clock of a run: time, step and number of steps.
 
-/// Time, step and step count. The step may change. Between changes, time is a multiple of the step, so
-/// round-off does not accumulate.
+/// Time, step and step count. The step may change. The time since the last change is a multiple of the step,
+/// so round-off does not accumulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
     /// Time (s) and step number at the last change of the step.
@@ -31,7 +31,7 @@ impl Clock {
         [since, self.since.1, before, step, self.number]
     }
 
-    /// Decode a clock from [`Self::words`], in a run that ends at `end` (s).
+    /// Decode a clock from [`Self::words`], in a stage that ends at `end` (s).
     pub fn of_words([since, at, before, step, number]: [u64; 5], end: f64) -> Self {
         let [since, before, step] = [since, before, step].map(f64::from_bits);
         Self {
@@ -64,7 +64,7 @@ impl Clock {
         self.number
     }
 
-    /// End of the run, s.
+    /// End of the present stage, s.
     pub fn end(&self) -> f64 {
         self.end
     }

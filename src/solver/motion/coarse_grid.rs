@@ -1,11 +1,12 @@
 //! The coarse grid of a preconditioner, for the long waves of the displacement of a body.
 //!
-//! A grid of box cells covers all bodies. Each edge is at least one horizon long. Displacements are defined
-//! at the nodes and are linear along each axis within a cell. The stiffness is that of the classical solid.
-//! The elastic constants of a cell are averages over its points, weighted by volume and by the fraction of
-//! intact bonds. Supported components of points are springs at their position in the cell. Forces on points
-//! are distributed to the nodes of their cells (restriction). Displacements of nodes are interpolated to
-//! the points (prolongation) with the same weights, so the preconditioner is symmetric.
+//! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
+//! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
+//! a cell. The stiffness is that of the classical solid. The elastic constants of a cell are averages over
+//! its points, weighted by volume and by the fraction of intact bonds. Supported components of points are
+//! springs at their position in the cell. Forces on points are distributed to the nodes of their cells
+//! (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same weights,
+//! so the preconditioner is symmetric.
 //!
 //! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
 //! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of
@@ -81,7 +82,7 @@ struct CellPosition<const D: usize> {
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Create a grid that covers all points, with cells of a few horizons (m). Collective.
+    /// Create a grid that covers all points, with cells of one horizon (m) or more. Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -365,8 +366,9 @@ struct Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// Create the shape for a box with these lengths (m) and cells with at least this edge (m). Nodes are
-    /// numbered first along the axis with the fewest nodes, which gives the narrowest band.
+    /// Create the shape for a box with these lengths (m) and cells with at least this edge (m); a shorter
+    /// axis has one cell. Nodes are numbered first along the axis with the fewest nodes, which gives the
+    /// narrowest band.
     fn new(length: [f64; D], edge: f64) -> Self {
         let cells = length.map(|length| ((length / edge) as usize).max(1));
         let mut axes: [usize; D] = std::array::from_fn(|d| d);

@@ -10,7 +10,7 @@ use crate::solver::model::Model;
 /// Name, unit and treatment of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Description {
-    /// Name in standard terms.
+    /// Name of the field; in checkpoints, its columns have this name and the index of the component.
     pub name: &'static str,
     /// SI unit of the values; `1` for dimensionless values.
     pub unit: &'static str,
@@ -19,7 +19,7 @@ pub struct Description {
     pub state: bool,
     /// Whether a rollback of a step restores the field.
     pub undone: bool,
-    /// Effect of creating or removing a point during a run on the field.
+    /// Effect on the field if a point is created or removed during a run.
     pub birth: Birth,
     /// Name of the field in decks; `None` if decks cannot request it.
     pub output: Option<Field>,
@@ -237,15 +237,16 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Energy of the zero-energy control that the point would have without plastic flow, J/m³; none without
-    /// plasticity.
+    /// Energy density of the zero-energy control that the point would have if plastic flow did not reduce the
+    /// control, J/m³; none without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density that plastic flow of a point has dissipated, J/m³; none without plasticity.
+    /// Energy density that plastic flow of a point and the reduction of its zero-energy control have
+    /// dissipated, J/m³; none without plasticity.
     plastic_work: Option<Vec<f64>> = Description {
         name: "plastic_work",
         unit: "J/m^3",
@@ -619,7 +620,7 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Set friction and contact damping to 0, because they do not act in a relaxation.
+    /// Set friction and contact damping to 0, because they do not act in load steps.
     pub fn clear_dissipative_contact(&mut self) {
         let forces = [&mut self.friction, &mut self.contact_damping];
         let columns = forces.into_iter().flatten().flatten();
@@ -630,7 +631,7 @@ impl<const D: usize> Fields<D> {
     /// point without bonds, which does not move.
     ///
     /// # Panics
-    /// In a run without relaxation.
+    /// In a run without load steps.
     pub fn relaxation_density(&self) -> RelaxationDensity<'_> {
         RelaxationDensity {
             bonds: self.fictitious_density.as_deref().expect("a relaxation"),

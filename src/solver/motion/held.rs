@@ -76,8 +76,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// Call `look` at the first and at the last load step of a stage, until it returns a value. Its arguments
     /// are the simulation with the loads and supports of this load step, the pieces, and the time, s.
     ///
-    /// `look` is not called for explicit stages, nor in runs with contact, because contact can hold pieces,
-    /// too. Afterwards, the loads and supports of the first stage at time 0 act again. Collective.
+    /// `look` is not called for explicit stages and for stages without loads. It is not called in runs with
+    /// contact either, because contact can hold pieces. Afterwards, the loads and supports of the first stage
+    /// at time 0 act again. Collective.
     fn at_load_steps<T>(
         &mut self,
         stage: usize,
@@ -160,7 +161,8 @@ impl<const D: usize> Simulation<'_, D> {
             }
             self.comm.max(&mut is_held);
             let sums = reduce(self.comm, &mut sums);
-            // The norm of forces with a given sum is smallest if they are equal.
+            // Forces on n points with the sum F have a norm of at least |F|/√n. A sum above √n times the
+            // allowed norm can therefore not be within the tolerance.
             let allowed = allowed * (piece.count as f64).sqrt();
             let unbalanced = |d: &usize| {
                 let force = sums[*d].abs();

@@ -10,9 +10,9 @@ use super::verlet::Verlet;
 
 /// The integration method of a stage.
 pub trait Integrator<const D: usize>: Send + Sync {
-    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending` says
-    /// whether the second half kick of the previous step must still be applied. Returns whether the second
-    /// half kick of this step must still be applied. Collective.
+    /// Make one step, with or without its second half kick, or one iteration of a load step.
+    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied.
+    /// Returns whether the second half kick of this step must still be applied. Collective.
     fn advance(&mut self, simulation: &mut Simulation<'_, D>, half_kick_pending: bool) -> bool;
 }
 

@@ -40,10 +40,10 @@ const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 pub struct LoadStep {
     /// Iterations made in this load step.
     pub iterations: u64,
-    /// Number of iterations since bonds broke in this load step.
+    /// Number of iterations since bonds last broke in this load step, or since its start.
     pub since_breaking: u64,
-    /// ‖f‖/(‖loads‖ + ‖reactions‖), where f is the total force on a point. It is 0 if f is round-off, and NaN
-    /// before the first load step.
+    /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
+    /// point. It is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation; NaN if all points are at rest.
     pub(super) damping: f64,
@@ -253,8 +253,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Break the bonds that reach their criterion at the present equilibrium. If no bond breaks, the load
-    /// step is finished. Returns whether any bond broke. If so, the forces still include those of the broken
-    /// bonds.
+    /// step is finished. Returns whether any bond broke. If so, the forces no longer include those of the
+    /// broken bonds, and the reactions must be recomputed.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;

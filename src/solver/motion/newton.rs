@@ -251,7 +251,7 @@ impl<const D: usize> Vectors<D> {
         simulation.newton.adapt(linear, force);
     }
 
-    /// Make one Newton iteration.
+    /// Make one Newton iteration: solve K x = f, move the points along x by the line search, and adapt η.
     fn iterate(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         simulation.load_step.iterations += 1;
         simulation.load_step.since_breaking += 1;

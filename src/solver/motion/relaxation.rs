@@ -10,10 +10,10 @@
 //! c ← 2 √(u̇·¹K u̇ / u̇·ρ u̇),   ¹K u̇ = −(f_new − f_old)
 //! ```
 //!
-//! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1; it follows from the row sums
-//! of the stiffness. c is the critical damping of the present motion. It is a Rayleigh quotient with u̇
-//! rather than u, because differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the result is
-//! bitwise independent of ranks and threads.
+//! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1, times a reserve. It follows
+//! from the largest eigenvalue of the matrix D of each point. c is the critical damping of the present
+//! motion. The quotient is a Rayleigh quotient with u̇ rather than u, because differences of f along u̇ give
+//! ¹K u̇ exactly. All sums are exact, so the result is bitwise independent of ranks and threads.
 //!
 //! [`super::load_step`] defines the equilibrium and when bonds break.
 //!

@@ -1,6 +1,6 @@
 //! The state of a run in the layout of checkpoints: points are ordered by global id.
 //!
-//! It consists of the fields that are declared as state, and the bond state.
+//! The state consists of the fields that are declared as state, the bond state, and the progress of the run.
 
 use crate::comm::{IdOrder, agree};
 use crate::error::{Error, Result};

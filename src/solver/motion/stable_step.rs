@@ -1,9 +1,9 @@
 //! The stable time step: the largest one for which stability is guaranteed.
 //!
-//! The energy of a bond is ½ C (n·(u_j − u_i))² ≤ C ((n·u_i)² + (n·u_j)²), so the whole strain energy
-//! is at most Σ V u·(D u) with D = Σ V C n⊗n, and every frequency obeys ω² ≤ 2 λ_max(D)/ρ. Verlet is
-//! stable for Δt ≤ 2/ω, hence Δt = min √(2ρ/λ_max(D)). The usual Δt = √(2ρ/Σ V C) (Silling & Askari
-//! 2005) uses the trace of D instead: it is √3 times smaller in 3-D, √2 times in 2-D.
+//! The energy of a bond is ½ C (n·(u_j − u_i))² ≤ C ((n·u_i)² + (n·u_j)²), so the whole strain energy is at
+//! most Σ V u·(D u) with D = Σ V C n⊗n, and every frequency obeys ω² ≤ 2 λ_max(D)/ρ. Verlet is stable for Δt
+//! ≤ 2/ω, hence Δt = min √(2ρ/λ_max(D)). The usual Δt = √(2ρ/Σ V C) (Silling & Askari 2005) uses the trace of
+//! D instead. For a D with equal eigenvalues, this step is √3 times smaller in 3-D, and √2 times in 2-D.
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;

@@ -26,7 +26,7 @@ pub struct GlobalState {
     pub cracked_points: u64,
     /// Corners of the bounding box of the cracked points, m.
     pub cracked_extent: [[f64; 3]; 2],
-    /// Number of points with too few intact bonds for their law.
+    /// Number of singular points: points whose law gives no force.
     pub singular_points: u64,
     /// State of the present load step.
     pub load_step: LoadStep,

@@ -23,14 +23,16 @@ const CELL: f64 = 8.0;
 /// the initial distance.
 const NEARER: f64 = 0.9;
 
-/// Two points of bodies that bonds joined count if their distance is below this fraction of their spacing.
-/// Compression alone rarely reaches this distance.
+/// Two points of bodies that bonds joined count if their distance is below this fraction of their spacing and
+/// of their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Number of points that one task processes.
 const CHUNK: usize = 1 << 15;
 
-/// Two points of different bodies that are nearer than points of touching bodies can be.
+/// Two points of different bodies that are too near: nearer than their spacing, and nearer than 0.9 of their
+/// initial distance. If bonds joined the bodies, the limit is half of the spacing or of the initial distance,
+/// whichever is smaller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Bodies of the points, the lower index first.
@@ -124,8 +126,8 @@ impl ContactWatch {
         Self { pairs, spacing }
     }
 
-    /// Find the nearest two points of different bodies; `None` if no two points are nearer than points of
-    /// touching bodies can be. The result is the same on all ranks. Collective.
+    /// Find the nearest two points of different bodies; `None` if no two points are too near, see
+    /// [`Contact`]. The result is the same on all ranks. Collective.
     pub fn look<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
         let meetings = self.meetings(simulation);
         if meetings.is_empty() {

@@ -10,7 +10,8 @@ use crate::solver::Simulation;
 use super::centre_line::{Branch, Damaged, Reach, branches};
 use super::crack_points::{link, points_of, spacings};
 
-/// Minimum of the distance up to which damaged points are connected, in spacings, so that diagonal neighbours are connected for any horizon.
+/// Minimum, in spacings, of the distance up to which damaged points are connected. With this minimum,
+/// diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.5;
 
 /// A crack whose path is tracked.

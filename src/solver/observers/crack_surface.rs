@@ -30,7 +30,8 @@ use super::snapshot::Snapshot;
 
 type Vector = Vector3<f64>;
 
-/// Minimum of the distance up to which damaged points are connected, in spacings, so that diagonal neighbours are connected for any horizon.
+/// Minimum, in spacings, of the distance up to which damaged points are connected. With this minimum,
+/// diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.8;
 
 /// Relative tolerance of distance limits: a point at the limit counts as within it.

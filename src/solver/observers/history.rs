@@ -67,9 +67,10 @@ pub struct Energies {
     pub fracture: f64,
     /// Part of the fracture energy above the criterion of the bonds when they broke.
     pub overshoot: f64,
-    /// Work done by loads and supports.
+    /// Work done by loads and supports, and by the prescribed forces and motions of rigid bodies.
     pub work: f64,
-    /// Energy dissipated by viscous damping, bonds that yield, friction and contact damping.
+    /// Energy dissipated by viscous damping, plastic flow, softening, viscoelasticity, friction and contact
+    /// damping.
     pub dissipated: f64,
     /// Error of the energy balance kinetic (including rigid bodies) + strain + contact + fracture +
     /// dissipated − work; 0 for an exact integrator. The error is the change of this sum since the start.
@@ -99,7 +100,8 @@ impl HistoryObserver {
     /// Find the points of all sets, probes, fronts, crack paths and tips of the history.
     ///
     /// # Errors
-    /// If a set is empty or no point lies along the line of a front; the error is the same on all ranks.
+    /// If a set is empty, if no point lies along the line of a front, or if all points of a tip lie behind
+    /// its start. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;
@@ -405,7 +407,7 @@ pub fn column_names(problem: &Problem) -> Vec<(String, &'static str)> {
     columns.names().to_vec()
 }
 
-/// Whether a law of the problem can have points with too few bonds.
+/// Whether a law of the problem can have singular points, see [`Law::is_singular`].
 fn can_be_singular<const D: usize>(problem: &Problem) -> bool {
     let mut blocks = problem.blocks();
     blocks.any(|block| Law::<D>::needs_shape(&block_laws(problem, &block).law))

@@ -3,7 +3,7 @@
 use crate::problem::{Interval, Output};
 use crate::solver::motion::Clock;
 
-/// Schedule of output: at the start, after intervals, at given times, and at the end.
+/// Schedule of output: at the start, after intervals, at given times, and at the end of each stage.
 #[derive(Debug, Clone)]
 pub struct Schedule {
     interval: Option<Interval>,
@@ -28,8 +28,8 @@ impl Schedule {
         }
     }
 
-    /// Whether output is due: at the start, at the end, and in the first step that reaches a multiple of the
-    /// interval or a given time, up to round-off.
+    /// Whether output is due: at the start, at the end of a stage, and in the first step that reaches a
+    /// multiple of the interval or a given time, up to round-off.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;

@@ -205,8 +205,8 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     rows
 }
 
-/// Stretch of an owned point perpendicular to the plane or bar, for this deformation gradient. It is 1 if the
-/// strain in this direction is 0, and in 3-D.
+/// Stretch ratio (deformed over reference length) of an owned point perpendicular to the plane or bar, for
+/// this deformation gradient. It is 1 if the strain in this direction is 0, and in 3-D.
 fn stretch_across<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,

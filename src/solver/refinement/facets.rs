@@ -16,7 +16,7 @@ pub struct Facets {
 }
 
 impl Facets {
-    /// Find the facets of the broken bonds. Collective.
+    /// Find the facets of the broken bonds and of the suppressed nodes. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let model = &simulation.model;

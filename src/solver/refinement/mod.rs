@@ -1,10 +1,11 @@
 //! Refinement during a run: which points are refined or removed, and the state of new points.
 //!
-//! Points with much strain energy or damage trigger refinement: all points within a horizon of them are
-//! refined (Dipasquale et al. 2014, §2.1). A new point gets the mean state of its parents. It takes its
-//! volume from the parents in equal parts, so mass and momentum are conserved. Bonds between existing points
-//! do not change. A new bond starts broken if it crosses a pre-crack, or a face between points that a crack
-//! separates. No point is created between points that a crack separates.
+//! Points with much strain energy, with damage, or at which a condition of the deck is true trigger
+//! refinement: all points within a horizon of them are refined (Dipasquale et al. 2014, §2.1). A new point
+//! gets the mean state of its parents. It takes its volume from the parents in equal parts, so mass and
+//! momentum are conserved. Bonds that exist before and after the refinement keep their state. A new bond
+//! starts broken if it crosses a pre-crack, or a face between points that a crack separates. No point is
+//! created between points that a crack separates.
 
 use std::cell::OnceCell;
 use std::time::Instant;
@@ -255,8 +256,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         broken
     }
 
-    /// Break the bonds that were broken before the refinement, and bonds of new points that cross facets. The
-    /// last number of a row is the previous block of the point.
+    /// Break the bonds that were broken before the refinement, and new bonds that cross facets. The last
+    /// number of a row is the previous block of the point.
     fn inherit(
         &mut self,
         rows: &[f64],

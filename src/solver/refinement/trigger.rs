@@ -9,7 +9,8 @@ use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
-/// A point in messages to all ranks: it marks the points within its horizon.
+/// A point that triggers refinement or has broken bonds, in messages to all ranks. Points within its horizon
+/// are refined or not coarsened.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Source {
@@ -34,8 +35,9 @@ const MOST_PLACES: f64 = 1e4;
 /// Check that a run supports the refinement of its problem.
 ///
 /// # Errors
-/// If horizons have very many spacings, or loads act on sets given by ids. For refinement during a run, also
-/// with relaxation or with steps that are rolled back.
+/// If horizons have very many spacings, or if loads or temperatures act on sets given by ids or by groups of
+/// meshes. For refinement during a run, also with scatter of the strength, with load steps, or with an
+/// adaptive step.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
