@@ -102,6 +102,7 @@ fn a_wrong_row_is_named_with_its_line() {
             "id vx\n63 1\n",
             ":2: id must be at most 62, the id of the last point, is 63",
         ),
+        ("repeated", "id vx VX\n7 1 2\n", ":1: has two columns `vx`"),
         (
             "twice",
             "id vx\n7 1\n8 1\n7 2\n",
@@ -123,4 +124,44 @@ fn a_wrong_row_is_named_with_its_line() {
             );
         }
     }
+}
+
+#[test]
+fn a_rebalance_does_not_read_the_file_again() {
+    let folder = Folder::new("initial_rebalance");
+    let text = (0..63).fold(String::from("vx\n"), |text, id| format!("{text}{id}\n"));
+    folder.write("all.txt", &text);
+    let deck = format!("{DECK}initial.push.file = 'all.txt'");
+    let problem = deck::parse(&Source::new(folder.join("plate.toml"), deck)).unwrap();
+    let parts = threads::run(2, |comm| {
+        let mut simulation = Simulation::<2>::new(&problem, comm).unwrap();
+        let before = state(&simulation).1;
+        // The exchange is a barrier: both ranks have read the file.
+        comm.max(&mut [0.0]);
+        if comm.rank() == 0 {
+            std::fs::remove_file(folder.join("all.txt")).unwrap();
+        }
+        comm.max(&mut [0.0]);
+        let moved = simulation.repartition([3000, 1000][comm.rank()]).unwrap();
+        (moved, before, state(&simulation).1)
+    });
+    assert!(parts[0].0 > 0);
+    let (before, after) = parts
+        .into_iter()
+        .map(|(_, before, after)| (before, after))
+        .unzip();
+    assert_eq!(whole(before), whole(after));
+}
+
+#[test]
+fn columns_that_are_not_read_cause_a_warning() {
+    let folder = Folder::new("initial_columns");
+    folder.write("all.txt", "id x vx u_y uz\n0 1 2 3 4\n");
+    let deck = format!("{DECK}initial.push.file = 'all.txt'");
+    let problem = deck::parse(&Source::new(folder.join("plate.toml"), deck)).unwrap();
+    let warnings: Vec<_> = problem.warnings.iter().map(|w| &w.message[..]).collect();
+    assert!(
+        warnings.contains(&"[initial.push] file: these columns are not read: x, u_y, uz"),
+        "{warnings:?}"
+    );
 }
