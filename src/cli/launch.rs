@@ -109,8 +109,8 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Return the number of threads: as requested, else Slurm's cores per task, else an even share of the
-/// available cores.
+/// Return the number of threads: as requested, else Slurm's cores per task, else the cores of this process.
+/// If the launcher has not bound the process to cores, ranks on one host share the cores evenly.
 pub fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };

@@ -111,7 +111,7 @@ fn a_difference_is_found_with_its_point_and_time() {
     );
     expect(&output, 1, &["kinetic_energy"]);
 
-    // The relative difference of energies is twice the difference of displacements.
+    // The relative difference of energies is twice the relative difference of displacements.
     expect(
         &compare(&first, &other, &["--tolerance", "0.0015"]),
         1,

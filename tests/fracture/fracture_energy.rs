@@ -150,7 +150,8 @@ fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
             (0..D).all(|k| k == axis || place[k].abs() < 1e-9)
         };
         let line = (0..model.owned()).filter(on_line);
-        // A bond that has yielded releases only the energy that it has not dissipated before.
+        // A bond that has yielded releases only the energy that it has not dissipated before, so both
+        // energies count.
         let fields = &simulation.fields;
         let [freed, overshoot] =
             [&fields.freed_energy, &fields.overshoot_energy].map(|field| field.as_ref().unwrap());
@@ -312,7 +313,8 @@ fn by_energy(law: &str, growth: f64, [strain, stress, space]: [Range<f64>; 3]) {
 #[test]
 fn by_the_energy_of_bonds_of_correspondence() {
     // A broken bond changes the deformation gradients of both ends, and thus the energies of the other bonds
-    // of both ends. The total cost is therefore less than the sum of the energies of the broken bonds.
+    // of both ends. The total cost therefore differs from the sum of the energies of the bonds at their
+    // breaking.
     by_energy(CORRESPONDENCE, 0.01, [0.93..1.02, 0.95..1.01, 0.85..0.9]);
     by_energy(WAN, 0.01, [0.78..0.85, 0.77..0.85, 0.66..0.71]);
 }
@@ -327,7 +329,8 @@ fn by_the_energy_of_bonds_of_bond_associated_correspondence() {
 #[test]
 fn by_the_energy_of_bonds_of_the_ordinary_law() {
     // A broken bond changes the energy of the other bonds of both ends. The released energy exceeds the
-    // energy of the broken bonds if the dilatation resists (ν above 1/4), and is smaller otherwise.
+    // energy of the broken bonds if ν is above the ratio of a bond-based law (1/4, or 1/3 in plane stress),
+    // and is smaller otherwise.
     let [low, high] = [0.1, 0.4].map(|ratio| ordinary(ratio, "constant"));
     by_energy(&low, 0.01, [0.94..0.96, 0.94..0.96, 0.9..0.93]);
     by_energy(&high, 0.01, [1.1..1.15, 1.0..1.02, 1.05..1.1]);
@@ -527,7 +530,7 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
         (PMB, STRETCH, vec![None, Some(&tough), Some(&weak)]),
         (NORMALISED, STRETCH, vec![Some(&tough)]),
         (&*soft, STRETCH, vec![None]),
-        // Bonds between the bodies break by energy, and bonds within a body break by stretch.
+        // Bonds between the bodies break by energy. Bonds within a body never break, or break by stretch.
         (&*soft, ENERGY, vec![None, Some(&tough)]),
         (CORRESPONDENCE, ENERGY, vec![None, Some(&tough_by_work)]),
     ] {

@@ -54,7 +54,7 @@ impl Case {
     /// Return the damage laws that the law supports, with this α.
     pub(super) fn damages(&self, alpha: f64) -> Vec<String> {
         let stretch = self.law.critical_stretch.map(|_| damage(alpha));
-        // The fracture energies correspond to a critical stretch of about 0.02.
+        // A fracture energy of 0.004 J/m² corresponds to a critical stretch of about 0.02.
         let energy = |fracture_energy: f64, more| {
             let text = format!("fracture_energy = {fracture_energy}, alpha = {alpha}{more}");
             format!("damage.brittle.energy = {{ {text} }}")
@@ -163,7 +163,7 @@ fn nothing_at_rest_and_under_translation() {
         let scale = force_scale(&mut simulation);
         displace(&mut simulation, |x| x);
         assert_eq!(largest_force(&simulation), 0.0);
-        // Displacements that are sums of powers of two have no rounding errors.
+        // Positions and these displacements are multiples of 1/4, so their sums have no rounding errors.
         displace(&mut simulation, |x| [x[0] + 0.5, x[1] - 4.25, x[2] + 64.0]);
         assert_eq!(largest_force(&simulation), 0.0);
         displace(&mut simulation, |x| {
@@ -836,7 +836,8 @@ fn bonds_of_a_no_failure_zone_hold() {
             intact_bonds(&mut simulation)
         });
         let bonds: Vec<_> = parts.into_iter().flatten().collect();
-        // x = (id mod 22) + ½. Exactly the bonds with an end at x < 8 remain.
+        // x = (id mod 22) + ½. All remaining bonds have an end at x < 8, and the point in the corner has kept
+        // all of its bonds.
         let left = |id: u64| id % 22 < 8;
         assert!(bonds.iter().all(|(a, b)| left(*a) || left(*b)));
         let corner = bonds.iter().filter(|(a, _)| *a == 0).count();
@@ -869,7 +870,8 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
                 _ => {}
             }
         }
-        // Opening the crack stretches no intact bond.
+        // Move the upper half up. Beside the crack this stretches no intact bond, so forces act only ahead of
+        // the tip.
         displace(&mut simulation, |x| match x {
             [a, b, c] if b > 9.0 => [a, b + 0.5, c],
             same => same,

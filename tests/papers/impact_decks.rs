@@ -307,7 +307,7 @@ fn a_tube_breaks_alike_on_a_lattice_and_not_with_scatter() {
         "momentum_x",
         "momentum_y",
     ];
-    // Return the lateral momentum as a fraction.
+    // Return the sum of the absolute lateral components of the momentum, kg m/s.
     let run = |jitter, modulus| {
         simulate_input::<3, _>(
             "fragmenting_cylinder",

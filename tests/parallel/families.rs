@@ -77,7 +77,7 @@ velocity = ['0.02*x', '0.02*y + 0.003*sin(x)']
 end = 6
 ";
 
-/// Return all fields that depend on bonds, sorted by global id.
+/// Return fields that depend on bonds, each with its values sorted by global id.
 fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
     let fields = [
         Field::Displacement,
