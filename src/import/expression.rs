@@ -14,7 +14,7 @@ const LONGEST: usize = 4096;
 /// Source language of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dialect {
-    /// C statements that set `value`.
+    /// C: a formula, or statements that set `value`.
     Peridigm,
     /// Julia.
     PeriLab,

@@ -54,7 +54,7 @@ fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
     warnings.push(Warning::new(message).at(&condition.place));
 }
 
-/// The components of the motion that a condition prescribes; `None` for loads.
+/// The components of the motion that a condition prescribes; `None` for loads and temperatures.
 fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     match &condition.action {
         Action::Displacement(values) | Action::Velocity(values) => Some(values),
@@ -200,7 +200,7 @@ fn layer<const D: usize>(
     }
 }
 
-/// The cell edges of a body, m; `default` for points from a file.
+/// The cell edges of a body, m; `default` for points from a file or mesh.
 fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     match &problem.bodies[body].points {
         PointSource::Lattice { spacing, .. } => *spacing,

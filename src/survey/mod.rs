@@ -169,7 +169,8 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    // A bond that softens carries almost no force near its critical stretch.
+    // A bond that softens carries almost no force near its critical stretch, so bodies that break by their
+    // law are not checked.
     let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
     let of_bodies = of_damage.filter_map(|body| {
         let law = block_laws(problem, &Block::unrefined(body)).damage?;

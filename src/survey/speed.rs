@@ -34,7 +34,7 @@ pub struct Speed {
     pub times: Times,
     /// Messages of the steps.
     pub sent: Traffic,
-    /// Messages of as many halo exchanges without overlap.
+    /// Messages of one exchange of displacements per step, without overlap.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
