@@ -19,8 +19,9 @@
 //! mean `(not x) < 1`. A `!` at the start of a comparison therefore requires parentheses.
 //!
 //! The variables are `x`, `y`, `z` and `t`, where the deck allows these; the only constant is `pi`. These
-//! names hide parameters of the same name; names of functions do not. Names of [tables](Table) are values by
-//! time, and are allowed where `t` is allowed. The functions are:
+//! names hide parameters of the same name; names of functions do not. In keys that are functions of the
+//! length of a bond, `r` is the only variable; elsewhere `r` can be a parameter. Names of [tables](Table) are
+//! values by time, and are allowed where `t` is allowed. The functions are:
 //!
 //! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
@@ -29,14 +30,14 @@
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
 //! - `step(a)`: 0 if `a < 0`, otherwise 1;
 //! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
-//!   after `start`, it jumps at `end`;
+//! after `start`, it jumps at `end`;
 //! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The other argument has no effect,
-//!   even if it is infinite or NaN.
+//! even if it is infinite or NaN.
 //!
 //! # Powers
 //!
 //! If the exponent is an integer from -16 to 16, `a ^ b` is computed by multiplication (`f64::powi`), so that
-//! `x^2` is exactly `x * x`. All other powers use `f64::powf`. The choice depends only on the exponent's
+//! `x^2` is exactly `x * x`. All other powers use `libm::pow`. The choice depends only on the exponent's
 //! value, not on its notation.
 
 mod evaluate;

@@ -333,8 +333,8 @@ struct Matches {
 }
 
 impl Matches {
-    /// Match each time of the first list with the nearest unmatched time of the second list, within
-    /// [`TIME_TOLERANCE`].
+    /// Match each time of the first list with the nearest unmatched time of the second list, within the
+    /// larger of [`TIME_TOLERANCE`] and [`ROUND_OFF`].
     fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
         let reach = |index: usize, time: f64| {
