@@ -127,7 +127,7 @@ fn is_bound() -> bool {
     cores() < cores_of_host()
 }
 
-/// Return the number of cores of this host.
+/// Return the number of cores of this host, available to this process or not.
 fn cores_of_host() -> usize {
     let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
     cores_in(&list).max(cores())

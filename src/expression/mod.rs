@@ -76,14 +76,12 @@ pub const POSITION_AND_TIME: [Variable; 4] = [Variable::X, Variable::Y, Variable
 pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 impl Variable {
-    /// Find the variable of this name.
     fn from_name(name: &str) -> Option<Self> {
         [Self::X, Self::Y, Self::Z, Self::T, Self::R]
             .into_iter()
             .find(|variable| variable.name() == name)
     }
 
-    /// Name of the variable.
     fn name(self) -> &'static str {
         match self {
             Self::X => "x",

@@ -48,7 +48,6 @@ impl Constants {
         }
     }
 
-    /// Return the number of a constant.
     fn get(&self, key: &str) -> Option<f64> {
         let (_, value, _) = self.given.iter().find(|(known, ..)| *known == key)?;
         Some(*value)

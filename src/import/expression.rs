@@ -409,7 +409,7 @@ impl Rewriter<'_> {
         Ok(text)
     }
 
-    /// Translate a function call.
+    /// Translate a function call. A function without a template keeps its name.
     fn call(&self, name: &str, tokens: &[Token], depth: usize) -> Result<String, String> {
         let mut arguments = vec![Vec::new()];
         let mut level = 0_i64;

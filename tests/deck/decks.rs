@@ -130,7 +130,6 @@ enum Change {
     Insert(Index, String),
 }
 
-/// The replacement of a token.
 #[derive(Debug, Clone)]
 enum Token {
     /// A copy of another token of the deck.
