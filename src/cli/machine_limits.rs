@@ -166,7 +166,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     (multiply_adds_any, 2)
 }
 
-/// Perform multiplications and additions, for instruction sets without fused multiply-adds.
+/// Perform multiplications and additions without instructions of a particular processor.
 fn multiply_adds_any(factor: f64, term: f64) {
     let mut sums = [[term; 2]; SUMS];
     for _ in 0..LENGTH {

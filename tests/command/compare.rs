@@ -6,7 +6,7 @@ use std::process::Output;
 use crate::support::command::{Folder, finish, fissure, succeed, text};
 use fissure::output::ResultReader;
 
-/// A pulled bar; its right half is the set `right`.
+/// A plate with an initial velocity; its right half is the set `right`.
 const DECK: &str = "
 dimension = 'plane-stress'
 parameters = { pull = 1, end = 2e-6 }

@@ -400,8 +400,8 @@ fn a_relaxed_body_yields_as_one_that_is_pulled() {
     });
 }
 
-/// Pull a bar without hardening to 1 % strain. Return its load divided by the yield load, and the error of
-/// the energy balance divided by the work.
+/// Pull a bar with hardly any hardening until it is 1 % longer. Return its load divided by the yield load,
+/// and the error of the energy balance divided by the work.
 fn limit_load(control: &str) -> [f64; 2] {
     let text = format!(
         "dimension = '3d'

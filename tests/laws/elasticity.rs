@@ -87,7 +87,7 @@ fn bulk_stiffness_of_the_prototype_law_on_a_cubic_lattice() {
 
 #[test]
 fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
-    // The central point is two horizons from the surface. Its neighbours then also have complete families,
+    // The central point is three horizons from the surface. Its neighbours then also have complete families,
     // and the normalised law gives them the same constant.
     for (dimension, own) in [
         ("plane-stress", 1.0 / 3.0),
@@ -111,7 +111,8 @@ fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
                     "3d" => simulate::<3, _>(&deck, |mut s| response(&mut s, map)),
                     _ => simulate::<2, _>(&deck, |mut s| response(&mut s, map)),
                 };
-                // Classical: σ = E ε/(1−2ν) in 3-D, E ε/(1−ν) and E ε/((1+ν)(1−2ν)) in the plane.
+                // Classical: σ = E ε/(1−2ν) in 3-D, E ε/(1−ν) in plane stress, and E ε/((1+ν)(1−2ν)) in plane
+                // strain.
                 let (count, modulus) = match dimension {
                     "3d" => (3.0, 5.0 / (1.0 - 2.0 * ratio)),
                     "plane-stress" => (2.0, 5.0 / (1.0 - ratio)),
@@ -314,7 +315,7 @@ fn a_bar_that_contracts_freely_has_youngs_modulus_and_no_stress_across() {
             (dilatation / wanted - 1.0).abs() < 1e-9,
             "{law}: {dilatation}"
         );
-        // The cross-section changes by the factor F^(−2ν).
+        // The cross-section changes by the factor F^(−2ν), so the volume changes by F^(1 − 2ν).
         let volume = libm::pow(stretch, 1.0 - 2.0 * ratio);
         assert!(
             (cauchy * volume / stress[0] - 1.0).abs() < 1e-12,
@@ -519,7 +520,7 @@ fn long_waves_on_a_cubic_lattice_have_the_speed_of_the_lattice_sum() {
 
 #[test]
 fn waves_in_a_bar_disperse_as_the_integral_says() {
-    // ω² = 4M/(ρδ²) Cin(kδ), with M the modulus of uniaxial strain.
+    // ω² = 4M/(ρδ²) Cin(kδ), with the modulus M of uniaxial strain and Cin(x) = ∫₀ˣ (1 − cos t)/t dt.
     let modulus: f64 = 1.2 * 5.0;
     for (number, expected) in [
         (0.5, 0.9948),

@@ -105,7 +105,7 @@ fn bodies_with_the_rule_none_do_not_feel_each_other() {
 }
 
 /// Return the deck of three blocks with different moduli, horizons and spacings, and a rule for each pair.
-/// Two of the blocks can break.
+/// Two of the blocks can break, unless the laws are linear.
 fn blocks(law: [&str; 3], correction: &str, rules: [&str; 3]) -> String {
     let [soft, firm, hard] = law;
     let [first, second, third] = rules;

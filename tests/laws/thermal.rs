@@ -190,7 +190,8 @@ fn a_clamped_body_has_the_stress_of_hookes_law() {
     }
 }
 
-/// Timoshenko (1925): layers of the same thickness and stiffness bend with curvature 3/2 Δα ΔT/h.
+/// Timoshenko (1925): two layers of the same thickness and stiffness bend with curvature 3/2 Δα ΔT/h, with
+/// the total thickness h.
 #[test]
 fn a_bimaterial_strip_bends_with_timoshenkos_curvature() {
     let (height, length) = (12.0, 72.0);
