@@ -14,7 +14,7 @@ use super::launch;
 pub struct Limits {
     /// Triad a = b + s c, 24 bytes per entry as in STREAM (McCalpin 1995), bytes/s.
     pub bandwidth: f64,
-    /// Fused multiply-adds with the widest vectors, two operations each, 1/s.
+    /// Multiply-adds with the widest vectors, two operations each, 1/s.
     pub arithmetic: f64,
 }
 

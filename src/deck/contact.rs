@@ -24,8 +24,9 @@ pub(super) struct Keys<'a> {
 
 /// Validate contact.
 ///
-/// # Errors On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not
-/// support contact.
+/// # Errors
+/// On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not support
+/// contact.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
