@@ -108,7 +108,7 @@ impl Difference {
     }
 }
 
-/// Differences of the common parts of two results, and names of the other parts.
+/// Differences of the common parts of two results, and the parts that only one result has.
 #[derive(Debug, Clone, Default)]
 pub struct Comparison {
     /// Number of pairs of outputs.
@@ -167,7 +167,7 @@ pub fn compare(
             indices: [a, b],
             time: times[0][a],
         };
-        // Compare static fields only at the first pair of outputs.
+        // If the points never change, compare static fields only at the first pair of outputs.
         let compared: Vec<usize> = (0..fields.len())
             .filter(|k| number == 0 || fields[*k] || !unchanging)
             .collect();

@@ -14,7 +14,7 @@ const VOLUME_SLACK: f64 = 5e-3;
 /// printed.
 const VOLUME_FACTOR: f64 = 10.0;
 
-/// Number, volume and position of a body's points.
+/// Number, volume, mass, centre and neighbours of a body's points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyFigures {
     /// Number of points.

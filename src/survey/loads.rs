@@ -101,7 +101,8 @@ fn twice_prescribed<const D: usize>(
     }
 }
 
-/// Warn of loads that are 0 or act only on points with prescribed motion.
+/// Warn of loads that are 0 or act only on points with prescribed motion, and of temperatures that act only
+/// on points without thermal expansion.
 fn without_effect<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],

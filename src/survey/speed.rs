@@ -41,8 +41,7 @@ pub struct Speed {
 }
 
 /// Measure `steps` steps after `warm_up` steps. During the warm-up, caches, page tables and clock rates
-/// settle.
-/// Collective.
+/// settle. Collective.
 ///
 /// # Errors
 /// Same as for a run; also if the motion of a point is not finite.
