@@ -1,5 +1,6 @@
-//! Calls of fsync on a result: none at outputs with preallocated space, only if the file grows or on request.
-//! A separate test program, because it replaces a function of MPI.
+//! Calls of fsync on a result: none at outputs with preallocated space. Calls occur at the creation and the
+//! end of the file, when it grows, and on request. A separate test program, because it replaces a function of
+//! MPI.
 
 use std::os::raw::c_int;
 use std::path::PathBuf;

@@ -176,7 +176,7 @@ fn deck(arguments: &BenchArguments) -> String {
     )
 }
 
-/// Return the number of warm-up steps.
+/// Return the number of warm-up steps: a tenth of the measured steps, rounded up.
 fn warm_up(arguments: &BenchArguments) -> u32 {
     arguments.steps.div_ceil(10)
 }

@@ -16,8 +16,8 @@ use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
-/// Limits of a dry run, which then takes some seconds and 1 GB: number of lattice cells, of points, and of
-/// directed bonds.
+/// Largest numbers of lattice cells, points and directed bonds for which `check` makes a dry run. A dry run
+/// of this size takes some seconds and 1 GB.
 const MAX_CELLS: f64 = 1e7;
 const MAX_POINTS: f64 = 2e6;
 const MAX_BONDS: f64 = 1.5e8;

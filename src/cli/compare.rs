@@ -169,7 +169,8 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// Format the comparison.
+/// Format the comparison: what only one of the results has, then a table of the fields and one of the
+/// columns.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,

@@ -109,8 +109,8 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Return the number of threads: as requested, else Slurm's cores per task, else an even share of the
-/// available cores.
+/// Return the number of threads: as requested, else Slurm's cores per task, else the cores of this process.
+/// If the launcher has not bound the process to cores, ranks on one host share the cores evenly.
 pub fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
@@ -127,7 +127,7 @@ fn is_bound() -> bool {
     cores() < cores_of_host()
 }
 
-/// Return the number of cores of this host.
+/// Return the number of cores of this host, available to this process or not.
 fn cores_of_host() -> usize {
     let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
     cores_in(&list).max(cores())

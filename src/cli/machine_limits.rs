@@ -14,7 +14,7 @@ use super::launch;
 pub struct Limits {
     /// Triad a = b + s c, 24 bytes per entry as in STREAM (McCalpin 1995), bytes/s.
     pub bandwidth: f64,
-    /// Fused multiply-adds with the widest vectors, two operations each, 1/s.
+    /// Multiply-adds with the widest vectors, two operations each, 1/s.
     pub arithmetic: f64,
 }
 
@@ -166,7 +166,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     (multiply_adds_any, 2)
 }
 
-/// Perform multiplications and additions, for instruction sets without fused multiply-adds.
+/// Perform multiplications and additions without instructions of a particular processor.
 fn multiply_adds_any(factor: f64, term: f64) {
     let mut sums = [[term; 2]; SUMS];
     for _ in 0..LENGTH {

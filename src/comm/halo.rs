@@ -30,7 +30,7 @@ pub struct Traffic {
     pub time: Duration,
 }
 
-/// The halo plan with its buffers, allocated once.
+/// The halo plan with its buffers, which all exchanges reuse.
 #[derive(Debug, Default)]
 pub struct Halo {
     neighbours: Vec<Neighbour>,
@@ -40,7 +40,7 @@ pub struct Halo {
 }
 
 impl Halo {
-    /// Allocate buffers of up to `width` values per point.
+    /// Allocate buffers for `width` values per point. An exchange of more values enlarges them.
     pub fn new(neighbours: Vec<Neighbour>, width: usize) -> Self {
         let buffers = neighbours
             .iter()

@@ -1,7 +1,7 @@
 //! Sums of terms that are rounded to multiples of one unit.
 //!
 //! A sum of integers does not depend on the order of the terms. It is therefore bitwise the same for any
-//! number of ranks and threads. A rounded sum needs 8 bytes, an [`ExactSum`](super::ExactSum) 560 bytes. The
+//! number of ranks and threads. A rounded sum needs 8 bytes, an [`ExactSum`](super::ExactSum) 552 bytes. The
 //! error is at most half a unit per term. Use rounded sums if the sum must be reproducible but not exact.
 
 /// Number of bits for the magnitude of a sum.

@@ -89,7 +89,7 @@ impl ExactSum {
         self.pending = 1;
     }
 
-    /// The sum of this rank's terms.
+    /// The sum of the terms, rounded to a number.
     pub fn value(&self) -> f64 {
         if !self.finite {
             return f64::NAN;
@@ -104,8 +104,8 @@ impl ExactSum {
         let Some(top) = magnitude.limbs.iter().rposition(|limb| *limb != 0) else {
             return 0.0;
         };
-        // The four highest limbs contain at least 97 significant bits. The conversion rounds once, to 53
-        // bits.
+        // The four highest limbs are the whole sum, or contain at least 97 significant bits. The conversion
+        // rounds once, to 53 bits.
         let lowest = top.saturating_sub(3);
         let head = magnitude.limbs[lowest..=top]
             .iter()

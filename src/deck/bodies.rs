@@ -23,7 +23,8 @@ const MOST_BODIES: usize = 256;
 /// Validate the bodies.
 ///
 /// # Errors
-/// On an unknown material or damage law, an invalid shape, or a body without exactly one source of points.
+/// On too many bodies, an unknown material or damage law, an invalid shape, a body without exactly one source
+/// of points, and bodies that contradict each other about a file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -151,8 +152,8 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     is_whole(upper - lower).then_some(if is_whole(lower) { 0.0 } else { lower })
 }
 
-/// Return the positions of the two flat faces that bound a shape along an axis, m; `None` if a face is not
-/// flat.
+/// Return the positions of the two faces that bound a shape along an axis, m; `None` if a face is round. For
+/// a polygon, return the smallest and largest coordinate of its corners.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),

@@ -68,7 +68,7 @@ pub fn initials(
         .collect()
 }
 
-/// Validate the file of initial values.
+/// Read the columns that an initial file has. Its path is relative to the folder of the deck.
 fn initial_file(
     scope: &Scope,
     deck: &Deck,

@@ -25,7 +25,7 @@ pub(super) struct Keys<'a> {
 /// Validate contact.
 ///
 /// # Errors
-/// On numbers out of range, on pairs that are given twice, and on methods or grids that do not support
+/// On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not support
 /// contact.
 pub fn contact(
     scope: &Scope,

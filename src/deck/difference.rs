@@ -11,7 +11,7 @@ use crate::deck::spanned::Spanned;
 use crate::error::{Error, Result};
 use crate::expression::{Expression, POSITION_AND_TIME};
 
-/// Keys within sections that a restart may change.
+/// Keys that a restart may change although their section is fixed.
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
 /// Keys of the history that set the interval of rows.

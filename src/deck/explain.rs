@@ -105,7 +105,7 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     }
     let time = deck.time.get_mut();
     // Newton's method uses the load steps and tolerance of the relaxation if `[time.static]` does not give
-    // them.
+    // them, so the table of the relaxation is written too.
     if problem.is_quasi_static() {
         let default = || Spanned::new(0..0, Relaxation::default());
         time.relaxation.get_or_insert_with(default);

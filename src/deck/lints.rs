@@ -1,5 +1,5 @@
-//! Warnings about probable mistakes in a deck: unused names, numbers in place of conditions, and stages that
-//! change the mass of moving points.
+//! Warnings about probable mistakes in a deck: unused names, columns of files that are not read, numbers in
+//! place of conditions, and stages that change the mass of moving points.
 
 use indexmap::IndexSet;
 use toml::Value;

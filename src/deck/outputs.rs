@@ -214,7 +214,8 @@ pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<problem::CheckpointRule>
     }
 }
 
-/// Parse a number with the unit s, min or h, and return seconds; `None` for any other text.
+/// Parse a number with the unit s, min or h, and return seconds; `None` for any other text, and for a number
+/// that is not above 0.
 fn duration(text: &str) -> Option<f64> {
     let units = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
     let (number, factor) = units

@@ -38,7 +38,7 @@ impl<'a> Scope<'a> {
     /// Evaluate the parameters, which may refer to each other in any order, and read the tables.
     ///
     /// # Errors
-    /// On a parameter with the name of a variable, an unknown name, a circular definition, or an invalid
+    /// On an invalid name of a parameter or table, an unknown name, a circular definition, or an invalid
     /// table.
     pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {

@@ -73,7 +73,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
 /// Validate the stages of the run, whose time axis is `whole`.
 ///
 /// # Errors
-/// On ends that do not increase or exceed the end of the run, on unknown names, and on invalid numbers.
+/// On a missing end, on an end before the previous one or after the end of the run, on unknown names, and on
+/// invalid numbers.
 pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;

@@ -1,10 +1,9 @@
 //! Change of an expression's value over a time interval, without cancellation.
 //!
 //! The difference of two computed values u has an error of ε|u|. Dividing a second difference by the square
-//! of a small step amplifies this error.
-//! Here each operation computes the change of its result from the changes of its operands. For example sin b
-//! − sin a = 2 cos((a + b)/2) sin((b − a)/2).
-//! The error is therefore relative to the change.
+//! of a small step amplifies this error. Here most operations compute the change of their result from the
+//! changes of their operands. For example sin b − sin a = 2 cos((a + b)/2) sin((b − a)/2). Their error is
+//! therefore relative to the change. The other operations, such as `tan` and `atan2`, subtract two values.
 
 use std::sync::Arc;
 

@@ -19,8 +19,9 @@
 //! mean `(not x) < 1`. A `!` at the start of a comparison therefore requires parentheses.
 //!
 //! The variables are `x`, `y`, `z` and `t`, where the deck allows these; the only constant is `pi`. These
-//! names hide parameters of the same name; names of functions do not. Names of [tables](Table) are values by
-//! time, and are allowed where `t` is allowed. The functions are:
+//! names hide parameters of the same name; names of functions do not. In keys that are functions of the
+//! length of a bond, `r` is the only variable; elsewhere `r` can be a parameter. Names of [tables](Table) are
+//! values by time, and are allowed where `t` is allowed. The functions are:
 //!
 //! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
@@ -29,14 +30,14 @@
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
 //! - `step(a)`: 0 if `a < 0`, otherwise 1;
 //! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
-//!   after `start`, it jumps at `end`;
+//! after `start`, it jumps at `end`;
 //! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The other argument has no effect,
-//!   even if it is infinite or NaN.
+//! even if it is infinite or NaN.
 //!
 //! # Powers
 //!
 //! If the exponent is an integer from -16 to 16, `a ^ b` is computed by multiplication (`f64::powi`), so that
-//! `x^2` is exactly `x * x`. All other powers use `f64::powf`. The choice depends only on the exponent's
+//! `x^2` is exactly `x * x`. All other powers use `libm::pow`. The choice depends only on the exponent's
 //! value, not on its notation.
 
 mod evaluate;
@@ -75,14 +76,12 @@ pub const POSITION_AND_TIME: [Variable; 4] = [Variable::X, Variable::Y, Variable
 pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 impl Variable {
-    /// Find the variable of this name.
     fn from_name(name: &str) -> Option<Self> {
         [Self::X, Self::Y, Self::Z, Self::T, Self::R]
             .into_iter()
             .find(|variable| variable.name() == name)
     }
 
-    /// Name of the variable.
     fn name(self) -> &'static str {
         match self {
             Self::X => "x",
@@ -269,8 +268,8 @@ impl Expression {
         evaluate::evaluate(&self.code, &self.tables, self.stack_size, [x, y, z, time])
     }
 
-    /// Compute the change of the value from a time over a step, which may be negative. Round-off is relative
-    /// to the change, not to the value.
+    /// Compute the change of the value from a time over a step, which may be negative. For most operations,
+    /// round-off is relative to the change, not to the value.
     pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
         let [x, y, z] = position;
         increment::increment(&self.code, &self.tables, [x, y, z, time], step)

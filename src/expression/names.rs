@@ -174,7 +174,7 @@ impl Scope<'_> {
 fn suggestion(name: &str, names: &[&str]) -> String {
     let lower = name.to_lowercase();
     let tolerance = match lower.len() {
-        // Any two single letters differ by one edit.
+        // Any two single letters differ by one edit, so only the other case of a single letter is suggested.
         1 => 0,
         length => (length / 3).clamp(1, 3),
     };

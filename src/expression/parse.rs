@@ -159,7 +159,7 @@ impl Parser<'_> {
         Err(ExpressionError::new(first.start, end, message))
     }
 
-    /// Parse a number, a name, a call, a parenthesis, or a sign followed by one of these.
+    /// Parse a number, a name, a call, a parenthesis, or a prefix operator with its operand.
     fn value(&mut self) -> Result<(), ExpressionError> {
         let token = self.peek();
         match token.kind {

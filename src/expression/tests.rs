@@ -693,7 +693,8 @@ proptest! {
 
 #[test]
 fn increments_have_the_rounding_of_a_change() {
-    // Slope and curvature are exact to the digits given; the start value is large and the step small.
+    // The step is so small that slope and curvature give the change to all digits. A difference of two values
+    // would keep at most seven digits.
     let (time, step) = (7.0, 1e-9);
     let sech = 1.0 - 1_f64.tanh().powi(2);
     let change = |text: &str| parse(text).unwrap().increment([2.0, 3.0, 5.0], time, step);

@@ -27,7 +27,7 @@ pub(super) enum Precedence {
 pub(super) enum Kind {
     /// A number.
     Number(f64),
-    /// The name of a variable, parameter, constant or function.
+    /// The name of a variable, parameter, table, constant or function.
     Name,
     /// An operator between two values; `+` and `-` may also be prefix operators.
     Operator(Binary, Precedence),

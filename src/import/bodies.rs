@@ -61,7 +61,7 @@ pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &No
     }
 }
 
-/// Laws that support only the energy criterion.
+/// Laws whose bonds do not break by stretch.
 const BY_ENERGY: [&str; 3] = [
     "ordinary_plastic",
     "correspondence",

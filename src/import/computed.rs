@@ -13,7 +13,7 @@ use crate::problem::Field;
 /// Log note for the angular momentum.
 pub(super) const ANGULAR_MOMENTUM: &str = "[history] angular_momentum: about the origin";
 
-/// Difference of variables that are a density times the volume of a point.
+/// Value of `FieldOf::difference` for variables that are a field times the volume of a point.
 const TIMES_VOLUME: &str = "times the volume";
 
 /// A computed quantity of the source deck.

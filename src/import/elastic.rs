@@ -48,7 +48,6 @@ impl Constants {
         }
     }
 
-    /// Return the number of a constant.
     fn get(&self, key: &str) -> Option<f64> {
         let (_, value, _) = self.given.iter().find(|(known, ..)| *known == key)?;
         Some(*value)
@@ -84,7 +83,8 @@ impl Constants {
     }
 
     /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. If the bulk modulus
-    /// is not that of the solid in 3-D, Young's modulus is `factor` times the bulk modulus.
+    /// is not that of the solid in 3-D, Young's modulus is `factor` times the bulk modulus. Return false if
+    /// the constants determine neither modulus.
     pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {

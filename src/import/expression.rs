@@ -14,7 +14,7 @@ const LONGEST: usize = 4096;
 /// Source language of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dialect {
-    /// C statements that set `value`.
+    /// C: a formula, or statements that set `value`.
     Peridigm,
     /// Julia.
     PeriLab,
@@ -409,7 +409,7 @@ impl Rewriter<'_> {
         Ok(text)
     }
 
-    /// Translate a function call.
+    /// Translate a function call. A function without a template keeps its name.
     fn call(&self, name: &str, tokens: &[Token], depth: usize) -> Result<String, String> {
         let mut arguments = vec![Vec::new()];
         let mut level = 0_i64;

@@ -174,7 +174,8 @@ pub(super) struct Log {
 }
 
 impl Log {
-    /// Log the outcome of a node. Notes for the same node are joined; the worse outcome holds.
+    /// Log the outcome of a node. Notes for the same node are joined, and the first outcome other than
+    /// `Taken` holds.
     pub(super) fn note(&self, node: &Node, fate: Fate, note: impl Into<String>) {
         let mut fates = self.fates.borrow_mut();
         match fates.get_mut(&node.id) {

@@ -120,7 +120,7 @@ impl<'a> Translation<'a> {
         }
     }
 
-    /// Read `true` or `false`; any other text is `false`.
+    /// Read a truth value: `true`, `yes`, `on` and `1` are true, any other text is false.
     pub fn is_true(&self, node: &Node) -> bool {
         node.text().is_some_and(|text| {
             ["true", "yes", "on", "1"]

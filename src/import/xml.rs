@@ -31,7 +31,6 @@ pub fn parse(text: &str) -> Result<Node, Mistake> {
     list(&document, root, &mut nodes, 0)
 }
 
-/// Return the line of an element.
 fn line_of(document: &Document, element: roxmltree::Node) -> usize {
     document.text_pos_at(element.range().start).row as usize
 }

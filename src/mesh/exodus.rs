@@ -79,7 +79,7 @@ fn kind(name: &str, nodes: usize) -> Option<Kind> {
         _ => return None,
     };
     // The 14th node of a pyramid is the centre of the base. Wedges of 18 nodes have different orders in
-    // different writers.
+    // different writers, so they are not supported.
     let is_known = nodes != 18 && super::kind::KINDS.contains(&Kind::new(form, nodes));
     is_known.then_some(Kind::new(form, nodes))
 }

@@ -319,7 +319,7 @@ impl<'a> Classic<'a> {
             .ok_or_else(|| format!("has no variable {name}"))
     }
 
-    /// Return the bytes of a variable.
+    /// Return the bytes of a variable of fixed size.
     fn bytes(&self, name: &str) -> Fault<&'a [u8]> {
         let variable = self.variable(name)?;
         let words = |message: &str| format!("variable {name}: {message}");

@@ -140,7 +140,6 @@ struct File<'a> {
     appended: Option<(&'a [u8], bool)>,
 }
 
-/// The numbers of an array.
 enum Numbers {
     Whole(Vec<i64>),
     Real(Vec<f64>),
@@ -303,7 +302,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Read the numbers of an array.
+    /// Decode an array: text, binary data in the element, or binary data appended to the file.
     fn numbers(&self, array: Node) -> Fault<Numbers> {
         let name = array.attribute("Name").unwrap_or("Points");
         let words = |message: String| format!("array {}: {message}", excerpt(name));

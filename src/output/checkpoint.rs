@@ -33,7 +33,7 @@ pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// Contents of a checkpoint, except the state of the points.
+/// Contents of a checkpoint, except the state of the points and bonds, and the progress of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// Number of the time step.
@@ -138,7 +138,7 @@ impl Checkpoints {
     /// Write a checkpoint that replaces the older one. Collective.
     ///
     /// # Errors
-    /// If the disk is full; existing checkpoints are kept.
+    /// If the checkpoint cannot be written, for example to a full disk; existing checkpoints are kept.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,

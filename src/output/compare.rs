@@ -108,7 +108,7 @@ impl Difference {
     }
 }
 
-/// Differences of the common parts of two results, and names of the other parts.
+/// Differences of the common parts of two results, and the parts that only one result has.
 #[derive(Debug, Clone, Default)]
 pub struct Comparison {
     /// Number of pairs of outputs.
@@ -167,7 +167,7 @@ pub fn compare(
             indices: [a, b],
             time: times[0][a],
         };
-        // Compare static fields only at the first pair of outputs.
+        // If the points never change, compare static fields only at the first pair of outputs.
         let compared: Vec<usize> = (0..fields.len())
             .filter(|k| number == 0 || fields[*k] || !unchanging)
             .collect();
@@ -333,8 +333,8 @@ struct Matches {
 }
 
 impl Matches {
-    /// Match each time of the first list with the nearest unmatched time of the second list, within
-    /// [`TIME_TOLERANCE`].
+    /// Match each time of the first list with the nearest unmatched time of the second list, within the
+    /// larger of [`TIME_TOLERANCE`] and [`ROUND_OFF`].
     fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
         let reach = |index: usize, time: f64| {

@@ -127,7 +127,8 @@ impl Dataset {
     }
 }
 
-/// Return the rows per chunk: one append, or an even fraction of an append, of 4 kB to 4 MB.
+/// Return the rows per chunk. A chunk has 4 kB to 4 MB: one append, an even fraction of a long append, or
+/// several short appends.
 fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
     let (min, max) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
     let parts = per_append.div_ceil(max).max(1);

@@ -190,7 +190,8 @@ fn lines(rows: &[Vec<f64>]) -> String {
     text
 }
 
-/// Format a number as the shortest text that parses to the same number; integers have no decimal point.
+/// Format a number with the fewest digits that parse to the same number; integers below 10¹⁵ have no decimal
+/// point.
 fn shortest(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         format!("{value}")

@@ -1,4 +1,5 @@
-//! Result files and checkpoints in HDF5, written collectively. No other folder calls HDF5.
+//! Result files and checkpoints in HDF5, written collectively. Of the other folders, only `mesh` calls HDF5,
+//! to read meshes.
 //!
 //! A result has the VTKHDF layout, with a history, and an XDMF side-car for older viewers.
 

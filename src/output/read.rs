@@ -375,7 +375,7 @@ impl ResultReader {
         Ok(values)
     }
 
-    /// Check that all points and values of the first `steps` steps are readable.
+    /// Check that the history, and all points and values of the first `steps` steps, are readable.
     ///
     /// # Errors
     /// If the file is damaged or has fewer steps.

@@ -1,7 +1,7 @@
 //! Reservation of disk space before collective writes.
 //!
-//! If the disk fills up inside a collective write, most of Open MPI 4.1's writers (`vulcan`, the
-//! default, `dynamic_gen2`, `two_phase`, ROMIO) hang on some ranks. A reservation by one rank fails with
+//! If the disk fills up inside a collective write, most of Open MPI 4.1's writers (`vulcan`, which is the
+//! default, `dynamic_gen2`, `two_phase` and ROMIO) hang on some ranks. A reservation by one rank fails with
 //! an ordinary error instead.
 
 use crate::error::{Error, Result};

@@ -121,8 +121,8 @@ fn what_is_no_result_is_named_so() {
     std::fs::remove_file(&path).unwrap();
 }
 
-/// Write two steps of a result of deck `one`, which expects two steps. Resume the result after one step with
-/// `deck`, and write up to four steps. Return true if the file was continued in place.
+/// Write a result of deck `one` with the two steps that it expects. Resume the result after its first step
+/// with `deck`, and write three more steps. Return true if the file was continued in place.
 fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
 

@@ -248,7 +248,7 @@ fn shape(rows: usize, columns: usize) -> String {
 }
 
 fn write_item(text: &mut String, number: Number, dimensions: &str, dataset: &str) -> fmt::Result {
-    // XDMF has no 8-byte unsigned integers.
+    // XDMF has no 8-byte unsigned integers, so ids are declared as signed integers.
     let (kind, precision) = match number {
         Number::F64 => ("Float", 8),
         Number::F32 => ("Float", 4),

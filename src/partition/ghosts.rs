@@ -16,7 +16,8 @@ use super::domain::Domain;
 use super::graph::NO_OWNER;
 use super::received;
 
-/// Maximum number of components per point in a halo exchange.
+/// Number of values per point for which the halo buffers are allocated: those of a vector. Exchanges of more
+/// values per point enlarge the buffers.
 const HALO_WIDTH: usize = 3;
 
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.

@@ -9,8 +9,8 @@ use super::cells::{CellLoads, Cells};
 /// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
-/// Additional factor on the weight of graph edges along x: lane groups lie along x, so cuts across x are
-/// costly.
+/// Additional factor on the weight of graph edges between cells that differ along x: lane groups lie along x,
+/// so cuts across x are costly.
 const ALONG_X: f64 = 1.5;
 
 /// Owner of cells without points.
@@ -23,8 +23,9 @@ const FEW_CELLS_PER_PART: usize = 30;
 /// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points.
 ///
 /// - `occupation` is the number of points in each cell.
-/// - The weight of a cell is the number of bonds of its points. The weight of an edge is the number of
-///   bonds across it.
+/// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
+///   edge is proportional to the estimated number of bonds across it, multiplied by `ALONG_X` if its cells
+///   differ along x.
 /// - With measured loads, cell weights are multiplied by the cost per point. Parts are numbered so that few
 ///   points migrate.
 ///

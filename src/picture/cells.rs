@@ -155,7 +155,7 @@ fn eighth(along: f64, down: f64) -> u32 {
 }
 
 /// Test whether there are points on all sides: no three adjacent eighths of a turn are empty. Every half of a
-/// turn contains three whole eighths.
+/// turn contains three whole eighths, and therefore has a point.
 fn is_surrounded(directions: u8) -> bool {
     let empty = !directions;
     empty & empty.rotate_left(1) & empty.rotate_left(2) == 0

@@ -219,7 +219,8 @@ impl Scene<'_> {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
                     (low.min(value), high.max(value))
                 });
-            // The low end of damage is always 0.
+            // The range of damage includes 0, so that undamaged points have the colour of the low end in all
+            // pictures.
             match self.colours() {
                 ColourMap::Damage => (low.min(0.0), high.max(0.0)),
                 ColourMap::General => (low, high),

@@ -168,7 +168,7 @@ pub struct Heading {
 /// # Errors
 /// If the file cannot be read.
 pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
-    // Opening a pipe would block until its other end is opened.
+    // Opening a pipe would block until its other end is opened, so only regular files are read.
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::other("it is not a regular file"));
     }

@@ -1,8 +1,8 @@
 //! The blocks of a problem. Without refinement, a block is a body; otherwise, the points of a body with one
 //! level and kind.
 //!
-//! All points of a block have the same law and horizon. Except in some blocks of refined bodies, they also
-//! have the same volume.
+//! All points of a block have the same law and horizon. Their volumes differ only in bodies from files and
+//! meshes, and in some blocks of refined bodies.
 
 use super::{Body, HorizonRule, PointSource, Problem};
 
@@ -12,7 +12,8 @@ const KINDS: usize = 3;
 /// A property that the points of a block have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Points with the cell volume of their level; they lie on a lattice.
+    /// Points with the cell volume of their level, on a lattice. All points of a body without refinement have
+    /// this kind, too.
     Whole,
     /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,

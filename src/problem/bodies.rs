@@ -23,7 +23,7 @@ pub struct Body {
     pub material_name: String,
     /// Law, density and elastic constants.
     pub material: Material,
-    /// The damage law, if bonds can break.
+    /// The damage law; `None` if bonds never break, or break by the law of the material.
     pub damage: Option<Damage>,
     /// Horizon δ, m.
     pub horizon: f64,
@@ -65,7 +65,7 @@ pub struct Material {
     pub law: Law,
     /// Density, kg/m³.
     pub density: f64,
-    /// Elastic constants E and ν; a bond-based law fixes ν.
+    /// Elastic constants E and ν. A bond-based law fixes ν, except for a bar under uniaxial stress.
     pub elastic: Isotropic,
     /// Rate r of viscous damping, 1/s. The damping exerts the force density −r ρ u̇.
     pub damping: f64,

@@ -238,9 +238,10 @@ pub enum Field {
     BrokenBonds,
     /// Number of the point's bonds that have broken since the last output.
     NewlyBrokenBonds,
-    /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for laws with plasticity, otherwise 0.
+    /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for correspondence laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 if the point has too few intact bonds for its law and carries no force, otherwise 0.
+    /// 1 if the point carries no force because it has too few intact bonds for its law, or a bond for which
+    /// the law defines no stress; otherwise 0.
     Singular,
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.

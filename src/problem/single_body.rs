@@ -2,8 +2,8 @@
 
 use super::{PointSource, Problem, Shape, StepRule};
 
-/// Create a problem with this body only, and return the edges of its cells (m). The result is `None` for
-/// points that are not on a lattice.
+/// Create a problem with this body only, without no-failure sets, scatter and damping, and return the edges
+/// of its cells (m). The result is `None` for points that are not on a lattice.
 pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
     let mut body = problem.bodies[body].clone();
     let PointSource::Lattice { spacing, .. } = body.points else {

@@ -96,7 +96,8 @@ impl Files {
                         self.folder.display()
                     )));
                 }
-                // Some network file systems do not support locks.
+                // Some network file systems do not support locks. The run then writes to the folder without a
+                // lock.
                 Ok(()) | Err(fs::TryLockError::Error(_)) => return Ok(file),
             }
         }

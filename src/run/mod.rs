@@ -110,7 +110,10 @@ pub fn start_mpi() -> Result<World> {
 /// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
 /// - the disk is full;
-/// - the motion of a point is not finite.
+/// - the motion of a point or rigid body is not finite;
+/// - a load step has no equilibrium;
+/// - the energy grows without limit;
+/// - an observer makes an invalid request.
 pub fn run(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -165,7 +168,8 @@ fn run_unlocated(
 enum LoopEnd {
     Complete,
     Stopped(Reason),
-    /// The motion of a point is not finite, or the energy grows without limit.
+    /// The motion is not finite, a load step has no equilibrium, the energy grows without limit, or an
+    /// observer has made an invalid request.
     Failed(Error),
 }
 

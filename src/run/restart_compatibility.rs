@@ -92,7 +92,8 @@ pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
     deck::differences(&source("the checkpoint", old), &source("the deck", new))
 }
 
-/// The first line that differs in two listings; empty if they are equal.
+/// The first line that differs in two listings, or a note that one listing has more lines; empty if they are
+/// equal.
 fn listed_differences(old: &str, new: &str) -> Vec<String> {
     let short = |line: &str| line.trim().chars().take(MAX_LINE).collect::<String>();
     let mut lines = old.lines().zip(new.lines());

@@ -69,7 +69,7 @@ pub fn remove(paths: &[PathBuf]) -> Result<()> {
 /// Read the first line of a history file.
 fn heading(path: &Path) -> std::io::Result<String> {
     let mut line = String::new();
-    // Opening a pipe would block until its other end is opened.
+    // Opening a pipe would block until its other end is opened, so only regular files are read.
     if fs::metadata(path)?.is_file() {
         BufReader::new(File::open(path)?.take(LONGEST_HEADING)).read_line(&mut line)?;
     }

@@ -10,10 +10,11 @@ use crate::solver::Simulation;
 /// Relative difference between the volumes of points and shape above which a warning is printed.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// Ratio between the mean volume of a file's points and their spacing³ above which a warning is printed.
+/// Ratio between the mean volume of the points of a file or mesh and their spacing³ above which a warning is
+/// printed.
 const VOLUME_FACTOR: f64 = 10.0;
 
-/// Number, volume and position of a body's points.
+/// Number, volume, mass, centre and neighbours of a body's points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyFigures {
     /// Number of points.
@@ -24,9 +25,11 @@ pub struct BodyFigures {
     pub mass: f64,
     /// Centre of mass, m.
     pub centre: [f64; 3],
-    /// Volume of the shape without the parts that later bodies occupy, m³; `None` for points from a file.
+    /// Volume of the shape without the parts that later bodies occupy, m³; `None` for points from a file or
+    /// mesh.
     pub shape_volume: Option<f64>,
-    /// Mean distance to the nearest neighbour for points from a file, m; 0 if there are no neighbours.
+    /// Mean distance to the nearest neighbour for points from a file or mesh, m; 0 if there are no
+    /// neighbours.
     pub spacing: f64,
     /// Smallest, median and largest number of neighbours per point, without pre-cracked bonds, for bodies
     /// that do not lie on a lattice.
@@ -80,8 +83,8 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
     Some(lattice.shape_volume())
 }
 
-/// Distance (m) of each owned point to its nearest bonded neighbour; empty if the points of no body come from
-/// a file.
+/// Distance (m) of each owned point to its nearest bonded neighbour; empty if no body has points from a file
+/// or mesh.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
     if !problem.bodies.iter().any(is_from_file) {

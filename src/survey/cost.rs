@@ -56,8 +56,8 @@ pub struct Measured {
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Peak memory of all ranks in the time loop (during an output), without ghosts, bytes: for one rank, and
-    /// for several ranks.
+    /// Peak memory of all ranks in the time loop (during an output, a checkpoint or a restart), without
+    /// ghosts, bytes: for one rank, and for several ranks.
     pub time_loop: [f64; 2],
     /// The main result with the history, then the further results.
     pub results: Vec<ResultCost>,

@@ -32,8 +32,8 @@ pub struct Interior {
     pub exact: [f64; 2],
 }
 
-/// Compute the properties of a lattice body. The result is `None` for points that are not on a lattice, and
-/// for families that are too large for a block.
+/// Compute the properties of a lattice body. The result is `None` for points that are not on a lattice, for
+/// families that are too large for a block, and if the block cannot be set up.
 pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     if !problem.bodies[body].is_on_lattice(problem.jitter) {
         return None;
@@ -46,7 +46,7 @@ pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     }
 }
 
-/// Create the problem of a block with at least one complete family.
+/// Create the problem of a block with at least one complete family; `None` if the block has too many bonds.
 fn block(problem: &Problem, body: usize) -> Option<Problem> {
     let (mut block, spacing) = single_body(problem, body)?;
     block.bodies[0].damage = None;
@@ -124,7 +124,8 @@ fn energy_and_bonds<const D: usize>(
     (stored.energy[point], stored.neighbours[point] as u32)
 }
 
-/// Modulus of isotropic expansion, Pa: 2 W/θ², where W is the classical energy density at dilatation θ.
+/// Modulus of isotropic expansion, Pa: 2 W/θ², where W is the classical energy density, and θ the sum of the
+/// strains in the directions of the problem.
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
     let (bulk, shear) = (elastic.bulk_modulus(), elastic.shear_modulus());
     match dimension {

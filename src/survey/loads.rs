@@ -54,7 +54,7 @@ fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
     warnings.push(Warning::new(message).at(&condition.place));
 }
 
-/// The components of the motion that a condition prescribes; `None` for loads.
+/// The components of the motion that a condition prescribes; `None` for loads and temperatures.
 fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     match &condition.action {
         Action::Displacement(values) | Action::Velocity(values) => Some(values),
@@ -101,7 +101,8 @@ fn twice_prescribed<const D: usize>(
     }
 }
 
-/// Warn of loads that are 0 or act only on points with prescribed motion.
+/// Warn of loads that are 0 or act only on points with prescribed motion, and of temperatures that act only
+/// on points without thermal expansion.
 fn without_effect<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
@@ -200,7 +201,7 @@ fn layer<const D: usize>(
     }
 }
 
-/// The cell edges of a body, m; `default` for points from a file.
+/// The cell edges of a body, m; `default` for points from a file or mesh.
 fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     match &problem.bodies[body].points {
         PointSource::Lattice { spacing, .. } => *spacing,

@@ -5,7 +5,7 @@
 pub struct Resident {
     /// Current resident memory.
     pub now: f64,
-    /// Largest resident memory since the start of the process.
+    /// Largest resident memory since the start of the process or the last [reset](reset_peak).
     pub peak: f64,
 }
 

@@ -169,7 +169,8 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    // A bond that softens carries almost no force near its critical stretch.
+    // A bond that softens carries almost no force near its critical stretch, so bodies that break by their
+    // law are not checked.
     let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
     let of_bodies = of_damage.filter_map(|body| {
         let law = block_laws(problem, &Block::unrefined(body)).damage?;
@@ -218,7 +219,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// The `safety` factors of the stages.
+/// The `safety` factors of the explicit stages with an automatic step.
 fn safeties(problem: &Problem) -> Vec<f64> {
     let moving = problem
         .all_stages()
@@ -237,8 +238,8 @@ fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
 
-/// Warn of pre-cracks without width that pass through points. Such points count as on one side of the
-/// pre-crack.
+/// Warn of pre-cracks without width that pass through more points than there are dimensions. Each of these
+/// points counts as on one side of the pre-crack.
 fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let is_on = |crack: &Crack, point: &usize| {
@@ -271,7 +272,7 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Number of points of each set.
+/// Number of points of each set, with warnings of sets by position that have very few points.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

@@ -9,7 +9,7 @@ use crate::solver::assign::cutoffs;
 /// Maximum number of lattice cells that are read to count neighbours, over all samples.
 const MAX_CELLS_READ: f64 = 4e6;
 
-/// Maximum number of sampled points per body.
+/// Maximum number of points per body at which neighbours are counted.
 const SAMPLES: u64 = 400;
 
 /// The estimated size of a run.
@@ -85,7 +85,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
     Ok(size)
 }
 
-/// Mean number of neighbours of a body's points on all lattices, from sampled points.
+/// Mean number of neighbours that a point of a body has on the lattices of all bodies, from sampled points.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
@@ -168,8 +168,9 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
     }
 }
 
-/// Test whether a point is in the set of an output, which is not a set of ids. If the set is a group of a
-/// mesh, all points count, because its ids are not known yet.
+/// Test whether a point is in the set of an output; `None` is the set of all points. Sets of ids are not
+/// supported. All points count as members of a group of a mesh, because the ids of its points are not known
+/// yet.
 fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f64; 3]) -> bool {
     set.map(|set| &problem.sets[set]).is_none_or(|set| {
         matches!(set.selector, Selector::Mesh(_))
@@ -177,8 +178,8 @@ fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f
     })
 }
 
-/// Number of points in the result of an output, from sampled points of each body. The argument is the index
-/// and the set of the output.
+/// Number of points in the result of an output, from sampled points of each body. `number` is the index of
+/// the output, and `set` is its set.
 fn output_points(
     problem: &Problem,
     (number, set): (usize, Option<usize>),

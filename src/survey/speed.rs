@@ -34,15 +34,14 @@ pub struct Speed {
     pub times: Times,
     /// Messages of the steps.
     pub sent: Traffic,
-    /// Messages of as many halo exchanges without overlap.
+    /// Messages of one exchange of displacements per step, without overlap.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
 }
 
 /// Measure `steps` steps after `warm_up` steps. During the warm-up, caches, page tables and clock rates
-/// settle.
-/// Collective.
+/// settle. Collective.
 ///
 /// # Errors
 /// Same as for a run; also if the motion of a point is not finite.

@@ -309,7 +309,7 @@ fn the_benchmark_counts_what_it_does() {
             let rate = figure(&json, "updates_per_second");
             let rate = rate * figure(&json, "loop_seconds_slowest");
             assert!((rate / f64::from(7 * bonds) - 1.0).abs() < 1e-9, "{json}");
-            // Each step sends three numbers per ghost; a state-based law sends a fourth.
+            // Each step sends three numbers per ghost; `lps` sends a fourth.
             let numbers = if law[1] == "lps" { 4.0 } else { 3.0 };
             let sent = figure(&json, "halo_bytes_per_step");
             assert_eq!(sent, 8.0 * numbers * figure(&json, "ghosts"), "{json}");

@@ -6,7 +6,7 @@ use std::process::Output;
 use crate::support::command::{Folder, finish, fissure, succeed, text};
 use fissure::output::ResultReader;
 
-/// A pulled bar; its right half is the set `right`.
+/// A plate with an initial velocity; its right half is the set `right`.
 const DECK: &str = "
 dimension = 'plane-stress'
 parameters = { pull = 1, end = 2e-6 }
@@ -111,7 +111,7 @@ fn a_difference_is_found_with_its_point_and_time() {
     );
     expect(&output, 1, &["kinetic_energy"]);
 
-    // The relative difference of energies is twice the difference of displacements.
+    // The relative difference of energies is twice the relative difference of displacements.
     expect(
         &compare(&first, &other, &["--tolerance", "0.0015"]),
         1,

@@ -295,7 +295,8 @@ fn a_launcher_of_another_mpi_does_not_run_the_deck_several_times() {
         failing(&mut run(variables), &message, 2);
         assert!(!out.exists());
     }
-    // Only the first rank prints the error, and it exits only after printing.
+    // Only the first rank prints the error. The other ranks wait before they exit, because the launcher ends
+    // all ranks when one of them exits.
     let other = finish(&mut run(&[("PMI_SIZE", "3"), ("PMI_RANK", "1")]));
     assert_eq!(other.status.code(), Some(2));
     assert_eq!(text(&other), "");

@@ -130,7 +130,6 @@ enum Change {
     Insert(Index, String),
 }
 
-/// The replacement of a token.
 #[derive(Debug, Clone)]
 enum Token {
     /// A copy of another token of the deck.
@@ -419,8 +418,8 @@ fn a_body_of_whole_cells_is_filled_exactly() {
         }
     }
 
-    // Bodies with the same cells share a grid. The first body that is a whole number of cells long sets its
-    // origin.
+    // Bodies with the same cells share a grid. The first body that is a whole number of cells long sets the
+    // origin of the grid.
     let disc = body("disc", "disc = { centre = [-0.6, 0], radius = 0.25 }");
     let other = body("b", "box = { lower = [0.25, -0.15], upper = [0.65, 0.15] }");
     let (counts, _, is_lattice) = filled("", &(disc + &centred + &other));

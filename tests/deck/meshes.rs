@@ -995,8 +995,8 @@ fn mutant(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     changed
 }
 
-/// Read `FISSURE_MUTANTS` mutants of a file, 2000 by default. Each is a mesh or an error, and a mesh is not
-/// larger than its file.
+/// Read `FISSURE_MUTANTS` mutants of a file, 2000 by default. Each is a mesh or an error, and a mesh has at
+/// most 40 nodes and elements per byte of its file.
 fn survives_mutants(name: &str, bytes: &[u8], seed: u64) {
     let mutants = std::env::var("FISSURE_MUTANTS").map_or(2000, |count| count.parse().unwrap());
     let mut random = Random(seed);

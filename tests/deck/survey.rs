@@ -311,7 +311,8 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
         ))
     };
     let space = "lower = [0, 0, 0], upper = [1, 1, 1]";
-    // Σ |ξ| V over the 122 neighbours, divided by the integral over the ball, π δ⁴.
+    // Expected bulk modulus of `pmb`, divided by the exact one: Σ |ξ| V over the 122 neighbours, divided by
+    // the integral over the ball, π δ⁴.
     let mut sum = 0.0;
     for x in -3..=3_i32 {
         for y in -3..=3_i32 {
@@ -366,8 +367,8 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
     ] {
         let exact = body(dimension, "pmb", corners, ", volume_correction = 'exact'");
         let found = interior(&exact, 0).unwrap();
-        // Σ |ξ| Ṽ over the family, divided by the integral of |ξ| over the ball, disc or interval of radius
-        // δ.
+        // Expected bulk modulus, divided by the exact one: Σ |ξ| Ṽ over the family, divided by the integral
+        // of |ξ| over the ball, disc or interval of radius δ.
         let count = exact.dimension.count();
         let share = CellShare::new(VolumeCorrection::Exact, 3.0, 1.0, count);
         let range = |k: usize| if k < count { -5..=5 } else { 0..=0 };

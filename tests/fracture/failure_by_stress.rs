@@ -316,7 +316,8 @@ fn an_end_whose_horizon_does_not_contain_the_bond_does_not_count() {
     let stiffness = YOUNG * (1.0 - RATIO) / ((1.0 + RATIO) * (1.0 - 2.0 * RATIO));
     let text = two_blocks("");
     // On the left, the stress is 1.2 times the strength; on the right, 0.6 times. The mean is 0.9 times the
-    // strength.
+    // strength, so bonds up to 2.2 m hold. Longer bonds lie in the horizon of the left end only, so the left
+    // stress breaks them.
     let [broken, intact] = across(&text, 1.2 * STRENGTH / stiffness);
     assert!(broken[0] == 0 && intact[0] > 0, "{broken:?} {intact:?}");
     assert!(broken[1] > 0 && intact[1] == 0, "{broken:?} {intact:?}");

@@ -1,4 +1,5 @@
-//! Separating a body along a plane dissipates the fracture energy, for every damage law in every dimension.
+//! The energy that separating a body along a plane dissipates, compared with the fracture energy, for damage
+//! by stretch, by energy and of softening bonds.
 //!
 //! The opening is multiplied by a factor in each step, so the stretch at which a bond breaks is too large by
 //! up to this factor. The overshoot energy of the bond is not counted. The remaining error is the quadrature
@@ -16,8 +17,9 @@ use crate::support::{displace, problem, simulate};
 /// G0, J/m².
 const FRACTURE_ENERGY: f64 = 2.0;
 
-/// Return the deck of a body with unit spacing and a cut plane between two layers of points. Families of the
-/// points above and below the middle of the cut, and of their neighbours, are complete.
+/// Return the deck of a body with unit spacing and a cut plane between two layers of points. The points above
+/// and below the middle of the cut have all their bonds across the cut. With state-based laws, the families
+/// at both ends of these bonds are complete.
 fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     let (rule, more) = rule.split_once(' ').unwrap_or((rule, ""));
     let (dimension, constraint) = match dimension {
@@ -150,7 +152,8 @@ fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
             (0..D).all(|k| k == axis || place[k].abs() < 1e-9)
         };
         let line = (0..model.owned()).filter(on_line);
-        // A bond that has yielded releases only the energy that it has not dissipated before.
+        // A bond that has yielded releases only the energy that it has not dissipated before, so both
+        // energies count.
         let fields = &simulation.fields;
         let [freed, overshoot] =
             [&fields.freed_energy, &fields.overshoot_energy].map(|field| field.as_ref().unwrap());
@@ -217,7 +220,8 @@ fn of_the_prototype_law() {
 
 #[test]
 fn of_the_elastic_plastic_law() {
-    // Without yielding, the bonds of the coarsest lattice would break at a stretch of about 0.02.
+    // Without yielding, the bonds of the coarsest lattice would break at a stretch of about 0.02, so they
+    // yield before they break.
     let law = "elastic_plastic_pmb = { density = 1, youngs_modulus = 3e3, yield_stretch = 0.008 }";
     in_a_bar(law);
     in_the_plane(law, 1.0);
@@ -229,8 +233,8 @@ fn of_the_elastic_plastic_law() {
 
 #[test]
 fn of_the_softening_law() {
-    // Without softening, the bonds of the coarsest lattice would break at a stretch of about 0.02. The
-    // dissipated energy follows from the largest stretch, so that steps may be long.
+    // Without softening, the bonds of the coarsest lattice would break at a stretch of about 0.02, so they
+    // soften before. The dissipated energy follows from the largest stretch, so that steps may be long.
     for curve in ["bilinear", "trilinear", "exponential"] {
         let law = format!(
             "softening_pmb = {{ density = 1, youngs_modulus = 3e3, strength_stretch = 0.005, \
@@ -258,7 +262,8 @@ fn of_the_normalised_law() {
 
 #[test]
 fn of_the_normalised_law_as_printed() {
-    // In the plane, the calibration of this form of the law (eq. 16) counts the energy of each bond twice.
+    // In the plane, eq. 16 of Diehl & Schweitzer (2016) for the critical stretch counts the energy of each
+    // bond twice, so an opening costs half of G0.
     in_the_plane(DIEHL, 0.5);
     in_space(DIEHL, [2, 3]);
 }
@@ -286,7 +291,8 @@ const WAN: &str = "correspondence = { density = 1, youngs_modulus = 3e3, poisson
 
 #[test]
 fn by_the_energy_of_bonds_of_bond_based_laws() {
-    // The energy of a bond of these laws follows from its stretch.
+    // The energy of a bond of these laws follows from its stretch, so both rules break a bond at the same
+    // stretch.
     let plastic =
         "elastic_plastic_pmb = { density = 1, youngs_modulus = 3e3, yield_stretch = 0.008 }";
     for law in [PMB, plastic, NORMALISED] {
@@ -312,7 +318,8 @@ fn by_energy(law: &str, growth: f64, [strain, stress, space]: [Range<f64>; 3]) {
 #[test]
 fn by_the_energy_of_bonds_of_correspondence() {
     // A broken bond changes the deformation gradients of both ends, and thus the energies of the other bonds
-    // of both ends. The total cost is therefore less than the sum of the energies of the broken bonds.
+    // of both ends. The total cost therefore differs from the sum of the energies of the bonds at their
+    // breaking.
     by_energy(CORRESPONDENCE, 0.01, [0.93..1.02, 0.95..1.01, 0.85..0.9]);
     by_energy(WAN, 0.01, [0.78..0.85, 0.77..0.85, 0.66..0.71]);
 }
@@ -327,7 +334,8 @@ fn by_the_energy_of_bonds_of_bond_associated_correspondence() {
 #[test]
 fn by_the_energy_of_bonds_of_the_ordinary_law() {
     // A broken bond changes the energy of the other bonds of both ends. The released energy exceeds the
-    // energy of the broken bonds if the dilatation resists (ν above 1/4), and is smaller otherwise.
+    // energy of the broken bonds if ν is above the ratio of a bond-based law (1/4, or 1/3 in plane stress),
+    // and is smaller otherwise.
     let [low, high] = [0.1, 0.4].map(|ratio| ordinary(ratio, "constant"));
     by_energy(&low, 0.01, [0.94..0.96, 0.94..0.96, 0.9..0.93]);
     by_energy(&high, 0.01, [1.1..1.15, 1.0..1.02, 1.05..1.1]);
@@ -411,7 +419,7 @@ fn of_mixed_modes_by_stretch_and_by_energy() {
         }
     }
     // The critical stretch of the ordinary law is calibrated for an opening. In an opening, the dilatation
-    // adds or releases energy.
+    // adds or releases energy, so the other modes cost more or less than G0.
     let [slide, slanted] = of_mixed_modes(&ordinary(0.1, "constant"), STRETCH);
     assert!(slide > 1.1 && slanted > 1.06, "{slide} {slanted}");
     let [slide, slanted] = of_mixed_modes(&ordinary(0.4, "constant"), STRETCH);
@@ -527,7 +535,7 @@ fn in_a_pair_of_bodies_with_damage_of_its_own() {
         (PMB, STRETCH, vec![None, Some(&tough), Some(&weak)]),
         (NORMALISED, STRETCH, vec![Some(&tough)]),
         (&*soft, STRETCH, vec![None]),
-        // Bonds between the bodies break by energy, and bonds within a body break by stretch.
+        // Bonds between the bodies break by energy. Bonds within a body never break, or break by stretch.
         (&*soft, ENERGY, vec![None, Some(&tough)]),
         (CORRESPONDENCE, ENERGY, vec![None, Some(&tough_by_work)]),
     ] {

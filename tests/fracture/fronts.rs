@@ -62,13 +62,14 @@ fn a_front_looks_at_the_points_near_its_line() {
     let front = |radius, component| {
         simulate::<3, _>(&deck(radius, component), |mut s| last::<3, 1>(&mut s)[0])
     };
-    // Near the line, points at x = 3.5 exceed the threshold, and points at 2.5 do not move: 4.5 + (value −
-    // 0.5)/value.
+    // Near the line, points at x = 3.5 exceed the threshold, and points at x = 2.5 do not move. The front is
+    // measured from x = 8 downwards, so it is at 4.5 + (value − 0.5)/value.
     let length = (0.2_f64.powi(2) + 0.3_f64.powi(2) + 0.6_f64.powi(2)).sqrt();
     assert!((front("0.1", "") - (4.5 + (length - 0.5) / length)).abs() < 1e-12);
     assert!((front("1.5", ", component = 'z'") - (4.5 + 0.1 / 0.6)).abs() < 1e-12);
     assert!(front("1.5", ", component = 'x'").is_nan());
-    // With radius 2, points with z < 1 count. The last point of the line is at x = 2.5.
+    // With radius 2, the points with z < 1 also count, and all of them exceed the threshold. The front is
+    // then at the last point within the length of 6 m, x = 2.5.
     assert!((front("2", "") - 5.5).abs() < 1e-12);
 }
 
@@ -142,8 +143,8 @@ fn the_tip_of_a_running_crack() {
             assert!((0.0..1e-3).contains(&ahead), "{ahead}");
             assert_eq!(of(row, "tip_crack_x"), of(row, "tip_crack_length"));
         }
-        // The tip is at rest until the load arrives over 20 mm, and then slower than Rayleigh waves, 3.1
-        // km/s.
+        // The tip is at rest until the load has travelled 20 mm. Afterwards the tip is slower than Rayleigh
+        // waves, which travel at 3.1 km/s.
         let speeds: Vec<f64> = rows[1..]
             .iter()
             .map(|row| of(row, "tip_crack_speed"))

@@ -79,8 +79,8 @@ fn opening_costs_the_fracture_energy_of_its_direction() {
     }
 }
 
-/// The breaking strain of a bond, divided by that of an isotropic body, depends on the direction of the bond
-/// as w_c does.
+/// The breaking strain of a bond, divided by the breaking strain in an isotropic body, is the square root of
+/// w_c/w in the direction of the bond.
 #[test]
 fn bonds_along_the_direction_break_last() {
     let law = "pmb = { density = 2, youngs_modulus = 1e6 }";
@@ -91,7 +91,8 @@ fn bonds_along_the_direction_break_last() {
         "critical_stretch",
         &directed(1.9, "[3, 0]"),
     );
-    // 1.9 is the largest ratio with the exponent k = 1: w_c = (0.1 + 2.7 (n·a)²) w.
+    // 1.9 is the largest ratio with the exponent k = 1: w_c = (0.1 + 2.7 (n·a)²) w, with the direction n of
+    // the bond and the direction a of the fibres.
     let isotropic = deck(
         "plane-stress",
         2,

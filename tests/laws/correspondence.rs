@@ -556,8 +556,10 @@ fn shear_waves_have_no_dispersion_of_the_second_order_with_the_control_of_that_n
             };
             let [none, wan, found] = ["none", "wan2019", "dispersion"].map(of);
             let case = format!("{dimension} {ratio}: {none:?} {wan:?} {found:?}");
-            // Without control, the error is about −(κδ)²/7 in 3-D and −(κδ)²/6 in the plane. With B = b/k I
-            // it is (3b/4M − 1) times (κδ)²/7 or (κδ)²/6.
+            // The error without control is about −(κδ)²/7 in 3-D and −(κδ)²/6 in the plane, with the wave
+            // number κ. A control B = (b/k) I multiplies this error by 1 − 3b/(4M), where M is the modulus of
+            // the wave. The control `dispersion` has b = 4G/3, so the factor is 0 for shear waves and 1 − G/M
+            // for pressure waves.
             assert!(
                 none.iter().all(|error| (-0.048..-0.03).contains(error)),
                 "{case}"
@@ -626,8 +628,8 @@ fn check_singular_rows(name: &str, [below, above]: [f64; 2], size: usize, horizo
 #[test]
 fn points_with_too_few_bonds_carry_no_force_and_are_counted() {
     for name in LAWS {
-        // One row, with bonds along the row only; then two rows, which would be 15 times as stiff as complete
-        // families.
+        // The first case is one row, which has bonds along the row only. The second case is two rows, which
+        // would be 15 times as stiff as complete families.
         check_singular_rows(name, [4.0, 5.0], 9, 2.5);
         check_singular_rows(name, [5.0, 7.0], 13, 3.5);
     }
@@ -671,8 +673,9 @@ fn a_plate_that_is_torn_keeps_its_energy_at_the_default_step() {
     ] {
         let (energies, broken) = torn(&law);
         assert!(broken > 2000, "{law}: {broken}");
-        // One crack through the plate costs 5.4 J at 0.8 of G0; the cracks here branch. An unstable run would
-        // be wrong by orders of magnitude.
+        // One straight crack through the plate would dissipate 5.4 J, if the energy per area is 0.8 G0. The
+        // cracks of this run branch, so they dissipate more. The energy of an unstable run would be wrong by
+        // orders of magnitude.
         assert!(
             (5.4..15.0).contains(&energies.fracture),
             "{law}: {energies:?}"

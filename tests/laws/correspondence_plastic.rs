@@ -198,7 +198,8 @@ fn a_cycle_of_shear_follows_the_curve_of_its_yield_stress() {
     let curve = || Curve {
         modulus: SHEAR,
         strength: YIELD / root,
-        // ε̄ is the plastic shear over √3.
+        // τ = (σ_y + H ε̄)/√3 at yield, and ε̄ is the plastic shear divided by √3, so τ rises by H/3 per
+        // plastic shear.
         hardening: HARDENING / 3.0,
         plastic: 0.0,
         flowed: 0.0,
@@ -358,8 +359,8 @@ fn the_energy_of_large_plastic_strains_is_balanced() {
 
 #[test]
 fn a_relaxed_body_yields_as_one_that_is_pulled() {
-    // The supports are two horizons long, so that the neighbours of free points have families without an end
-    // of the bar.
+    // The supports are two horizons long, so that all neighbours of free points have families that the ends
+    // of the bar do not cut.
     let text = format!(
         "dimension = 'plane-stress'
         thickness = 0.5
@@ -380,7 +381,7 @@ fn a_relaxed_body_yields_as_one_that_is_pulled() {
         let snapshot = Snapshot::new(&mut simulation);
         let stress = snapshot.field(&mut simulation, Field::Stress);
         let flowed = snapshot.field(&mut simulation, Field::PlasticStrainEquivalent);
-        // E (ε − ε̄) = σ_y + H ε̄.
+        // E (ε − ε̄) = σ_y + H ε̄ with ε = 3 σ_y/E gives ε̄ = 2 σ_y/(E + H).
         let growth = 2.0 * YIELD / (YOUNG + HARDENING);
         for point in 0..simulation.model.owned() {
             let [xx, yy] = [stress[6 * point], stress[6 * point + 1]];
@@ -399,8 +400,8 @@ fn a_relaxed_body_yields_as_one_that_is_pulled() {
     });
 }
 
-/// Pull a bar without hardening to 1 % strain. Return its load divided by the yield load, and the error of
-/// the energy balance divided by the work.
+/// Pull a bar with hardly any hardening until it is 1 % longer. Return its load divided by the yield load,
+/// and the error of the energy balance divided by the work.
 fn limit_load(control: &str) -> [f64; 2] {
     let text = format!(
         "dimension = '3d'

@@ -87,7 +87,8 @@ fn bulk_stiffness_of_the_prototype_law_on_a_cubic_lattice() {
 
 #[test]
 fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
-    // The central point is two horizons from the surface, so that its neighbours have the same constant.
+    // The central point is three horizons from the surface. Its neighbours then also have complete families,
+    // and the normalised law gives them the same constant.
     for (dimension, own) in [
         ("plane-stress", 1.0 / 3.0),
         ("plane-strain", 0.25),
@@ -110,7 +111,8 @@ fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
                     "3d" => simulate::<3, _>(&deck, |mut s| response(&mut s, map)),
                     _ => simulate::<2, _>(&deck, |mut s| response(&mut s, map)),
                 };
-                // Classical: σ = E ε/(1−2ν) in 3-D, E ε/(1−ν) and E ε/((1+ν)(1−2ν)) in the plane.
+                // Classical: σ = E ε/(1−2ν) in 3-D, E ε/(1−ν) in plane stress, and E ε/((1+ν)(1−2ν)) in plane
+                // strain.
                 let (count, modulus) = match dimension {
                     "3d" => (3.0, 5.0 / (1.0 - 2.0 * ratio)),
                     "plane-stress" => (2.0, 5.0 / (1.0 - ratio)),
@@ -133,7 +135,8 @@ fn normalised_and_ordinary_laws_hold_the_classical_energy_of_expansion() {
                     (stress[2] - across).abs() < 1e-9 * stress[0],
                     "{case}: {stress:?}"
                 );
-                // T⊗Y is σ F, hence the factor 1 + ε.
+                // The output stress is Σ T ⊗ Y V with the deformed bonds Y = (1 + ε) ξ, hence the factor 1 +
+                // ε.
                 let expected = modulus * strain * (1.0 + strain);
                 assert!(
                     (stress[0] / expected - 1.0).abs() < 1e-9,
@@ -177,8 +180,9 @@ fn moments(count: usize, horizon: f64, influence: impl Fn(f64) -> f64) -> [f64; 
 #[test]
 fn the_ordinary_law_under_every_strain() {
     // The law assumes isotropic fourth moments of the family, which a square or cubic lattice does not have.
-    // The shear modulus is G (A − B) a/2m for an axis-parallel deviatoric strain and G B a/m for a shear
-    // along the axes, with a = 8 in the plane and 15 in 3-D. Dilatation and pressure are exact.
+    // With m, A and B as returned by `moments`, the shear modulus is G (A − B) a/(2m) for an axis-parallel
+    // deviatoric strain, and G B a/m for a shear along the axes. The factor a is 8 in the plane and 15 in
+    // 3-D. Dilatation and pressure are exact.
     type Named = (&'static str, fn(f64) -> f64);
     let influences: [Named; 3] = [
         ("constant", |_| 1.0),
@@ -311,7 +315,7 @@ fn a_bar_that_contracts_freely_has_youngs_modulus_and_no_stress_across() {
             (dilatation / wanted - 1.0).abs() < 1e-9,
             "{law}: {dilatation}"
         );
-        // The cross-section changes by the factor F^(−2ν).
+        // The cross-section changes by the factor F^(−2ν), so the volume changes by F^(1 − 2ν).
         let volume = libm::pow(stretch, 1.0 - 2.0 * ratio);
         assert!(
             (cauchy * volume / stress[0] - 1.0).abs() < 1e-12,
@@ -391,7 +395,7 @@ fn bond_based_laws_under_every_strain() {
     ] {
         let (c, energy, bulk_energy) = (c * modulus, energy * modulus, bulk_energy * modulus);
         let sum = |of: fn(f64) -> f64| {
-            // Σ of(r) is the energy at unit stretch with c = 4 of(r)/r.
+            // The energy at unit stretch is ¼ Σ c r V, so c = 4 of(r)/r gives Σ of(r) V.
             let isotropic = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             section * lattice_response(count, horizon, isotropic, |r| 4.0 * of(r) / r).0
         };
@@ -463,7 +467,7 @@ fn bond_based_laws_under_every_strain() {
                     .iter()
                     .fold(0.0_f64, |scale, entry| scale.max(entry.abs()));
                 for (k, (found, expected)) in stress.iter().zip(tensor).enumerate() {
-                    // Stress across the setting is not a sum over bonds.
+                    // The normal stress perpendicular to the plane or bar is not a sum over bonds.
                     let along = !(count..3).contains(&k);
                     assert!(
                         !along || (found - expected).abs() < 1e-5 * scale,
@@ -516,7 +520,7 @@ fn long_waves_on_a_cubic_lattice_have_the_speed_of_the_lattice_sum() {
 
 #[test]
 fn waves_in_a_bar_disperse_as_the_integral_says() {
-    // ω² = (4c/ρδ²) Cin(kδ), with c the modulus of uniaxial strain.
+    // ω² = 4M/(ρδ²) Cin(kδ), with the modulus M of uniaxial strain and Cin(x) = ∫₀ˣ (1 − cos t)/t dt.
     let modulus: f64 = 1.2 * 5.0;
     for (number, expected) in [
         (0.5, 0.9948),

@@ -105,7 +105,7 @@ fn bodies_with_the_rule_none_do_not_feel_each_other() {
 }
 
 /// Return the deck of three blocks with different moduli, horizons and spacings, and a rule for each pair.
-/// Two of the blocks can break.
+/// Two of the blocks can break, unless the laws are linear.
 fn blocks(law: [&str; 3], correction: &str, rules: [&str; 3]) -> String {
     let [soft, firm, hard] = law;
     let [first, second, third] = rules;
@@ -184,8 +184,9 @@ fn momentum_is_kept_by_every_rule() {
 #[test]
 fn pieces_that_are_worked_on_between_messages_do_not_cut_vectors() {
     // Points of the fine layers have bonds in two lists and in a lattice, and floating-point sums depend on
-    // the order of their terms. Each rank has more points than one piece of work. For each width, the borders
-    // between pieces cut the vectors of the lattice elsewhere.
+    // the order of their terms. Each rank has more points than one piece of work. A border between pieces
+    // that does not lie between two vectors would cut a vector; the position of this border depends on the
+    // width.
     let piece = 4096 * rayon::current_num_threads();
     let layers = |below: usize, above: usize, width: usize| {
         let boxes = (0..piece / 280).map(|n| {

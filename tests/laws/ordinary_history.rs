@@ -204,7 +204,8 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
         limit: of_shear,
         share: 1.0,
     };
-    // Plastic power (σ_xx − σ_yy) ė_xx, with the plastic strain e and σ_xx − σ_yy = 2G (ε − 3/2 e_xx).
+    // The plastic power is (σ_xx − σ_yy) ė_xx, with the plastic strain e. Because σ_xx − σ_yy = 2G (ε − 3/2
+    // e_xx), the plastic strain of the model is 3/2 e_xx, and the share is 2/3.
     let pull = Way {
         over: |[x, ..]| x,
         stress: |stress| stress[0] - stress[1],

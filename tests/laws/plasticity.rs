@@ -160,8 +160,9 @@ fn wave(size: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
 
 #[test]
 fn below_the_yield_stretch_it_is_the_prototype_law_to_the_bit() {
-    // Hence the force is the derivative of the energy below the yield stretch. Above it, the force is the
-    // derivative of the sum of energy and dissipation; the next test checks this.
+    // Below the yield stretch, forces and energy equal those of `pmb`, so the force is the derivative of the
+    // energy. Above the yield stretch, the force is the derivative of the sum of energy and dissipation; the
+    // next test checks this.
     let pmb = format!("pmb = {{ density = 2, youngs_modulus = {MODULUS} }}");
     for (size, same) in [(0.01, true), (0.1, false)] {
         let [elastic, yielding] = [pmb.as_str(), &law()].map(|law| {
@@ -176,7 +177,7 @@ fn below_the_yield_stretch_it_is_the_prototype_law_to_the_bit() {
 
 #[test]
 fn work_goes_into_energy_and_dissipation() {
-    /// Check the balance near the last of these states.
+    /// Check the balance near the last of the states with these sizes.
     fn near<const D: usize>(mut simulation: Simulation<D>, sizes: &[f64]) {
         for size in sizes {
             displace(&mut simulation, wave(*size));

@@ -67,8 +67,8 @@ fn energies<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 2] {
         .map(|density| density.iter().zip(volume.iter()).map(|(w, v)| w * v).sum())
 }
 
-/// Load a bond, unload it to the origin, compress it, load it again and break it. `path` has the stretches
-/// and the expected forces.
+/// Load a bond, unload it to the origin, compress it, load it again and break it. `path` has the stretches,
+/// and the expected forces divided by c V, with the volume V of a point.
 fn follow(more: &str, path: &[[f64; 2]]) {
     simulate::<1, _>(&pair(&law(more)), |mut simulation| {
         let (mut before, mut force_before, mut work) = (0.0, 0.0, 0.0);

@@ -25,7 +25,8 @@ fn free_expansion_has_no_force_and_no_energy() {
             assert!(column.iter().all(|stretch| *stretch == column[0]));
             column[0]
         };
-        // α (T − T₀) = 0.01; the expansion is larger if the strain across is 0.
+        // α (T − T₀) = 0.01. If the strain across is 0, the expansion is larger for a Poisson's ratio above
+        // 0, and smaller for a negative one.
         let dimension = simulation.problem.dimension;
         let wanted = if dimension.is_confined() {
             0.006..0.02
@@ -39,8 +40,9 @@ fn free_expansion_has_no_force_and_no_energy() {
         assert!(scale > 0.0 && energy > 0.0);
         displace(&mut simulation, |x| x.map(|x| (1.0 + stretch) * x));
         let law = &simulation.problem.bodies[0].material.law;
-        // Rounding errors of the positions of up to 40 bonds, divided by a strain of 1 %, are some 1e-12; the
-        // energy has the square of this error.
+        // Positions of up to 40 m have rounding errors of up to 1e-14 m. Divided by a strain of 1 %, the
+        // relative error of the forces is some 1e-12, and the relative error of the energy is the square of
+        // this.
         assert!(largest_force(&simulation) < 1e-10 * scale, "{law:?}");
         assert!(
             strain_energy(&mut simulation).abs() < 1e-15 * energy,
@@ -188,7 +190,8 @@ fn a_clamped_body_has_the_stress_of_hookes_law() {
     }
 }
 
-/// Timoshenko (1925): layers of the same thickness and stiffness bend with curvature 3/2 Δα ΔT/h.
+/// Timoshenko (1925): two layers of the same thickness and stiffness bend with curvature 3/2 Δα ΔT/h, with
+/// the total thickness h.
 #[test]
 fn a_bimaterial_strip_bends_with_timoshenkos_curvature() {
     let (height, length) = (12.0, 72.0);

@@ -19,7 +19,7 @@ fn ends(mut simulation: Simulation<'_, 3>, names: &[&str]) -> [Vec<f64>; 2] {
         let values = row(&mut observer, simulation).values;
         places.iter().map(|place| values[*place]).collect()
     };
-    // The history needs its first row.
+    // Energy errors are relative to the first row.
     look(&mut simulation);
     let mut middle = None;
     while !simulation.is_over() {
@@ -41,7 +41,7 @@ fn series<const D: usize>(
 ) -> Vec<Vec<f64>> {
     let mut observer = HistoryObserver::new(&simulation).unwrap();
     let places: Vec<usize> = names.iter().map(|name| column(&observer, name)).collect();
-    // The history needs its first row.
+    // Energy errors are relative to the first row.
     row(&mut observer, &mut simulation);
     let mut rows = Vec::new();
     while !simulation.is_over() {
@@ -307,7 +307,7 @@ fn a_tube_breaks_alike_on_a_lattice_and_not_with_scatter() {
         "momentum_x",
         "momentum_y",
     ];
-    // Return the lateral momentum as a fraction.
+    // Return the sum of the absolute lateral components of the momentum, kg m/s.
     let run = |jitter, modulus| {
         simulate_input::<3, _>(
             "fragmenting_cylinder",

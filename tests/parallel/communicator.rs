@@ -76,7 +76,8 @@ fn ranks_may_have_nothing_to_gather() {
         return;
     }
     let world = World::start().unwrap();
-    // The address of an empty vector of bytes equals `MPI_IN_PLACE`, so it must not be passed to MPI.
+    // The address of an empty vector of bytes equals `MPI_IN_PLACE` of Open MPI, so it must not be passed to
+    // MPI.
     assert!(world.all_gather(&Vec::new()).is_empty());
     for giver in 0..2 {
         let own = if world.rank() == giver {

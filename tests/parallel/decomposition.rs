@@ -1,5 +1,5 @@
 //! A deck gives equal bits on any number of ranks and threads. Ranks are threads of the test, which avoids
-//! starts of MPI. Four decks are also run by the command under `mpirun`.
+//! starts of MPI. Five decks are also run by the command under `mpirun`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -189,8 +189,8 @@ relaxation = { load_steps = 6, tolerance = 1e-4 }
 on = ['down']
 ";
 
-/// A rotating block that breaks at another block, with friction and damping, and a third body beside the path
-/// of the fragments.
+/// A rotating block that breaks at another block, with friction and restitution; a rigid wall and a rigid
+/// hammer; and a third body beside the path of the fragments.
 const COLLISION: &str = "
 dimension = 'plane-strain'
 contact = { friction = 0.2, static_friction = 0.4, restitution = 0.8, pair.hit = { bodies = ['flying', 'target'], model = 'short-range' } }
@@ -210,7 +210,7 @@ output = { every_steps = 5, fields = ['displacement', 'velocity', 'damage', 'con
 history.every_steps = 3
 ";
 
-/// Fewer points than ranks.
+/// Three points, fewer than the largest number of ranks.
 const FEW: &str = "
 dimension = '1d'
 grid = { volume_correction = 'none', spacing = 1, horizon = 1.5 }
@@ -338,7 +338,8 @@ fn a_plate_of_two_materials_with_listed_bonds() {
 
 #[test]
 fn a_bar_whose_ghosts_lie_far_from_their_neighbours_in_memory() {
-    // More than 2^16 points on a rank, so that differences of local indices need more than 16 bits.
+    // On up to three ranks, a rank has more than 2^16 points, so that differences of local indices need more
+    // than 16 bits.
     let deck = "
         dimension = '1d'
         [grid]

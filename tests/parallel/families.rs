@@ -1,5 +1,5 @@
-//! Bonds in lattices and in lists give the same physics up to rounding; so do all sets of vector
-//! instructions.
+//! Bonds in lattices and in lists give the same physics up to rounding. All sets of vector instructions give
+//! the same bits.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ velocity = ['0.02*x', '0.02*y + 0.003*sin(x)', '0.002*z*x']
 end = 6
 ";
 
-/// A plane problem: a disc, regular points from a file beside it, and two grids that do not match.
+/// A plane problem: a disc, and a block with a finer grid that does not match the grid of the disc.
 const PLANE: &str = "
 dimension = 'plane-strain'
 [grid]
@@ -77,7 +77,7 @@ velocity = ['0.02*x', '0.02*y + 0.003*sin(x)']
 end = 6
 ";
 
-/// Return all fields that depend on bonds, sorted by global id.
+/// Return fields that depend on bonds, each with its values sorted by global id.
 fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
     let fields = [
         Field::Displacement,

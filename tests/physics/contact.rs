@@ -45,8 +45,8 @@ fn a_ball_that_goes_through_a_plate_is_told_once() {
     let deck = ball_and_plate("[0, -1]", "");
     let alone = warnings(1, &deck);
     assert_eq!(alone.len(), 1, "{alone:?}");
-    // After 5 s the lowest points of the ball (y = 9.5) are one spacing above the points of the plate (y =
-    // 3.5); then the distance is smaller.
+    // After 5 s the lowest points of the ball, initially at y = 9.5, are one spacing above the highest points
+    // of the plate at y = 3.5; then the distance is smaller.
     let expected = "warning: at t = 5.2500e0 s points of `plate` and `ball` are closer";
     assert!(alone[0].starts_with(expected), "{alone:?}");
     let place = alone[0].split(['(', ')']).nth(1).unwrap();

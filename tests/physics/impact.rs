@@ -212,7 +212,8 @@ fn a_block_on_an_incline_slides_or_sticks() {
         &names,
     );
     let last = rows.last().unwrap();
-    // The block creeps against the drag of its eight points, √(k m) each, with k = 2 E ℓ/δ.
+    // Sticking is a viscous drag of √(k m) at each of the eight touching points, with k = 2 E ℓ/δ and m = 2
+    // kg. The block therefore creeps with the friction force divided by this drag.
     let creep = last[2] / (8.0 * (2.0 * 5.0 / 3.0 * 2.0_f64).sqrt());
     assert!((last[1] / mass / creep - 1.0).abs() < 0.02, "{last:?}");
     let weight = mass * 0.01 * 0.2_f64.sin();

@@ -93,8 +93,9 @@ fn run(
     fissure::run(problem, &threads::alone(), options, observer)
 }
 
-/// Assert that a run with factors gives the bits of a run whose load expression contains the factors, each
-/// from just before a time (s).
+/// Assert that a run with factors gives the bits of a run whose load expression contains the factors.
+/// `factors` has the step at which the observer sets a factor, the factor, and the time (s) after which the
+/// expression contains it.
 fn is_as_by_expression(name: &str, time: &str, outputs: &str, factors: &[(u64, f64, f64)]) {
     let folder = Folder::new(name);
     let [controlled, expressed] = ["controlled", "expressed"].map(|name| folder.join(name));

@@ -7,7 +7,8 @@ use fissure::solver::refinement::Regridded;
 
 use crate::support::{displace, problem, simulate, simulate_on};
 
-/// Return the deck of a plate with a hole, refined twice around a position on its edge and once elsewhere.
+/// Return the deck of a plate with a hole, refined twice at the edge of the hole and once in a corner of the
+/// plate.
 fn plate(more: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -359,7 +360,7 @@ fn bonds_of_mean_horizons_are_the_same_on_any_number_of_ranks() {
     are_the_same(&text, [100, 0]);
 }
 
-/// Return mass, momentum by component, released energy, and volume.
+/// Return mass, momentum by component, and released energy.
 fn sums(simulation: &Simulation<'_, 2>) -> Vec<f64> {
     let (model, fields) = (&simulation.model, &simulation.fields);
     let freed = fields.freed_energy.as_ref().expect("bonds break");

@@ -271,7 +271,8 @@ fn a_piece_that_breaks_off_is_named() {
     }
 }
 
-/// Return the deck of a plate in three strips without bonds between them; the left strip is fixed.
+/// Return the deck of a plate in three strips without bonds between them. The left strip is held along x and
+/// moved along y.
 fn strips(conditions: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -580,7 +581,7 @@ fn a_load_step_that_breaks_before_its_first_iteration_is_counted_once() {
     let rows = energies_of_load_steps(deck);
     let [row] = rows[..] else { panic!("{rows:?}") };
     assert!(row.fracture > 0.0 && row.strain > 0.0, "{row:?}");
-    // The bonds of a bar are linear, and no point moves when bonds break.
+    // The bonds of a bar are linear, and no point moves when bonds break, so no energy is lost.
     let lost = row.work - row.strain - row.fracture;
     assert!(lost.abs() < 1e-9 * row.work, "{row:?}");
 }
@@ -689,7 +690,7 @@ fn goes_on_from_within_a_load_step_to_the_same_bits() {
     assert!(within >= 3, "{within} stops within a load step");
 }
 
-/// A strip of a plastic solid is pulled to ten times its yield strain. The reference force was computed with
+/// A strip of a plastic solid is pulled to four times its yield strain. The reference force was computed with
 /// 500 load steps. The limit load of a continuum is 2/√3 σ_y A = 6.93 N; families at surfaces carry more.
 #[test]
 fn bonds_that_flow_are_in_equilibrium_after_any_number_of_load_steps() {

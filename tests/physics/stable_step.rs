@@ -196,7 +196,7 @@ fn below_the_step_the_energy_is_bounded_and_beyond_the_limit_it_is_not() {
                 "{dimension}: {found}, at most {swing}"
             );
         }
-        // With ωΔt = 2.04, the energy grows by a factor of 1.49 per step.
+        // With ωΔt = 2.04, the amplitude grows by a factor of 1.49 per step, and the energy by its square.
         let found = growth::<D>(&system, 1.02 * limit, 100);
         assert!(found > 1e9, "{dimension}: {found}");
     }

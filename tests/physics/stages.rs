@@ -90,7 +90,8 @@ fn a_relaxed_body_stays_at_rest() {
 fn a_body_that_is_let_go_swings_about_its_place() {
     let seen = see(&bar("safety = 0.1\n off = ['pull']"));
     let strain = seen.preload.strain;
-    // Half a period is less than 2 L/c = 32 s, with L = 28 m and c = √3 m/s.
+    // The end has its lowest displacement after half a period, 2 L/c = 35 s with L = 28 m and c = √(E/ρ) =
+    // √2.5 m/s. The second stage lasts 40 s.
     assert!((seen.lowest + seen.displacement).abs() < 0.1 * seen.displacement);
     assert!(
         (0.9..1.001).contains(&(seen.kinetic / strain)),

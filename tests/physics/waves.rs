@@ -183,7 +183,7 @@ fn a_pulse_has_the_speed_of_the_normalised_law_in_a_wide_family() {
 
 #[test]
 fn standing_waves_in_a_bar_disperse_as_the_integral_says() {
-    // ω = k c with the phase speeds of ω² = (4c/ρδ²) Cin(kδ), where c is the modulus of uniaxial strain. The
+    // ω² = 4M/(ρδ²) Cin(kδ), with the modulus M of uniaxial strain and Cin(x) = ∫₀ˣ (1 − cos t)/t dt. The
     // displacement in the middle of a long bar is zero at π/2ω, before waves from the ends arrive.
     let (horizon, modulus) = (40.0, 1.2_f64 * 5.0);
     let speed = (modulus / DENSITY).sqrt();

@@ -72,7 +72,7 @@ fn outputs(out: &Path) -> usize {
     steps.map_or(0, |steps| steps.len())
 }
 
-/// Return the number of lines of `history.csv`.
+/// Return the number of lines of `history.csv`; 0 without this file.
 fn rows(out: &Path) -> usize {
     let text = std::fs::read_to_string(out.join("history.csv"));
     text.map_or(0, |text| text.lines().count())
@@ -470,7 +470,7 @@ fn a_collision_of_scattered_bodies_goes_on_as_if_it_had_never_stopped() {
     collision_goes_on("scattered-collision", scatter);
 }
 
-/// Stop a collision in the middle and restart it on other ranks; the result must equal that of an
+/// Stop a collision in the middle and restart it on another number of ranks; the result must equal that of an
 /// uninterrupted run.
 fn collision_goes_on(name: &str, [jitter, weibull]: [&str; 2]) {
     let folder = Folder::new(name);
@@ -521,8 +521,8 @@ fn dissipates(result: &BTreeMap<String, Vec<u64>>) {
     assert!(middle > 0.0 && *dissipated.last().unwrap() > middle);
 }
 
-/// Stop a run in the middle and restart it on other ranks; the result must equal that of an uninterrupted
-/// run. Return the result.
+/// Stop a run in the middle and restart it on another number of ranks; the result must equal that of an
+/// uninterrupted run. Return the result.
 fn goes_on(name: &str, law: &str, family: &str) -> BTreeMap<String, Vec<u64>> {
     let folder = Folder::new(name);
     let text = plate("1e-5", "")

@@ -232,7 +232,7 @@ fn a_restart_may_change_the_further_results() {
             .zip(&now)
             .all(|((before, new), now)| before + new == *now)
     );
-    // A file of another run is renamed.
+    // A file of an output that the checkpoint does not contain is renamed.
     let third = deck(&folder, "third.toml", &[FURTHER]);
     let printed = printed_by(&mut run(
         1,

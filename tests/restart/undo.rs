@@ -7,8 +7,7 @@ use fissure::solver::Simulation;
 use fissure::solver::motion::{Kept, Saved};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
-/// Return the deck of a damped plate that is torn by supports and loads, with bonds in lists between its
-/// bodies.
+/// Return the deck of a notched plate that is torn by supports and a load.
 fn plate(law: &str, alpha: f64, family: &str) -> String {
     format!(
         "dimension = 'plane-stress'

@@ -88,7 +88,7 @@ pub fn forces<const D: usize>(simulation: &Simulation<D>) -> Vec<[f64; D]> {
     points.map(|point| force(simulation, point)).collect()
 }
 
-/// Return the largest component of the force density of all owned points, N/m³.
+/// Return the largest absolute value of a component of the force density, over all owned points, N/m³.
 pub fn largest_force<const D: usize>(simulation: &Simulation<D>) -> f64 {
     let components = forces(simulation).into_iter().flatten();
     components.fold(0.0, |largest, force| force.abs().max(largest))

@@ -99,7 +99,7 @@ pub struct SweepArguments {
 }
 
 impl SweepArguments {
-    /// Return the output folder.
+    /// Return the output folder, by default `out/<deck>_sweep`.
     fn folder(&self) -> PathBuf {
         let default = || {
             let stem = self.deck.file_stem().unwrap_or_default();

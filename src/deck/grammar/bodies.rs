@@ -8,7 +8,7 @@ use crate::deck::group_name::GroupName;
 use crate::deck::number::{Edges, Number, Vector};
 use crate::deck::spanned::Spanned;
 
-/// A body: a shape filled with lattice points, or a file of points.
+/// A body: a shape filled with lattice points, or points from a file or mesh.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {

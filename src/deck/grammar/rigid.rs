@@ -7,8 +7,9 @@ use super::Shape;
 use crate::deck::number::{Number, Vector};
 use crate::deck::spanned::Spanned;
 
-/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when its
-/// distance to the surface is half the edge of its cell, or its initial distance if that is smaller.
+/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when the
+/// distance of the point to the surface is half the edge of the point's cell, or the initial distance if that
+/// is smaller.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {

@@ -288,7 +288,7 @@ fn properties(
     Ok(())
 }
 
-/// Read `velocity`.
+/// Read `velocity … set`. Other styles of `velocity` are left out.
 fn velocity(
     translation: &Translation,
     variables: &Variables,

@@ -101,8 +101,9 @@ fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
 
 /// Write a prescribed temperature.
 ///
-/// The reference of thermal expansion is the temperature at the start. If `uniform`, it is the reference
-/// temperature of all materials; otherwise it is subtracted from the temperature.
+/// The reference of thermal expansion is the temperature at the start. If `uniform`, the start temperature is
+/// the reference temperature of all materials. Otherwise, the start temperature is subtracted from the
+/// prescribed temperature.
 fn temperature<'n>(
     translation: &mut Translation,
     sets: &mut Sets<'n>,

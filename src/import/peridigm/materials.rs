@@ -201,7 +201,7 @@ pub(super) fn read_materials(
     Ok((materials, expanding))
 }
 
-/// Write the keys of individual laws.
+/// Write the keys that only some laws have, and log the parameters that the law does not use.
 fn law_keys(
     translation: &Translation,
     table: &Node,

@@ -224,7 +224,7 @@ impl<'a> ResultFile<'a> {
     /// [`create`](Self::create).
     ///
     /// # Errors
-    /// If a field has the wrong length or the disk is full.
+    /// If the points of the result never change, a field has the wrong length, or the disk is full.
     pub fn set_points(&mut self, contents: &Contents) -> Result<()> {
         let Contents {
             piece,

@@ -31,9 +31,9 @@ impl<'a> ResultFile<'a> {
     /// Resume a result after its first steps and history rows, and drop later ones. Return the retained
     /// history rows.
     ///
-    /// A file of the same deck and version with space for all expected steps is continued in place. No
-    /// retained row moves, so a kill loses no row. Otherwise, or if the file is not writable, the retained
-    /// part is copied to a new file, which then replaces the old file.
+    /// A file is continued in place if its points never change, it is of the same deck and version, and it
+    /// has space for all expected steps. No retained row moves, so a kill loses no row. Otherwise, or if the
+    /// file is not writable, the retained part is copied to a new file, which then replaces the old file.
     ///
     /// # Errors
     /// If the old file cannot be read, has fewer steps, or other points or fields; if the disk is full.
@@ -262,8 +262,8 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     Ok(true)
 }
 
-/// Test whether a file can be continued in place: same deck and version, space for all expected steps, and
-/// no chunk freed by the truncation.
+/// Test whether a file can be continued in place: points that never change, same deck and version, space for
+/// all expected steps, and no chunk freed by the truncation.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,
