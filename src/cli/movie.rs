@@ -9,7 +9,8 @@ use fissure::picture::Image;
 use fissure::picture::film::Film;
 
 use super::plot::check_ending;
-use super::plot::picture::{Frame, Painter, PictureArguments, beside};
+use super::plot::limits::Frame;
+use super::plot::picture::{Painter, PictureArguments, beside};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 

@@ -1,6 +1,9 @@
 //! `fissure plot`: a picture of a field, or curves of the history.
 
+mod blocks;
+mod choice;
 pub mod curves;
+pub mod limits;
 mod paths;
 pub mod picture;
 mod quantity;

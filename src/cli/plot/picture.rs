@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use fissure::error::{Error, Result};
-use fissure::message::suggestion;
-use fissure::output::{ResultReader, StoredField};
-use fissure::picture::{Axis, Bounds, Image, Scene, View, is_in_slice, render};
+use fissure::output::ResultReader;
+use fissure::picture::{Image, Scene, View, is_in_slice, render};
 
-use super::paths::{self, Line};
+use super::blocks::{blocks, is_zero, scattered_bodies};
+use super::choice::{choose_field, choose_times, number, view};
+use super::limits::{Frame, Limits, Range, range};
+use super::paths::{self, Line, NearestPoints};
 use super::quantity::Quantity;
 use super::{PlotArguments, check_ending};
 use crate::cli::format::si;
@@ -17,25 +19,6 @@ use crate::cli::{Verbosity, file_error, outln, result_file};
 
 /// Largest drawn displacement for `--deform auto`, relative to the body's size.
 const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
-
-/// Percentiles at the ends of the automatic range of colours if there are outliers.
-const PERCENTILES: [f64; 2] = [0.5, 99.5];
-
-/// Ratio of the full range to the percentile range above which there are outliers.
-const OUTLIERS: f64 = 4.0;
-
-/// Largest distance of a requested time from the first or last output, as a fraction of the output interval.
-const TIME_REACH: f64 = 0.5;
-
-/// Fields that are drawn by default, in order of preference.
-const PREFERRED: [&str; 6] = [
-    "damage",
-    "von_mises_stress",
-    "cauchy_stress",
-    "stress",
-    "velocity",
-    "displacement",
-];
 
 /// Options of pictures.
 #[derive(Args)]
@@ -123,153 +106,11 @@ pub fn beside(result: &Path, name: &str) -> PathBuf {
     result.with_file_name(format!("{further}{name}"))
 }
 
-fn number(text: &str, wanted: &str) -> Result<f64> {
-    let value = text
-        .trim()
-        .parse()
-        .ok()
-        .filter(|value: &f64| value.is_finite());
-    value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
-}
-
-/// Return the indices of the outputs to draw.
-fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
-    let Some(last) = times.len().checked_sub(1) else {
-        return Err(Error::input("the result holds no output yet"));
-    };
-    match text {
-        "last" => Ok(vec![last]),
-        "all" => Ok((0..=last).collect()),
-        text => {
-            let wanted = number(text, "--time must be `last`, `all` or a time in s")?;
-            let distance = |k: &usize| (times[*k] - wanted).abs();
-            let nearest = (0..=last)
-                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .unwrap_or(last);
-            let interval = match nearest {
-                0 => times.get(1).map_or(0.0, |next| next - times[0]),
-                later => times[later] - times[later - 1],
-            };
-            let inside = (times[0]..=times[last]).contains(&wanted);
-            if inside || distance(&nearest) <= TIME_REACH * interval {
-                return Ok(vec![nearest]);
-            }
-            Err(Error::input(format!(
-                "--time {text}: the outputs are between {:e} and {:e} s; the nearest one is at --time {:e}",
-                times[0], times[last], times[nearest]
-            )))
-        }
-    }
-}
-
 /// Insert a number into a file name: `name.png` becomes `name_0012.png`.
 fn numbered(path: &Path, index: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}_{index:04}.png"))
 }
-
-/// Requested range of the colours.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Range {
-    Automatic,
-    All,
-    Percentiles([f64; 2]),
-    Values((f64, f64)),
-}
-
-/// Range of the drawn values. `shown` are the values at the ends of the colour bar; `all` are the smallest
-/// and the largest value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    shown: [f64; 2],
-    all: [f64; 2],
-    /// Percentiles at the ends of the colour bar; `None` if the colour bar covers all values.
-    percentiles: Option<[f64; 2]>,
-}
-
-impl Limits {
-    /// Return the limits of some values for a requested range; `None` without values.
-    fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
-        let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
-            let [low, high] = ends.unwrap_or([*value; 2]);
-            Some([low.min(*value), high.max(*value)])
-        })?;
-        let wanted = match range {
-            Range::Percentiles(wanted) => wanted,
-            _ => PERCENTILES,
-        };
-        let last = (values.len() - 1) as f64;
-        let between = wanted.map(|percent| {
-            let rank = (percent / 100.0 * last).round() as usize;
-            *values.select_nth_unstable_by(rank, f64::total_cmp).1
-        });
-        let spread = |ends: [f64; 2]| ends[1] - ends[0];
-        let uses = match range {
-            Range::Percentiles(_) => spread(between) > 0.0,
-            Range::Automatic => spread(between) > 0.0 && spread(all) > OUTLIERS * spread(between),
-            Range::All | Range::Values(_) => false,
-        };
-        Some(Self {
-            shown: if uses { between } else { all },
-            all,
-            percentiles: uses.then_some(wanted),
-        })
-    }
-
-    /// Return limits that enclose those of `self` and `other`.
-    pub fn union(self, other: Self) -> Self {
-        let union = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        Self {
-            shown: union(self.shown, other.shown),
-            all: union(self.all, other.all),
-            percentiles: self.percentiles.or(other.percentiles),
-        }
-    }
-
-    /// Format a note about values beyond the colour bar; empty if the colour bar covers all values.
-    fn note(&self, unit: &str) -> String {
-        let Some([low, high]) = self.percentiles else {
-            return String::new();
-        };
-        let ends = self.all.map(|value| si(value, unit));
-        format!(
-            "colours from percentile {low} to {high}; values from {} to {}",
-            ends[0].trim(),
-            ends[1].trim()
-        )
-        .replace('-', "−")
-    }
-}
-
-/// Settings that all frames of a film share.
-#[derive(Debug, Clone, Copy)]
-pub struct Frame {
-    /// Box that all frames show, m.
-    pub bounds: Bounds,
-    /// Limits of the values; `None` without values.
-    pub limits: Option<Limits>,
-}
-
-impl Frame {
-    /// Return a frame that encloses `self` and `other`.
-    pub fn union(self, other: Self) -> Self {
-        Self {
-            bounds: self.bounds.union(other.bounds),
-            limits: match (self.limits, other.limits) {
-                (Some(a), Some(b)) => Some(a.union(b)),
-                (a, b) => a.or(b),
-            },
-        }
-    }
-}
-
-/// Largest difference of coordinates that count as equal, as a fraction of the extent. Points in one row of a
-/// lattice differ by round-off.
-const SAME_COORDINATE: f64 = 1e-9;
-
-/// Largest number of combinations of coordinates of a lattice with n points, divided by n^1.5. Scattered
-/// points have more combinations; see [`scattered_bodies`].
-const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Settings of all pictures of a result.
 pub struct Painter<'a> {
@@ -431,8 +272,8 @@ impl<'a> Painter<'a> {
             let scattered = self.are_scattered(index, points.clone())?;
             let places = self.result.positions_of(index, points.clone())?;
             let displacements = self.displacements(index, points)?;
-            paths.look(&places, &displacements);
-            for (k, position) in self.moved(&places, &displacements).enumerate() {
+            paths.search(&places, &displacements);
+            for (k, position) in self.drawn_positions(&places, &displacements).enumerate() {
                 let size = (volumes[k] / self.section).powf(power);
                 if let View::Slice { axis, position: at } = self.view
                     && !is_in_slice(axis, at, position, size)
@@ -447,12 +288,12 @@ impl<'a> Painter<'a> {
                 }
             }
         }
-        found.lines = paths.moved(self.factor);
+        found.lines = paths.moved_lines(self.factor);
         Ok(found)
     }
 
     /// Return the drawn positions, m: reference positions plus displacements times the deformation factor.
-    fn moved<'b>(
+    fn drawn_positions<'b>(
         &'b self,
         places: &'b [[f64; 3]],
         displacements: &'b [f64],
@@ -576,7 +417,7 @@ impl<'a> Painter<'a> {
         for points in blocks(count) {
             let places = self.result.positions_of(index, points.clone())?;
             let displacements = self.displacements(index, points)?;
-            let along = self.moved(&places, &displacements);
+            let along = self.drawn_positions(&places, &displacements);
             let along = along.map(|place| place[axis.index()]);
             for at in along.filter(|coordinate| coordinate.is_finite()) {
                 ends = [ends[0].min(at), ends[1].max(at)];
@@ -592,258 +433,5 @@ impl<'a> Painter<'a> {
             "--slice {name}={position}: no points are drawn there; they are between {name} = {:.4e} and {:.4e} m{nearest}",
             ends[0], ends[1]
         )))
-    }
-}
-
-/// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of its
-/// nearest point.
-struct NearestPoints<'a> {
-    /// The lines, each with the index of its file.
-    lines: Vec<(usize, &'a Line)>,
-    /// For each vertex of all lines, in order: distance of the nearest point found so far, and displacement
-    /// of this point, m.
-    nearest: Vec<(f64, [f64; 2])>,
-}
-
-impl<'a> NearestPoints<'a> {
-    fn new(files: &'a [Vec<Line>]) -> Self {
-        let files = files.iter().enumerate();
-        let lines = files.flat_map(|(number, lines)| lines.iter().map(move |line| (number, line)));
-        let lines: Vec<_> = lines.collect();
-        let vertices = lines.iter().map(|(_, line)| line.len()).sum();
-        Self {
-            lines,
-            nearest: vec![(f64::INFINITY, [0.0; 2]); vertices],
-        }
-    }
-
-    /// Search a block of points. `displacements` has three components per point, m.
-    fn look(&mut self, positions: &[[f64; 3]], displacements: &[f64]) {
-        let vertices = self.lines.iter().flat_map(|(_, line)| line.iter());
-        for (place, nearest) in vertices.zip(&mut self.nearest) {
-            for (point, u) in positions.iter().zip(displacements.chunks_exact(3)) {
-                let distance = (point[0] - place[0]).hypot(point[1] - place[1]);
-                if distance < nearest.0 {
-                    *nearest = (distance, [u[0], u[1]]);
-                }
-            }
-        }
-    }
-
-    /// Return the lines to draw, each with the index of its file. Each vertex is moved by the displacement of
-    /// its nearest point times `factor`.
-    fn moved(&self, factor: f64) -> Vec<(usize, Vec<[f64; 3]>)> {
-        let mut nearest = self.nearest.iter();
-        let mut moved = |place: &[f64; 2]| {
-            let (_, [x, y]) = nearest.next().expect("one for each vertex");
-            [place[0] + factor * x, place[1] + factor * y, 0.0]
-        };
-        let lines = self.lines.iter();
-        lines
-            .map(|(number, line)| (*number, line.iter().map(&mut moved).collect()))
-            .collect()
-    }
-}
-
-/// Number of points that are read at once; limits the memory of a picture.
-const BLOCK: usize = 1 << 18;
-
-/// Divide `points` points into ranges of at most [`BLOCK`] points.
-fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
-    let block = move |first: usize| first..(first + BLOCK).min(points);
-    (0..points).step_by(BLOCK).map(block)
-}
-
-/// Test whether all values of a field are 0 at an output.
-fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool> {
-    for points in blocks(result.points(index)) {
-        let values = result.field_of(field, index, points)?;
-        if values.iter().any(|value| *value != 0.0) {
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
-/// Return for each body whether its points are scattered at an output; empty for bars.
-///
-/// The number of combinations is the product of the numbers of different x, y and z. For n points of a
-/// lattice, it is about n. For n scattered points in the plane, it is n². A body with few points does not
-/// count as scattered.
-fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Result<Vec<bool>> {
-    if dimension < 2 || result.times()?.is_empty() {
-        return Ok(Vec::new());
-    }
-    // Number of points of each body.
-    let mut points_of: Vec<usize> = Vec::new();
-    for points in blocks(result.points(index)) {
-        for body in result.field_of("block", index, points)? {
-            let body = body as usize;
-            points_of.resize(points_of.len().max(body + 1), 0);
-            points_of[body] += 1;
-        }
-    }
-    let mut combinations = vec![1.0; points_of.len()];
-    for d in 0..dimension {
-        // Store the coordinates of one direction at a time, to limit the memory.
-        let of_body = points_of.iter().map(|points| Vec::with_capacity(*points));
-        let mut along: Vec<Vec<f64>> = of_body.collect();
-        for points in blocks(result.points(index)) {
-            let bodies = result.field_of("block", index, points.clone())?;
-            let positions = result.positions_of(index, points)?;
-            for (position, body) in positions.iter().zip(&bodies) {
-                along[*body as usize].push(position[d]);
-            }
-        }
-        for (along, combinations) in along.iter_mut().zip(&mut combinations) {
-            along.sort_unstable_by(f64::total_cmp);
-            let ends = along.first().zip(along.last());
-            let tolerance = ends.map_or(0.0, |(first, last)| SAME_COORDINATE * (last - first));
-            let steps = along
-                .windows(2)
-                .filter(|pair| pair[1] - pair[0] > tolerance);
-            *combinations *= 1.0 + steps.count() as f64;
-        }
-    }
-    let both = combinations.into_iter().zip(points_of);
-    let is_scattered = |(combinations, points): (f64, usize)| {
-        points > 0 && combinations > MOST_COMBINATIONS * (points as f64).powf(1.5)
-    };
-    Ok(both.map(is_scattered).collect())
-}
-
-/// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else a field
-/// that changes with time.
-fn choose_field<'a>(
-    name: Option<&str>,
-    path: &Path,
-    fields: &'a [StoredField],
-) -> Result<&'a StoredField> {
-    let find = |name: &str| fields.iter().find(|field| field.name == name);
-    let found = match name {
-        Some(name) => find(name),
-        None => {
-            let dynamic = fields
-                .iter()
-                .find(|field| field.dynamic && field.name != "id");
-            let preferred = PREFERRED.into_iter().find_map(find);
-            preferred.or(dynamic).or(fields.first())
-        }
-    };
-    found.ok_or_else(|| {
-        let name = name.unwrap_or("damage");
-        let known = fields.iter().map(|field| field.name.as_str());
-        let known = suggestion(name, known);
-        Error::input(format!("{} has no field `{name}`{known}", path.display()))
-    })
-}
-
-fn range(text: &str) -> Result<Range> {
-    let wanted = "--range must be LOW,HIGH, percentiles such as 5%,95%, or `all`";
-    if text == "all" {
-        return Ok(Range::All);
-    }
-    let wrong = || Error::input(format!("{wanted}, is `{text}`"));
-    let (low, high) = text.split_once(',').ok_or_else(wrong)?;
-    let (low, high) = (low.trim(), high.trim());
-    let percent = (low.strip_suffix('%'), high.strip_suffix('%'));
-    let percentiles = percent.0.is_some() || percent.1.is_some();
-    let (low, high) = match percent {
-        (Some(low), Some(high)) => (number(low, wanted)?, number(high, wanted)?),
-        _ => (number(low, wanted)?, number(high, wanted)?),
-    };
-    if low >= high {
-        return Err(Error::input(format!(
-            "--range {text}: LOW must be below HIGH"
-        )));
-    }
-    if !percentiles {
-        return Ok(Range::Values((low, high)));
-    }
-    if low < 0.0 || high > 100.0 {
-        return Err(wrong());
-    }
-    Ok(Range::Percentiles([low, high]))
-}
-
-fn view(slice: Option<&str>, dimension: usize) -> Result<View> {
-    let wanted = "--slice must be AXIS=POSITION, such as z=0.005";
-    let Some(text) = slice else {
-        return Ok(if dimension == 3 {
-            View::Orthographic
-        } else {
-            View::Plane
-        });
-    };
-    if dimension != 3 {
-        return Err(Error::input(
-            "--slice is for solids; this result is not 3-D",
-        ));
-    }
-    let (axis, position) = text
-        .split_once('=')
-        .ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))?;
-    let axis = match axis.trim() {
-        "x" => Axis::X,
-        "y" => Axis::Y,
-        "z" => Axis::Z,
-        _ => return Err(Error::input(format!("{wanted}, is `{text}`"))),
-    };
-    Ok(View::Slice {
-        axis,
-        position: number(position, wanted)?,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_outside_of_the_result_are_rejected() {
-        let times = [0.0, 1e-5, 2e-5];
-        let chosen = |text| choose_times(text, &times).unwrap();
-        assert_eq!(chosen("last"), [2]);
-        assert_eq!(chosen("all"), [0, 1, 2]);
-        assert_eq!(chosen("1.2e-5"), [1]);
-        assert_eq!(chosen("2.4e-5"), [2]);
-        assert_eq!(chosen("-4e-6"), [0]);
-        for (text, nearest) in [("25", "--time 2e-5"), ("-1e-5", "--time 0e0")] {
-            let message = choose_times(text, &times).unwrap_err().message;
-            assert!(message.ends_with(nearest), "{message}");
-        }
-        assert!(choose_times("1", &[0.5]).is_err());
-        assert!(choose_times("last", &[]).is_err());
-    }
-
-    #[test]
-    fn outliers_do_not_set_the_range() {
-        let mut values: Vec<f64> = (0..1000).map(f64::from).collect();
-        let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
-        assert_eq!((limits.shown, limits.percentiles), ([0.0, 999.0], None));
-        values[3] = 1e9;
-        let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
-        assert_eq!((limits.shown, limits.all), ([6.0, 995.0], [0.0, 1e9]));
-        let note = limits.note("Pa");
-        assert!(note.ends_with("values from 0 Pa to 1.000 GPa"), "{note}");
-        let limits = Limits::of(values.clone(), Range::All).unwrap();
-        assert_eq!((limits.shown, limits.note("Pa").as_str()), ([0.0, 1e9], ""));
-        let limits = Limits::of(values, Range::Percentiles([0.0, 50.0])).unwrap();
-        assert_eq!(limits.shown, [0.0, 501.0]);
-        // Few values of a pulse differ from the others; the range must include these few.
-        let pulse: Vec<f64> = (0..1000).map(|k| f64::from(u8::from(k == 7))).collect();
-        let limits = Limits::of(pulse, Range::Automatic).unwrap();
-        assert_eq!(limits.percentiles, None);
-        assert_eq!(Limits::of(Vec::new(), Range::Automatic), None);
-    }
-
-    #[test]
-    fn ranges_are_values_or_percentiles() {
-        assert_eq!(range("-1,2").unwrap(), Range::Values((-1.0, 2.0)));
-        assert_eq!(range("5%, 95%").unwrap(), Range::Percentiles([5.0, 95.0]));
-        assert_eq!(range("all").unwrap(), Range::All);
-        for wrong in ["1", "2,1", "5%,9", "-1%,50%", "a,b"] {
-            assert!(range(wrong).is_err(), "{wrong}");
-        }
     }
 }
