@@ -19,8 +19,9 @@
 //!     note: "",
 //!     bounds: None,
 //! };
-//! let image = render(&scene);
+//! let image = render(&scene)?;
 //! assert_eq!(image.width, 600);
+//! # Ok::<(), fissure::error::Error>(())
 //! ```
 
 mod axes;
@@ -40,6 +41,7 @@ pub use canvas::Image;
 pub use projection::Bounds;
 pub use scene::{Axis, Scene, View, is_in_slice};
 
+use crate::error::Result;
 use axes::{Pen, Ruler};
 use canvas::{Colour, PALE_INK};
 use layout::Layout;
@@ -50,8 +52,11 @@ use scale::Scale;
 use scene::Mark;
 
 /// Render a scene.
-pub fn render(scene: &Scene) -> Image {
-    let marks = scene.marks();
+///
+/// # Errors
+/// If the scene has too many points.
+pub fn render(scene: &Scene) -> Result<Image> {
+    let marks = scene.marks()?;
     let projection = Projection::of(scene);
     let bounds = scene.bounds.unwrap_or_else(|| Bounds::of(marks.iter()));
     let width = scene.width.clamp(200, 16_384);
@@ -103,7 +108,7 @@ pub fn render(scene: &Scene) -> Image {
     let rise = if scene.note.is_empty() { 1.5 } else { 2.35 };
     heading(&mut pen, &layout, scene.title, (1.15, rise));
     heading(&mut pen, &layout, scene.note, (0.85, 1.0));
-    image
+    Ok(image)
 }
 
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).

@@ -2,6 +2,7 @@
 
 use super::colours::ColourMap;
 use super::projection::Bounds;
+use crate::error::{Error, Result};
 
 /// A coordinate axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,9 +119,12 @@ impl Scene<'_> {
     }
 
     /// Return the points to draw, in painting order.
-    pub fn marks(&self) -> Marks<'_> {
+    ///
+    /// # Errors
+    /// If there are 2³² points or more.
+    pub fn marks(&self) -> Result<Marks<'_>> {
         let points = self.positions.len().min(self.sizes.len());
-        let points = points.min(self.values.len()) as u32;
+        let points = index_limit(points.min(self.values.len()))?;
         let is_drawn = |point: &u32| {
             let mark = self.mark(*point);
             let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
@@ -145,7 +149,7 @@ impl Scene<'_> {
             // A depth buffer selects the visible cubes, so the order does not matter.
             View::Orthographic => {}
         }
-        Marks { scene: self, order }
+        Ok(Marks { scene: self, order })
     }
 
     /// Return the point with this index.
@@ -179,18 +183,6 @@ impl Scene<'_> {
             View::Slice { axis, position } => mark.position[axis.index()] - position,
             View::Plane | View::Orthographic => 0.0,
         }
-    }
-
-    /// Return the box of the drawn points, with a margin.
-    pub fn extent(&self) -> Bounds {
-        Bounds::of(self.marks().iter())
-    }
-
-    /// Return the finite values of the drawn points.
-    pub fn drawn_values(&self) -> Vec<f64> {
-        let marks = self.marks();
-        let values = marks.iter().map(|mark| mark.value);
-        values.filter(|value| value.is_finite()).collect()
     }
 
     /// Return the position with zeros for coordinates that the body does not have.
@@ -230,6 +222,17 @@ impl Scene<'_> {
     }
 }
 
+/// Return the number of points, which their indices must be able to represent.
+fn index_limit(points: usize) -> Result<u32> {
+    u32::try_from(points).map_err(|_| {
+        Error::input(format!(
+            "{points} points are too many for a picture, which holds at most {}; draw a slice, or a \
+             result with fewer points",
+            u32::MAX
+        ))
+    })
+}
+
 /// The points of a scene to draw, in painting order.
 pub struct Marks<'a> {
     scene: &'a Scene<'a>,
@@ -246,6 +249,17 @@ impl Marks<'_> {
     /// Iterate over the points in painting order.
     pub fn iter(&self) -> impl Iterator<Item = Mark> + Clone {
         self.order.iter().map(|point| self.scene.mark(*point))
+    }
+
+    /// Return the box of the points, with a margin.
+    pub fn extent(&self) -> Bounds {
+        Bounds::of(self.iter())
+    }
+
+    /// Return the finite values of the points.
+    pub fn values(&self) -> Vec<f64> {
+        let values = self.iter().map(|mark| mark.value);
+        values.filter(|value| value.is_finite()).collect()
     }
 }
 
@@ -304,31 +318,41 @@ mod tests {
             position: 0.0,
         };
         let scene = scene(&positions, &[1.0, 2.0, 3.0], view);
-        let values: Vec<f64> = scene.marks().iter().map(|mark| mark.value).collect();
-        assert_eq!(values, [3.0, 1.0]);
+        assert_eq!(scene.marks().unwrap().values(), [3.0, 1.0]);
     }
 
     #[test]
     fn given_bounds_leave_out_what_is_beyond_them() {
         let positions = [[0.0; 3], [9.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         let all = scene(&positions, &[1.0, 2.0, f64::NAN], View::Plane);
-        let bounds = scene(&positions[..1], &[1.0], View::Plane).extent();
-        assert_eq!(all.drawn_values(), [1.0, 2.0]);
+        let bounds = scene(&positions[..1], &[1.0], View::Plane);
+        let bounds = bounds.marks().unwrap().extent();
+        assert_eq!(all.marks().unwrap().values(), [1.0, 2.0]);
         let bounds = bounds.union(bounds);
         let some = Scene {
             bounds: Some(bounds),
             ..all
         };
-        assert_eq!(some.drawn_values(), [1.0]);
-        assert_eq!(bounds.union(all.extent()), all.extent());
+        assert_eq!(some.marks().unwrap().values(), [1.0]);
+        let extent = all.marks().unwrap().extent();
+        assert_eq!(bounds.union(extent), extent);
+    }
+
+    #[test]
+    fn points_beyond_the_largest_index_are_an_error() {
+        assert_eq!(index_limit(7).unwrap(), 7);
+        let message = index_limit(1 << 32).unwrap_err().message;
+        assert!(
+            message.starts_with("4294967296 points are too many"),
+            "{message}"
+        );
     }
 
     #[test]
     fn unusable_positions_are_left_out() {
         let positions = [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0; 3]];
         let scene = scene(&positions, &[1.0, 2.0, 3.0], View::Plane);
-        let values: Vec<f64> = scene.marks().iter().map(|mark| mark.value).collect();
-        assert_eq!(values, [3.0]);
+        assert_eq!(scene.marks().unwrap().values(), [3.0]);
     }
 
     #[test]
@@ -339,7 +363,7 @@ mod tests {
                 range,
                 ..scene(&[[0.0; 3]; 3], values, View::Plane)
             };
-            scene.colour_range(&scene.marks())
+            scene.colour_range(&scene.marks().unwrap())
         };
         assert_eq!(range(&[1.0, f64::NAN, 4.0], "speed", None), (1.0, 4.0));
         assert_eq!(

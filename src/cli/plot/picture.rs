@@ -335,13 +335,13 @@ impl<'a> Painter<'a> {
         Ok(bodies.iter().map(is_scattered).collect())
     }
 
-    /// Return the limits of a scene. An automatic range covers all values of damage, which has no outliers.
-    fn limits(&self, scene: &Scene) -> Option<Limits> {
+    /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no outliers.
+    fn limits(&self, values: Vec<f64>) -> Option<Limits> {
         let range = match self.range {
             Range::Automatic if self.quantity.field.contains("damage") => Range::All,
             range => range,
         };
-        Limits::of(scene.drawn_values(), range)
+        Limits::of(values, range)
     }
 
     /// Return the frame that encloses an output; `None` if no point is drawn. A film uses the union of the
@@ -352,12 +352,13 @@ impl<'a> Painter<'a> {
     pub fn frame(&self, index: usize) -> Result<Option<Frame>> {
         let points = self.points(index)?;
         let scene = self.scene(&points);
-        if scene.marks().is_empty() {
+        let marks = scene.marks()?;
+        if marks.is_empty() {
             return Ok(None);
         }
         Ok(Some(Frame {
-            bounds: scene.extent(),
-            limits: self.limits(&scene),
+            bounds: marks.extent(),
+            limits: self.limits(marks.values()),
         }))
     }
 
@@ -371,14 +372,14 @@ impl<'a> Painter<'a> {
         let scene = self.scene(&points);
         let limits = match frame {
             Some(frame) => frame.limits,
-            None => self.limits(&scene),
+            None => self.limits(scene.marks()?.values()),
         };
         let note = limits.map_or(String::new(), |limits| limits.note(&self.quantity.unit));
         let mut title = format!("{}   t = {time}", self.title);
         if self.has_displacement && self.factor != 0.0 {
             title += &format!("   deformation × {}", self.factor);
         }
-        Ok(render(&Scene {
+        render(&Scene {
             title: title.trim_start(),
             range: match (self.range, limits) {
                 (Range::Values(range), _) => Some(range),
@@ -394,7 +395,7 @@ impl<'a> Painter<'a> {
             note: &note,
             bounds: frame.map(|frame| frame.bounds),
             ..scene
-        }))
+        })
     }
 
     /// Check that there are points near the slice.
@@ -407,7 +408,7 @@ impl<'a> Painter<'a> {
             return Ok(());
         };
         let count = self.result.points(index);
-        if count == 0 || !self.scene(&self.points(index)?).marks().is_empty() {
+        if count == 0 || !self.scene(&self.points(index)?).marks()?.is_empty() {
             return Ok(());
         }
         let name = axis.letter();
