@@ -69,6 +69,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     };
     let hint = " (an animated PNG); for other formats, write --frames and encode them with ffmpeg";
     check_ending(&path, &["png", "apng"], hint)?;
+    painter.check(&chosen)?;
     if let Some(folder) = &arguments.frames {
         create_folder(folder)?;
     }
@@ -85,7 +86,6 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
         progress.update(number as u64 + 1, 2 * count, times[*index]);
     }
     let Some(frame) = frame else {
-        painter.check_slice(chosen[0])?;
         let message = format!("{}: no output has points to draw", file.display());
         return Err(Error::input(message));
     };

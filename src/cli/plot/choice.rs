@@ -5,7 +5,7 @@ use std::path::Path;
 use fissure::error::{Error, Result};
 use fissure::message::suggestion;
 use fissure::output::StoredField;
-use fissure::picture::{Axis, View};
+use fissure::picture::{Axis, Camera, ColourMap, View};
 
 /// Largest distance of a requested time from the first or last output, as a fraction of the output interval.
 const TIME_REACH: f64 = 0.5;
@@ -95,15 +95,118 @@ pub fn choose_field<'a>(
     })
 }
 
-/// Return the view of a body of this dimension; `slice` is the argument of `--slice`.
+/// Return the colour map with a name.
 ///
 /// # Errors
-/// If the text is not AXIS=POSITION, or the body is not 3-D.
-pub fn view(slice: Option<&str>, dimension: usize) -> Result<View> {
+/// If there is no such colour map.
+pub fn colour_map(name: &str) -> Result<ColourMap> {
+    let mut maps = ColourMap::ALL.into_iter();
+    maps.find(|map| map.name() == name).ok_or_else(|| {
+        let known = suggestion(name, ColourMap::ALL.map(ColourMap::name));
+        Error::input(format!(
+            "--colors {name}: there is no such colour map{known}"
+        ))
+    })
+}
+
+/// Lines of equal value, as `--contours` asks for them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Contours {
+    /// Number of values at equal distances on the colour bar.
+    Count(usize),
+    /// The values.
+    Values(Vec<f64>),
+}
+
+/// Largest number of lines for `--contours`.
+const MOST_CONTOURS: usize = 100;
+
+impl Contours {
+    /// Read the argument of `--contours`: a whole number is a count, anything else are values.
+    ///
+    /// # Errors
+    /// If the text is neither, the count is not from 1 to 100, or a value is not above 0 on a logarithmic
+    /// scale.
+    pub fn new(text: &str, is_logarithmic: bool) -> Result<Self> {
+        if let Ok(count) = text.trim().parse::<usize>() {
+            if (1..=MOST_CONTOURS).contains(&count) {
+                return Ok(Self::Count(count));
+            }
+            return Err(Error::input(format!(
+                "--contours {text}: a number of lines must be from 1 to {MOST_CONTOURS}; write one value \
+                 with a decimal point, such as {text}.0"
+            )));
+        }
+        let wanted = "--contours must be a number of lines, or values such as 1e6,2e6";
+        let values = text.split(',').map(|value| number(value, wanted));
+        let values = values.collect::<Result<Vec<f64>>>()?;
+        if is_logarithmic && let Some(value) = values.iter().find(|value| **value <= 0.0) {
+            return Err(Error::input(format!(
+                "--contours: with --log, values must be above 0, one is {value}"
+            )));
+        }
+        Ok(Self::Values(values))
+    }
+}
+
+/// Return the vector field with a name, for `--vectors`.
+///
+/// # Errors
+/// If the result has no such field, or it is not a vector field.
+pub fn vector_field<'a>(
+    name: &str,
+    path: &Path,
+    fields: &'a [StoredField],
+) -> Result<&'a StoredField> {
+    let field = choose_field(Some(name), path, fields)?;
+    if field.components == 3 {
+        return Ok(field);
+    }
+    let vectors = fields.iter().filter(|field| field.components == 3);
+    let known: Vec<&str> = vectors.map(|field| field.name.as_str()).collect();
+    Err(Error::input(format!(
+        "--vectors {name}: must be a vector field, but a point has {} numbers (vector fields: {})",
+        field.components,
+        known.join(", ")
+    )))
+}
+
+/// Return the axis with a name; `None` if there is no such axis.
+pub fn axis_named(name: &str) -> Option<Axis> {
+    let mut axes = [Axis::X, Axis::Y, Axis::Z].into_iter();
+    axes.find(|axis| axis.letter() == name)
+}
+
+/// Read the argument of `--camera`, such as `-30,20`.
+fn camera_of(text: &str) -> Result<Camera> {
+    let wanted = "--camera must be AZIMUTH,ELEVATION in degrees, such as -30,20";
+    let wrong = || Error::input(format!("{wanted}, is `{text}`"));
+    let (azimuth, elevation) = text.split_once(',').ok_or_else(wrong)?;
+    let (azimuth, elevation) = (number(azimuth, wanted)?, number(elevation, wanted)?);
+    if elevation.abs() > 90.0 {
+        let message = format!("--camera {text}: ELEVATION must be from -90 to 90 degrees");
+        return Err(Error::input(message));
+    }
+    Ok(Camera::new(azimuth, elevation))
+}
+
+/// Return the view of a body of this dimension; `slice` and `camera` are the arguments of these options.
+///
+/// # Errors
+/// If the text of the slice is not AXIS=POSITION, that of the camera not AZIMUTH,ELEVATION, or the body is not
+/// 3-D.
+pub fn view(slice: Option<&str>, camera: Option<&str>, dimension: usize) -> Result<View> {
     let wanted = "--slice must be AXIS=POSITION, such as z=0.005";
+    let given = camera.is_some();
+    let camera = camera.map_or(Ok(Camera::isometric()), camera_of)?;
+    if given && dimension != 3 {
+        return Err(Error::input(
+            "--camera is for solids; this result is not 3-D",
+        ));
+    }
     let Some(text) = slice else {
         return Ok(if dimension == 3 {
-            View::Orthographic
+            View::Orthographic(camera)
         } else {
             View::Plane
         });
@@ -116,14 +219,9 @@ pub fn view(slice: Option<&str>, dimension: usize) -> Result<View> {
     let (axis, position) = text
         .split_once('=')
         .ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))?;
-    let axis = match axis.trim() {
-        "x" => Axis::X,
-        "y" => Axis::Y,
-        "z" => Axis::Z,
-        _ => return Err(Error::input(format!("{wanted}, is `{text}`"))),
-    };
+    let axis = axis_named(axis.trim());
     Ok(View::Slice {
-        axis,
+        axis: axis.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))?,
         position: number(position, wanted)?,
     })
 }
@@ -131,6 +229,49 @@ pub fn view(slice: Option<&str>, dimension: usize) -> Result<View> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cameras_are_for_solids() {
+        let camera = |text, dimension| view(None, Some(text), dimension);
+        let expected = View::Orthographic(Camera::new(-30.0, 20.0));
+        assert_eq!(camera("-30, 20", 3).unwrap(), expected);
+        assert_eq!(view(None, None, 2).unwrap(), View::Plane);
+        for (text, dimension, words) in [
+            ("30", 3, "must be AZIMUTH,ELEVATION"),
+            ("a,1", 3, "must be AZIMUTH,ELEVATION"),
+            ("0,91", 3, "ELEVATION must be from -90 to 90"),
+            ("0,0", 2, "--camera is for solids"),
+        ] {
+            let message = camera(text, dimension).unwrap_err().message;
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn contours_are_a_count_or_values() {
+        let contours = |text| Contours::new(text, false);
+        assert_eq!(contours("9").unwrap(), Contours::Count(9));
+        assert_eq!(contours("5.0").unwrap(), Contours::Values(vec![5.0]));
+        assert_eq!(
+            contours("-1, 2e6").unwrap(),
+            Contours::Values(vec![-1.0, 2e6])
+        );
+        for wrong in ["0", "101", "a", "1,", "1,nan", ""] {
+            assert!(contours(wrong).is_err(), "{wrong}");
+        }
+        let message = Contours::new("1.5,0", true).unwrap_err().message;
+        assert!(message.contains("must be above 0, one is 0"), "{message}");
+    }
+
+    #[test]
+    fn colour_maps_have_names() {
+        for map in ColourMap::ALL {
+            assert_eq!(colour_map(map.name()).unwrap(), map);
+        }
+        let message = colour_map("virides").unwrap_err().message;
+        assert!(message.contains("did you mean `viridis`?"), "{message}");
+        assert!(message.ends_with("(known: viridis, turbo, coolwarm, grey, damage)"));
+    }
 
     #[test]
     fn times_outside_of_the_result_are_rejected() {

@@ -12,6 +12,10 @@ const PERCENTILES: [f64; 2] = [0.5, 99.5];
 /// Ratio of the full range to the percentile range above which there are outliers.
 const OUTLIERS: f64 = 4.0;
 
+/// Number of decades that the automatic range of a logarithmic scale covers at most. Round-off of values that
+/// should be 0 would otherwise set the range.
+const DECADES: i32 = 6;
+
 /// Requested range of the colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
@@ -29,7 +33,7 @@ pub enum Range {
 ///
 /// # Errors
 /// If the text is neither two values, nor two percentiles, nor `all`.
-pub fn range(text: &str) -> Result<Range> {
+pub fn range_of(text: &str) -> Result<Range> {
     let wanted = "--range must be LOW,HIGH, percentiles such as 5%,95%, or `all`";
     if text == "all" {
         return Ok(Range::All);
@@ -64,8 +68,17 @@ pub struct Limits {
     pub shown: [f64; 2],
     /// Smallest and largest value.
     all: [f64; 2],
-    /// Percentiles at the ends of the colour bar; `None` if the colour bar covers all values.
-    pub percentiles: Option<[f64; 2]>,
+    cut: Cut,
+}
+
+/// Values beyond the ends of the colour bar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Cut {
+    Nothing,
+    /// Values beyond two percentiles.
+    Percentiles([f64; 2]),
+    /// Values more than [`DECADES`] below the largest value.
+    Decades,
 }
 
 impl Limits {
@@ -93,8 +106,34 @@ impl Limits {
         Some(Self {
             shown: if uses { between } else { all },
             all,
-            percentiles: uses.then_some(wanted),
+            cut: if uses {
+                Cut::Percentiles(wanted)
+            } else {
+                Cut::Nothing
+            },
         })
+    }
+
+    /// Return the limits of the values above 0 on a logarithmic scale; `None` without such values.
+    pub fn logarithmic(mut values: Vec<f64>, asked: Range) -> Option<Self> {
+        values.retain(|value| *value > 0.0);
+        let range = match asked {
+            Range::Automatic => Range::All,
+            range => range,
+        };
+        let mut limits = Self::of(values, range)?;
+        let [low, high] = limits.all;
+        let least = high * 10_f64.powi(-DECADES);
+        if asked == Range::Automatic && low < least {
+            limits.shown = [least, high];
+            limits.cut = Cut::Decades;
+        }
+        Some(limits)
+    }
+
+    /// Return whether there are values beyond the ends of the colour bar.
+    pub fn is_cut(&self) -> bool {
+        self.cut != Cut::Nothing
     }
 
     /// Return limits that enclose those of `self` and `other`.
@@ -103,18 +142,20 @@ impl Limits {
         Self {
             shown: union(self.shown, other.shown),
             all: union(self.all, other.all),
-            percentiles: self.percentiles.or(other.percentiles),
+            cut: if self.is_cut() { self.cut } else { other.cut },
         }
     }
 
     /// Format a note about values beyond the colour bar; empty if the colour bar covers all values.
     pub fn note(&self, unit: &str) -> String {
-        let Some([low, high]) = self.percentiles else {
-            return String::new();
+        let colours = match self.cut {
+            Cut::Nothing => return String::new(),
+            Cut::Percentiles([low, high]) => format!("from percentile {low} to {high}"),
+            Cut::Decades => format!("over {DECADES} decades"),
         };
         let ends = self.all.map(|value| si(value, unit));
         format!(
-            "colours from percentile {low} to {high}; values from {} to {}",
+            "colours {colours}; values from {} to {}",
             ends[0].trim(),
             ends[1].trim()
         )
@@ -129,6 +170,8 @@ pub struct Frame {
     pub bounds: Bounds,
     /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
+    /// Largest length of a vector in the picture; 0 without vectors.
+    pub longest_vector: f64,
 }
 
 impl Frame {
@@ -140,6 +183,7 @@ impl Frame {
                 (Some(a), Some(b)) => Some(a.union(b)),
                 (a, b) => a.or(b),
             },
+            longest_vector: self.longest_vector.max(other.longest_vector),
         }
     }
 }
@@ -152,7 +196,7 @@ mod tests {
     fn outliers_do_not_set_the_range() {
         let mut values: Vec<f64> = (0..1000).map(f64::from).collect();
         let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
-        assert_eq!((limits.shown, limits.percentiles), ([0.0, 999.0], None));
+        assert_eq!((limits.shown, limits.is_cut()), ([0.0, 999.0], false));
         values[3] = 1e9;
         let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
         assert_eq!((limits.shown, limits.all), ([6.0, 995.0], [0.0, 1e9]));
@@ -165,17 +209,41 @@ mod tests {
         // Few values of a pulse differ from the others; the range must include these few.
         let pulse: Vec<f64> = (0..1000).map(|k| f64::from(u8::from(k == 7))).collect();
         let limits = Limits::of(pulse, Range::Automatic).unwrap();
-        assert_eq!(limits.percentiles, None);
+        assert!(!limits.is_cut());
         assert_eq!(Limits::of(Vec::new(), Range::Automatic), None);
     }
 
     #[test]
+    fn logarithmic_limits_cover_six_decades_of_values_above_zero() {
+        let limits = |values: &[f64], range| Limits::logarithmic(values.to_vec(), range);
+        let values = [-7.0, 0.0, 1e-20, 1.0, 1e3];
+        let automatic = limits(&values, Range::Automatic).unwrap();
+        assert_eq!(
+            (automatic.shown, automatic.all),
+            ([1e-3, 1e3], [1e-20, 1e3])
+        );
+        let note = automatic.note("");
+        assert!(
+            note.starts_with("colours over 6 decades; values from"),
+            "{note}"
+        );
+        let all = limits(&values, Range::All).unwrap();
+        assert_eq!((all.shown, all.is_cut()), ([1e-20, 1e3], false));
+        let few = limits(&values[3..], Range::Automatic).unwrap();
+        assert_eq!((few.shown, few.is_cut()), ([1.0, 1e3], false));
+        assert_eq!(limits(&values[..2], Range::Automatic), None);
+    }
+
+    #[test]
     fn ranges_are_values_or_percentiles() {
-        assert_eq!(range("-1,2").unwrap(), Range::Values((-1.0, 2.0)));
-        assert_eq!(range("5%, 95%").unwrap(), Range::Percentiles([5.0, 95.0]));
-        assert_eq!(range("all").unwrap(), Range::All);
+        assert_eq!(range_of("-1,2").unwrap(), Range::Values((-1.0, 2.0)));
+        assert_eq!(
+            range_of("5%, 95%").unwrap(),
+            Range::Percentiles([5.0, 95.0])
+        );
+        assert_eq!(range_of("all").unwrap(), Range::All);
         for wrong in ["1", "2,1", "5%,9", "-1%,50%", "a,b"] {
-            assert!(range(wrong).is_err(), "{wrong}");
+            assert!(range_of(wrong).is_err(), "{wrong}");
         }
     }
 }

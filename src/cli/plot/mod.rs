@@ -3,6 +3,7 @@
 mod blocks;
 mod choice;
 pub mod curves;
+mod filter;
 pub mod limits;
 mod paths;
 pub mod picture;
@@ -53,7 +54,7 @@ pub struct PlotArguments {
 
     /// Columns of the history to draw as curves.
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
-    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time"])]
+    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time", "colors", "log", "threshold", "clip", "camera", "contours", "vectors"])]
     y: Vec<String>,
 
     /// Column of the horizontal axis of curves [default: time].

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use fissure::error::{Error, Result};
-use fissure::output::ResultReader;
-use fissure::picture::{Image, Scene, View, is_in_slice, render};
+use fissure::output::{ResultReader, StoredField};
+use fissure::picture::{
+    Axis, ColourMap, Image, Scene, Vectors, View, is_damage, is_in_slice, render,
+};
 
 use super::blocks::{blocks, is_zero, scattered_bodies};
-use super::choice::{choose_field, choose_times, number, view};
-use super::limits::{Frame, Limits, Range, range};
+use super::choice::{Contours, choose_field, choose_times, colour_map, number, vector_field, view};
+use super::filter::{Clip, Threshold};
+use super::limits::{Frame, Limits, Range, range_of};
 use super::paths::{self, Line, NearestPoints};
 use super::quantity::Quantity;
 use super::{PlotArguments, check_ending};
@@ -44,6 +47,28 @@ pub struct PictureArguments {
     #[arg(long, value_name = "AXIS=POSITION")]
     slice: Option<String>,
 
+    /// Direction of the view of a solid: angle of the camera from +x towards +y, and above the x-y plane, in
+    /// degrees [default: -45,35.26].
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION",
+        allow_hyphen_values = true,
+        conflicts_with = "slice"
+    )]
+    camera: Option<String>,
+
+    /// Draw only the points in a half space, such as 'x<0.01' or 'z>0'. May be repeated.
+    #[arg(long, value_name = "AXIS<POSITION")]
+    clip: Vec<String>,
+
+    /// Draw only the points whose value is in this range. An end may be left out: `0.3:`.
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    threshold: Option<String>,
+
+    /// Field of `--threshold`; a component or invariant follows a colon: stress:xx [default: the drawn values].
+    #[arg(long, value_name = "NAME[:COMPONENT]", requires = "threshold")]
+    threshold_field: Option<String>,
+
     /// Draw the lines of a CSV file, such as crack_NAME.csv, over a plane picture. The columns are x and y
     /// (m), and branch if there are several lines. May be repeated.
     #[arg(long, value_name = "FILE.csv")]
@@ -53,6 +78,22 @@ pub struct PictureArguments {
     /// 0.5%,99.5% if there are outliers].
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     range: Option<String>,
+
+    /// Draw lines of equal value in plane pictures and slices: a number of lines, or values such as 1e6,2e6.
+    #[arg(long, value_name = "N|VALUE,…", allow_hyphen_values = true)]
+    contours: Option<String>,
+
+    /// Draw the arrows of a vector field, such as velocity.
+    #[arg(long, value_name = "FIELD")]
+    vectors: Option<String>,
+
+    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: damage for damage, else viridis].
+    #[arg(long, value_name = "NAME")]
+    colors: Option<String>,
+
+    /// Logarithmic scale of the colours. Points with values up to 0 are grey.
+    #[arg(long)]
+    log: bool,
 
     /// Width of the picture in pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
@@ -74,6 +115,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
         Some(path) => path.clone(),
         None => beside(&file, &format!("{}.png", painter.name())),
     };
+    painter.check(&chosen)?;
     let hint = "; `--y` draws curves, and `fissure movie` films";
     check_ending(&path, &["png"], hint)?;
     for index in &chosen {
@@ -81,7 +123,6 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
             1 => path.clone(),
             _ => numbered(&path, *index),
         };
-        painter.check_slice(*index)?;
         let image = painter.image(*index, &si(times[*index], "s"), None)?;
         image
             .write_png(&path)
@@ -123,7 +164,13 @@ pub struct Painter<'a> {
     has_displacement: bool,
     section: f64,
     range: Range,
+    colours: Option<ColourMap>,
     view: View,
+    clips: Vec<Clip>,
+    threshold: Option<Threshold>,
+    contours: Option<Contours>,
+    /// Field of the arrows.
+    vectors: Option<StoredField>,
     factor: f64,
     /// Whether the points of a body are scattered, by index of the body.
     scattered: Vec<bool>,
@@ -139,6 +186,8 @@ struct Points {
     /// For each point, whether its body has scattered points; empty if no body has scattered points.
     scattered: Vec<bool>,
     values: Vec<f64>,
+    /// Vectors for arrows; empty without arrows.
+    vectors: Vec<[f64; 3]>,
     lines: Vec<(usize, Vec<[f64; 3]>)>,
 }
 
@@ -182,17 +231,50 @@ impl<'a> Painter<'a> {
         if dimension != 2 && !arguments.path.is_empty() {
             return Err(Error::input("--path is for results of plane problems"));
         }
+        let range = arguments.range.as_deref();
+        let range = range.map_or(Ok(Range::Automatic), range_of)?;
+        if let Range::Values((low, _)) = range
+            && arguments.log
+            && low <= 0.0
+        {
+            let message = format!("--range: with --log, LOW must be above 0, is {low}");
+            return Err(Error::input(message));
+        }
+        let colours = arguments.colors.as_deref().map(colour_map);
+        let clips = arguments.clip.iter().map(|clip| Clip::new(clip, dimension));
+        let threshold = arguments.threshold.as_deref().map(|text| {
+            let field = arguments.threshold_field.as_deref();
+            Threshold::new(text, field, path, &fields)
+        });
+        let contours = arguments.contours.as_deref();
+        let contours = contours.map(|text| Contours::new(text, arguments.log));
+        if contours.is_some() && dimension != 2 && arguments.slice.is_none() {
+            let message = "--contours is for plane problems, and for slices of solids";
+            return Err(Error::input(message));
+        }
+        let vectors = arguments.vectors.as_deref();
+        let vectors = vectors.map(|name| vector_field(name, path, &fields));
+        if vectors.is_some() && dimension == 1 {
+            let message = "--vectors is for plane problems and solids; this result is 1-D";
+            return Err(Error::input(message));
+        }
         let paths = arguments.path.iter().map(|path| paths::read(path));
         let mut painter = Self {
             title: attribute("title"),
             quantity: Quantity::new(field, arguments.component.as_deref())?,
             has_displacement: fields.iter().any(|field| field.name == "displacement"),
             section,
-            range: arguments
-                .range
-                .as_deref()
-                .map_or(Ok(Range::Automatic), range)?,
-            view: view(arguments.slice.as_deref(), dimension)?,
+            range,
+            colours: colours.transpose()?,
+            clips: clips.collect::<Result<_>>()?,
+            threshold: threshold.transpose()?,
+            contours: contours.transpose()?,
+            vectors: vectors.transpose()?.cloned(),
+            view: view(
+                arguments.slice.as_deref(),
+                arguments.camera.as_deref(),
+                dimension,
+            )?,
             factor: 0.0,
             scattered: scattered_bodies(result, reference, dimension)?,
             paths: paths.collect::<Result<_>>()?,
@@ -251,12 +333,44 @@ impl<'a> Painter<'a> {
         Ok(step.unwrap_or(1.0) * power)
     }
 
-    /// Read the points of an output, block by block. If the view is a slice, keep only the points in the
-    /// slice.
+    /// Return whether the slice shows a position; true without a slice. `size` is the edge of the cell, m.
+    fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
+        match self.view {
+            View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),
+            View::Plane | View::Orthographic(_) => true,
+        }
+    }
+
+    fn is_clipped(&self, position: [f64; 3]) -> bool {
+        !self.clips.iter().all(|clip| clip.holds(position))
+    }
+
+    /// Return whether points may be left out.
+    fn is_partial(&self) -> bool {
+        let is_slice = matches!(self.view, View::Slice { .. });
+        is_slice || !self.clips.is_empty() || self.threshold.is_some()
+    }
+
+    /// Return the values for the threshold; `None` if these are the drawn values.
+    fn threshold_values(
+        &self,
+        index: usize,
+        points: ops::Range<usize>,
+    ) -> Result<Option<Vec<f64>>> {
+        let threshold = self.threshold.as_ref();
+        let Some(quantity) = threshold.and_then(|threshold| threshold.quantity.as_ref()) else {
+            return Ok(None);
+        };
+        let values = self.result.field_of(&quantity.field, index, points)?;
+        Ok(Some(quantity.of(values)))
+    }
+
+    /// Read the points of an output, block by block. Keep only the points in the slice, the half spaces and
+    /// the range of values.
     fn points(&self, index: usize) -> Result<Points> {
         let mut found = Points::default();
         let count = self.result.points(index);
-        if !matches!(self.view, View::Slice { .. }) {
+        if !self.is_partial() {
             found.positions.reserve_exact(count);
             found.sizes.reserve_exact(count);
             found.values.reserve_exact(count);
@@ -269,20 +383,33 @@ impl<'a> Painter<'a> {
                 .field_of(&self.quantity.field, index, points.clone())?;
             let values = self.quantity.of(values);
             let volumes = self.result.field_of("volume", index, points.clone())?;
+            let thresholds = self.threshold_values(index, points.clone())?;
             let scattered = self.are_scattered(index, points.clone())?;
+            let vectors = match &self.vectors {
+                Some(field) => self.result.field_of(&field.name, index, points.clone())?,
+                None => Vec::new(),
+            };
             let places = self.result.positions_of(index, points.clone())?;
             let displacements = self.displacements(index, points)?;
             paths.search(&places, &displacements);
             for (k, position) in self.drawn_positions(&places, &displacements).enumerate() {
                 let size = (volumes[k] / self.section).powf(power);
-                if let View::Slice { axis, position: at } = self.view
-                    && !is_in_slice(axis, at, position, size)
+                let value = thresholds.as_ref().map_or(values[k], |values| values[k]);
+                if self.is_clipped(position)
+                    || !self.is_in_view(position, size)
+                    || self
+                        .threshold
+                        .as_ref()
+                        .is_some_and(|range| !range.holds(value))
                 {
                     continue;
                 }
                 found.positions.push(position);
                 found.sizes.push(size);
                 found.values.push(values[k]);
+                if let Some(vector) = vectors.chunks_exact(3).nth(k) {
+                    found.vectors.push([vector[0], vector[1], vector[2]]);
+                }
                 if let Some(scattered) = scattered.get(k) {
                     found.scattered.push(*scattered);
                 }
@@ -311,11 +438,23 @@ impl<'a> Painter<'a> {
             values: &points.values,
             field: &self.quantity.label,
             unit: &self.quantity.unit,
+            colours: self.colours,
+            is_logarithmic: self.arguments.log,
             title: "",
             range: None,
             view: self.view,
             width: self.arguments.width,
             lines: &points.lines,
+            contours: &[],
+            vectors: self.vectors.as_ref().map(|field| Vectors {
+                values: &points.vectors,
+                field: &field.name,
+                unit: match field.unit.as_str() {
+                    "1" => "",
+                    unit => unit,
+                },
+                longest: None,
+            }),
             note: "",
             bounds: None,
         }
@@ -335,13 +474,14 @@ impl<'a> Painter<'a> {
         Ok(bodies.iter().map(is_scattered).collect())
     }
 
-    /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no outliers.
+    /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no
+    /// outliers.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
-        let range = match self.range {
-            Range::Automatic if self.quantity.field.contains("damage") => Range::All,
-            range => range,
-        };
-        Limits::of(values, range)
+        match self.range {
+            range if self.arguments.log => Limits::logarithmic(values, range),
+            Range::Automatic if is_damage(&self.quantity.field) => Limits::of(values, Range::All),
+            range => Limits::of(values, range),
+        }
     }
 
     /// Return the frame that encloses an output; `None` if no point is drawn. A film uses the union of the
@@ -359,6 +499,7 @@ impl<'a> Painter<'a> {
         Ok(Some(Frame {
             bounds: marks.extent(),
             limits: self.limits(marks.values()),
+            longest_vector: marks.longest_vector(),
         }))
     }
 
@@ -379,60 +520,155 @@ impl<'a> Painter<'a> {
         if self.has_displacement && self.factor != 0.0 {
             title += &format!("   deformation × {}", self.factor);
         }
-        render(&Scene {
+        let scene = Scene {
             title: title.trim_start(),
             range: match (self.range, limits) {
                 (Range::Values(range), _) => Some(range),
                 // The colour bar of damage starts at 0 in all pictures.
-                (_, Some(limits)) if frame.is_some() || limits.percentiles.is_some() => {
+                (_, Some(limits)) if frame.is_some() || limits.is_cut() => {
                     let [low, high] = limits.shown;
-                    let damage = self.quantity.field.contains("damage");
-                    let low = if damage { low.min(0.0) } else { low };
+                    let from_zero = is_damage(&self.quantity.field) && !self.arguments.log;
+                    let low = if from_zero { low.min(0.0) } else { low };
                     (low < high).then_some((low, high))
                 }
                 _ => None,
             },
             note: &note,
             bounds: frame.map(|frame| frame.bounds),
+            vectors: scene.vectors.map(|vectors| Vectors {
+                longest: frame.map(|frame| frame.longest_vector),
+                ..vectors
+            }),
+            ..scene
+        };
+        let contours = match &self.contours {
+            None => Vec::new(),
+            Some(Contours::Count(count)) => scene.levels(*count)?,
+            Some(Contours::Values(values)) => values.clone(),
+        };
+        render(&Scene {
+            contours: &contours,
             ..scene
         })
     }
 
-    /// Check that there are points near the slice.
+    /// Check that some of these outputs have points to draw. If the scale is logarithmic, some drawn values
+    /// must be above 0.
     ///
     /// # Errors
-    /// If the output has points, but none near the slice; the message gives the position of the nearest
-    /// point.
-    pub fn check_slice(&self, index: usize) -> Result<()> {
-        let View::Slice { axis, position } = self.view else {
-            return Ok(());
-        };
-        let count = self.result.points(index);
-        if count == 0 || !self.scene(&self.points(index)?).marks()?.is_empty() {
+    /// If no points are drawn although the outputs have points, or all drawn values are 0 or less.
+    pub fn check(&self, indices: &[usize]) -> Result<()> {
+        if !self.is_partial() && !self.arguments.log {
             return Ok(());
         }
-        let name = axis.letter();
-        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut last = None;
+        let mut are_drawn = false;
+        for index in indices {
+            if self.result.points(*index) == 0 {
+                continue;
+            }
+            last = Some(*index);
+            let points = self.points(*index)?;
+            let scene = self.scene(&points);
+            let marks = scene.marks()?;
+            are_drawn |= !marks.is_empty();
+            if are_drawn && (!self.arguments.log || marks.iter().any(|mark| mark.value > 0.0)) {
+                return Ok(());
+            }
+        }
+        match last {
+            None => Ok(()),
+            Some(_) if are_drawn => Err(Error::input(format!(
+                "--log: no drawn value of {} is above 0",
+                self.quantity.label
+            ))),
+            Some(index) => Err(self.nothing_drawn(index)?),
+        }
+    }
+
+    /// Return the error for an output of which no point is drawn. It says which option leaves out the last
+    /// points, and where the points are.
+    fn nothing_drawn(&self, index: usize) -> Result<Error> {
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let include = |ends: &mut [f64; 2], value: f64| {
+            if value.is_finite() {
+                *ends = [ends[0].min(value), ends[1].max(value)];
+            }
+        };
+        // Ends of the coordinates of all points, of the coordinates of points in the half spaces, and of the
+        // values of points that are also in the slice.
+        let (mut all, mut kept, mut values) = ([none; 3], [none; 3], none);
         let mut nearest: Option<f64> = None;
-        let distance = |at: &f64| (at - position).abs();
-        for points in blocks(count) {
+        let power = 1.0 / self.dimension as f64;
+        for points in blocks(self.result.points(index)) {
+            let drawn = (self.result).field_of(&self.quantity.field, index, points.clone())?;
+            let drawn = self.quantity.of(drawn);
+            let thresholds = self.threshold_values(index, points.clone())?;
+            let thresholds = thresholds.unwrap_or(drawn);
+            let volumes = self.result.field_of("volume", index, points.clone())?;
             let places = self.result.positions_of(index, points.clone())?;
             let displacements = self.displacements(index, points)?;
-            let along = self.drawn_positions(&places, &displacements);
-            let along = along.map(|place| place[axis.index()]);
-            for at in along.filter(|coordinate| coordinate.is_finite()) {
-                ends = [ends[0].min(at), ends[1].max(at)];
-                if nearest.is_none_or(|nearest| distance(&at) < distance(&nearest)) {
-                    nearest = Some(at);
+            for (k, place) in self.drawn_positions(&places, &displacements).enumerate() {
+                (all.iter_mut().zip(place)).for_each(|(ends, at)| include(ends, at));
+                if self.is_clipped(place) {
+                    continue;
+                }
+                (kept.iter_mut().zip(place)).for_each(|(ends, at)| include(ends, at));
+                if let View::Slice { axis, position } = self.view {
+                    let (at, distance) = (place[axis.index()], |at: f64| (at - position).abs());
+                    if at.is_finite() && nearest.is_none_or(|old| distance(at) < distance(old)) {
+                        nearest = Some(at);
+                    }
+                }
+                if self.is_in_view(place, (volumes[k] / self.section).powf(power)) {
+                    include(&mut values, thresholds[k]);
                 }
             }
         }
-        let nearest = nearest.map_or(String::new(), |at| {
-            format!("; the nearest ones are at --slice {name}={at:.4e}")
-        });
-        Err(Error::input(format!(
-            "--slice {name}={position}: no points are drawn there; they are between {name} = {:.4e} and {:.4e} m{nearest}",
-            ends[0], ends[1]
-        )))
+        let message = match (self.view, &self.arguments.threshold) {
+            _ if kept == [none; 3] => {
+                let between = [Axis::X, Axis::Y, Axis::Z].map(|axis| {
+                    let [low, high] = all[axis.index()];
+                    format!("{} = {low:.4e} and {high:.4e} m", axis.letter())
+                });
+                let clips = self
+                    .arguments
+                    .clip
+                    .iter()
+                    .map(|clip| format!("--clip {clip}"));
+                format!(
+                    "{}: no points are drawn there; they are between {}",
+                    clips.collect::<Vec<_>>().join(" "),
+                    between[..self.dimension].join(", ")
+                )
+            }
+            (_, Some(text)) if values != none => {
+                let threshold = self.threshold.as_ref();
+                let quantity = threshold.and_then(|threshold| threshold.quantity.as_ref());
+                let quantity = quantity.unwrap_or(&self.quantity);
+                let [low, high] = values;
+                let unit = &quantity.unit;
+                format!(
+                    "--threshold {text}: no points are drawn; their values of {} are between \
+                     {low:.4e} and {high:.4e} {unit}",
+                    quantity.label
+                )
+                .trim_end()
+                .to_owned()
+            }
+            (View::Slice { axis, position }, _) => {
+                let name = axis.letter();
+                let [low, high] = kept[axis.index()];
+                let nearest = nearest.map_or(String::new(), |at| {
+                    format!("; the nearest ones are at --slice {name}={at:.4e}")
+                });
+                format!(
+                    "--slice {name}={position}: no points are drawn there; they are between \
+                     {name} = {low:.4e} and {high:.4e} m{nearest}"
+                )
+            }
+            _ => "no points are drawn: no position or value is a finite number".to_owned(),
+        };
+        Ok(Error::input(message))
     }
 }
