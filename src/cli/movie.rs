@@ -10,7 +10,8 @@ use fissure::picture::film::Film;
 
 use super::plot::check_ending;
 use super::plot::limits::Frame;
-use super::plot::picture::{Painter, PictureArguments, beside};
+use super::plot::painter::Painter;
+use super::plot::picture::{PictureArguments, beside};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 

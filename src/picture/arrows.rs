@@ -1,6 +1,6 @@
 //! Arrows of a vector field, with a legend.
 
-use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 use super::axes::Pen;
 use super::canvas::{Colour, INK, Image};
@@ -40,8 +40,8 @@ const WHITE: Colour = [255; 3];
 
 /// Draw arrows in the middle of which are the points, and the legend.
 ///
-/// The length of an arrow is proportional to the projection of the vector. Circles with the arrows as
-/// diameters do not overlap. Of the other points, those nearest to the camera have arrows.
+/// The length of an arrow is proportional to the projection of the vector. Only some points have arrows, so
+/// that arrows do not overlap.
 pub fn draw(
     pen: &mut Pen,
     marks: impl Iterator<Item = (Mark, [f64; 3])>,
@@ -50,67 +50,65 @@ pub fn draw(
     layout: &Layout,
     projection: Projection,
 ) {
-    let [reach, spacing] = [LONGEST_ARROW, SPACING].map(|size| size * layout.text);
+    let [reach, cell] = [LONGEST_ARROW, SPACING].map(|size| size * layout.text);
     let scale = if longest > 0.0 { reach / longest } else { 0.0 };
-    let mut roots: Vec<Root> = Vec::new();
-    let mut cells: FxHashMap<[i64; 2], Root> = FxHashMap::default();
-    for (mark, vector) in marks {
+    let roots = marks.map(|(mark, vector)| {
         let [across, up] = projection.project(vector);
-        if !(across.is_finite() && up.is_finite()) {
-            continue;
-        }
-        let place = layout.pixel(projection.project(mark.position));
-        let cell = place.map(|pixel| (pixel / spacing).floor() as i64);
-        let from_centre = [0, 1].map(|k| place[k] / spacing - cell[k] as f64 - 0.5);
-        let root = Root {
-            place,
+        Root {
+            place: layout.pixel(projection.project(mark.position)),
             arrow: [scale * across, -scale * up],
-            rank: match projection {
+            depth: match projection {
                 Projection::Orthographic(camera) => camera.depth(mark.position),
-                Projection::Strip | Projection::Flat(_) => -from_centre[0].hypot(from_centre[1]),
+                Projection::Strip | Projection::Flat(_) => 0.0,
             },
-        };
-        let best = cells.entry(cell).or_insert(root);
-        if root.rank > best.rank {
-            *best = root;
         }
-    }
-    let mut order: Vec<[i64; 2]> = cells.keys().copied().collect();
-    order.sort_unstable();
-    let mut kept: FxHashMap<[i64; 2], [f64; 2]> = FxHashMap::default();
-    for cell in order {
-        let root = cells[&cell];
-        let neighbours = (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]);
-        let is_near = |other: [f64; 2]| {
-            (other[0] - root.place[0]).hypot(other[1] - root.place[1]) < reach * (1.0 - 1e-9)
-        };
-        let is_crowded = neighbours
-            .filter_map(|neighbour| kept.get(&neighbour))
-            .any(|other| is_near(*other));
-        if !is_crowded {
-            kept.insert(cell, root.place);
-            roots.push(root);
-        }
-    }
-    for root in roots {
-        arrow(
-            pen.image,
-            root.place,
-            root.arrow,
-            layout.text,
-            pen.thickness(),
-        );
+    });
+    let thickness = pen.thickness();
+    for root in thinned(roots, cell, reach) {
+        arrow(pen.image, root.place, root.arrow, layout.text, thickness);
     }
     legend(pen, vectors, longest, layout);
 }
 
-/// A candidate for an arrow: the pixel of its middle, and its vector in pixels.
+/// A candidate for an arrow.
 #[derive(Debug, Clone, Copy)]
 struct Root {
+    /// Pixel of the middle of the arrow.
     place: [f64; 2],
+    /// The arrow, in pixels.
     arrow: [f64; 2],
-    /// Of the points in a cell of the picture, the one with the largest rank has an arrow.
-    rank: f64,
+    /// Depth of the point; larger depths are nearer to the camera.
+    depth: f64,
+}
+
+/// Return at most one root for each square cell of the picture, at distances of at least `reach`. `cell` and
+/// `reach` are in pixels, and `reach` is at most `cell`. The root of a cell is the nearest to the camera, and
+/// among these the nearest to the centre of the cell.
+fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root> {
+    let rank = |root: &Root, number: [i64; 2]| {
+        let offset = [0, 1].map(|k| root.place[k] / cell - number[k] as f64 - 0.5);
+        (root.depth, -offset[0].hypot(offset[1]))
+    };
+    let mut best: BTreeMap<[i64; 2], Root> = BTreeMap::new();
+    for root in roots {
+        let number = root.place.map(|pixel| (pixel / cell).floor() as i64);
+        let own = best.entry(number).or_insert(root);
+        if rank(&root, number) > rank(own, number) {
+            *own = root;
+        }
+    }
+    let mut kept: BTreeMap<[i64; 2], Root> = BTreeMap::new();
+    for (number, root) in best {
+        let is_near = |other: &Root| {
+            let [across, down] = [0, 1].map(|k| other.place[k] - root.place[k]);
+            across.hypot(down) < reach * (1.0 - 1e-9)
+        };
+        let mut neighbours = (0..9).map(|k| [number[0] + k % 3 - 1, number[1] + k / 3 - 1]);
+        if !neighbours.any(|neighbour| kept.get(&neighbour).is_some_and(is_near)) {
+            kept.insert(number, root);
+        }
+    }
+    kept.into_values().collect()
 }
 
 /// Draw an arrow with a white border, so that it is visible on all colours. Lengths are in pixels.
@@ -190,6 +188,32 @@ fn legend_entry(longest: f64, unit: &str) -> (f64, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn arrows_do_not_overlap_and_those_in_front_are_kept() {
+        let lattice = |spacing: f64, depth: f64| {
+            (0..10_000).map(move |k| Root {
+                place: [f64::from(k % 100) * spacing, f64::from(k / 100) * spacing],
+                arrow: [1.0, 0.0],
+                depth,
+            })
+        };
+        for spacing in [0.7, 3.1, 11.0, 25.0, 60.0] {
+            let all = lattice(spacing, 0.0).chain(lattice(spacing, 1.0));
+            let kept = thinned(all, 30.0, 24.0);
+            assert!(kept.iter().all(|root| root.depth == 1.0));
+            for (k, one) in kept.iter().enumerate() {
+                for other in &kept[..k] {
+                    let [x, y] = [0, 1].map(|axis| one.place[axis] - other.place[axis]);
+                    assert!(x.hypot(y) > 23.9, "{spacing}");
+                }
+            }
+            // At least a quarter of the cells have an arrow, and all of far points.
+            let cells = (99.0 * spacing / 30.0).powi(2).min(10_000.0);
+            assert!(kept.len() as f64 > cells / 4.0, "{spacing}: {}", kept.len());
+            assert_eq!(kept.len() == 10_000, spacing > 30.0);
+        }
+    }
 
     #[test]
     fn legend_has_a_round_length() {

@@ -1,38 +1,27 @@
-//! Pictures of a field at points.
+//! `fissure plot` of a field: options, and the names of the files.
 
-use std::ops;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use fissure::error::{Error, Result};
-use fissure::output::{ResultReader, StoredField};
-use fissure::picture::{
-    Axis, ColourMap, Image, Scene, Vectors, View, is_damage, is_in_slice, render,
-};
+use fissure::error::Result;
+use fissure::output::ResultReader;
 
-use super::blocks::{blocks, is_zero, scattered_bodies};
-use super::choice::{Contours, choose_field, choose_times, colour_map, number, vector_field, view};
-use super::filter::{Clip, Threshold};
-use super::limits::{Frame, Limits, Range, range_of};
-use super::paths::{self, Line, NearestPoints};
-use super::quantity::Quantity;
+use super::choice::choose_times;
+use super::painter::Painter;
 use super::{PlotArguments, check_ending};
 use crate::cli::format::si;
 use crate::cli::{Verbosity, file_error, outln, result_file};
-
-/// Largest drawn displacement for `--deform auto`, relative to the body's size.
-const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 
 /// Options of pictures.
 #[derive(Args)]
 pub struct PictureArguments {
     /// Field to draw [default: damage, or another field if the result has none].
     #[arg(short, long, value_name = "NAME")]
-    field: Option<String>,
+    pub(super) field: Option<String>,
 
     /// Component or invariant of a vector or tensor: x, xx, magnitude, von_mises, principal_1, trace, …
     #[arg(short, long, value_name = "NAME")]
-    component: Option<String>,
+    pub(super) component: Option<String>,
 
     /// Factor on the drawn displacement, or `auto`.
     #[arg(
@@ -41,11 +30,11 @@ pub struct PictureArguments {
         default_value = "auto",
         allow_hyphen_values = true
     )]
-    deform: String,
+    pub(super) deform: String,
 
     /// Draw only the points of a solid that are nearest to this plane, such as z=0.005.
     #[arg(long, value_name = "AXIS=POSITION")]
-    slice: Option<String>,
+    pub(super) slice: Option<String>,
 
     /// Direction of the view of a solid: angle of the camera from +x towards +y, and above the x-y plane, in
     /// degrees [default: -45,35.26].
@@ -55,45 +44,45 @@ pub struct PictureArguments {
         allow_hyphen_values = true,
         conflicts_with = "slice"
     )]
-    camera: Option<String>,
+    pub(super) camera: Option<String>,
 
     /// Draw only the points in a half space, such as 'x<0.01' or 'z>0'. May be repeated.
     #[arg(long, value_name = "AXIS<POSITION")]
-    clip: Vec<String>,
+    pub(super) clip: Vec<String>,
 
     /// Draw only the points whose value is in this range. An end may be left out: `0.3:`.
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
-    threshold: Option<String>,
+    pub(super) threshold: Option<String>,
 
     /// Field of `--threshold`; a component or invariant follows a colon: stress:xx [default: the drawn values].
     #[arg(long, value_name = "NAME[:COMPONENT]", requires = "threshold")]
-    threshold_field: Option<String>,
+    pub(super) threshold_field: Option<String>,
 
     /// Draw the lines of a CSV file, such as crack_NAME.csv, over a plane picture. The columns are x and y
     /// (m), and branch if there are several lines. May be repeated.
     #[arg(long, value_name = "FILE.csv")]
-    path: Vec<PathBuf>,
+    pub(super) path: Vec<PathBuf>,
 
     /// Range of the colours: values such as 0,1, percentiles such as 5%,95%, or `all` [default: all, or
     /// 0.5%,99.5% if there are outliers].
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
-    range: Option<String>,
+    pub(super) range: Option<String>,
 
     /// Draw lines of equal value in plane pictures and slices: a number of lines, or values such as 1e6,2e6.
     #[arg(long, value_name = "N|VALUE,…", allow_hyphen_values = true)]
-    contours: Option<String>,
+    pub(super) contours: Option<String>,
 
     /// Draw the arrows of a vector field, such as velocity.
     #[arg(long, value_name = "FIELD")]
-    vectors: Option<String>,
+    pub(super) vectors: Option<String>,
 
     /// Colour map: viridis, turbo, coolwarm, grey or damage [default: damage for damage, else viridis].
     #[arg(long, value_name = "NAME")]
-    colors: Option<String>,
+    pub(super) colors: Option<String>,
 
     /// Logarithmic scale of the colours. Points with values up to 0 are grey.
     #[arg(long)]
-    log: bool,
+    pub(super) log: bool,
 
     /// Width of the picture in pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
@@ -151,524 +140,4 @@ pub fn beside(result: &Path, name: &str) -> PathBuf {
 fn numbered(path: &Path, index: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}_{index:04}.png"))
-}
-
-/// Settings of all pictures of a result.
-pub struct Painter<'a> {
-    result: &'a ResultReader,
-    arguments: &'a PictureArguments,
-    dimension: usize,
-    title: String,
-    /// Field and component of the drawn values, with label and unit.
-    pub quantity: Quantity,
-    has_displacement: bool,
-    section: f64,
-    range: Range,
-    colours: Option<ColourMap>,
-    view: View,
-    clips: Vec<Clip>,
-    threshold: Option<Threshold>,
-    contours: Option<Contours>,
-    /// Field of the arrows.
-    vectors: Option<StoredField>,
-    factor: f64,
-    /// Whether the points of a body are scattered, by index of the body.
-    scattered: Vec<bool>,
-    /// Lines over the picture, by index of the file.
-    paths: Vec<Vec<Line>>,
-}
-
-/// The points of an output as they are drawn.
-#[derive(Default)]
-struct Points {
-    positions: Vec<[f64; 3]>,
-    sizes: Vec<f64>,
-    /// For each point, whether its body has scattered points; empty if no body has scattered points.
-    scattered: Vec<bool>,
-    values: Vec<f64>,
-    /// Vectors for arrows; empty without arrows.
-    vectors: Vec<[f64; 3]>,
-    lines: Vec<(usize, Vec<[f64; 3]>)>,
-}
-
-impl<'a> Painter<'a> {
-    /// Create a painter of a result. An automatic displacement factor is chosen for the output `reference`.
-    ///
-    /// # Errors
-    /// If an argument is wrong for this result.
-    pub fn new(
-        arguments: &'a PictureArguments,
-        path: &Path,
-        result: &'a ResultReader,
-        reference: usize,
-    ) -> Result<Self> {
-        let attributes = result.attributes()?;
-        let attribute = |name: &str| {
-            let found = attributes.iter().find(|(known, _)| known == name);
-            found.map(|(_, value)| value.clone()).unwrap_or_default()
-        };
-        let wrong = |name: &str| {
-            let (path, value) = (path.display(), attribute(name));
-            Error::input(format!(
-                "{path}: attribute `{name}` must be a number, is `{value}`; was this written by \
-                 another version of Fissure?"
-            ))
-        };
-        let number_of = |name: &str| attribute(name).parse::<f64>().map_err(|_| wrong(name));
-        let dimension = number_of("dimension")? as usize;
-        let section = number_of("out_of_plane_measure")?;
-        let fields = result.fields()?;
-        let mut field = choose_field(arguments.field.as_deref(), path, &fields)?;
-        if arguments.field.is_none() && field.name == "velocity" {
-            // Quasi-static results have a velocity of zero, so draw the displacement instead.
-            let displacement = fields.iter().find(|field| field.name == "displacement");
-            if let Some(displacement) = displacement
-                && is_zero(result, "velocity", reference)?
-            {
-                field = displacement;
-            }
-        }
-        if dimension != 2 && !arguments.path.is_empty() {
-            return Err(Error::input("--path is for results of plane problems"));
-        }
-        let range = arguments.range.as_deref();
-        let range = range.map_or(Ok(Range::Automatic), range_of)?;
-        if let Range::Values((low, _)) = range
-            && arguments.log
-            && low <= 0.0
-        {
-            let message = format!("--range: with --log, LOW must be above 0, is {low}");
-            return Err(Error::input(message));
-        }
-        let colours = arguments.colors.as_deref().map(colour_map);
-        let clips = arguments.clip.iter().map(|clip| Clip::new(clip, dimension));
-        let threshold = arguments.threshold.as_deref().map(|text| {
-            let field = arguments.threshold_field.as_deref();
-            Threshold::new(text, field, path, &fields)
-        });
-        let contours = arguments.contours.as_deref();
-        let contours = contours.map(|text| Contours::new(text, arguments.log));
-        if contours.is_some() && dimension != 2 && arguments.slice.is_none() {
-            let message = "--contours is for plane problems, and for slices of solids";
-            return Err(Error::input(message));
-        }
-        let vectors = arguments.vectors.as_deref();
-        let vectors = vectors.map(|name| vector_field(name, path, &fields));
-        if vectors.is_some() && dimension == 1 {
-            let message = "--vectors is for plane problems and solids; this result is 1-D";
-            return Err(Error::input(message));
-        }
-        let paths = arguments.path.iter().map(|path| paths::read(path));
-        let mut painter = Self {
-            title: attribute("title"),
-            quantity: Quantity::new(field, arguments.component.as_deref())?,
-            has_displacement: fields.iter().any(|field| field.name == "displacement"),
-            section,
-            range,
-            colours: colours.transpose()?,
-            clips: clips.collect::<Result<_>>()?,
-            threshold: threshold.transpose()?,
-            contours: contours.transpose()?,
-            vectors: vectors.transpose()?.cloned(),
-            view: view(
-                arguments.slice.as_deref(),
-                arguments.camera.as_deref(),
-                dimension,
-            )?,
-            factor: 0.0,
-            scattered: scattered_bodies(result, reference, dimension)?,
-            paths: paths.collect::<Result<_>>()?,
-            result,
-            arguments,
-            dimension,
-        };
-        painter.factor = match arguments.deform.as_str() {
-            "auto" => painter.automatic_factor(reference)?,
-            text => number(text, "--deform must be `auto` or a number")?,
-        };
-        Ok(painter)
-    }
-
-    /// Return the name of the drawn quantity, for file names.
-    pub fn name(&self) -> String {
-        let field = &self.quantity.field;
-        match &self.arguments.component {
-            Some(component) => format!("{field}_{component}"),
-            None => field.clone(),
-        }
-    }
-
-    fn displacements(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<f64>> {
-        if self.has_displacement {
-            self.result.field_of("displacement", index, points)
-        } else {
-            Ok(vec![0.0; 3 * points.len()])
-        }
-    }
-
-    /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible.
-    fn automatic_factor(&self, index: usize) -> Result<f64> {
-        let mut largest = 0.0_f64;
-        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        for points in blocks(self.result.points(index)) {
-            let values = self.displacements(index, points.clone())?;
-            let finite = values.iter().filter(|u| u.is_finite());
-            largest = finite.fold(largest, |a, u| a.max(u.abs()));
-            for position in self.result.positions_of(index, points)? {
-                for d in 0..3 {
-                    low[d] = low[d].min(position[d]);
-                    high[d] = high[d].max(position[d]);
-                }
-            }
-        }
-        let extent = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
-        let wanted = AUTOMATIC_DISPLACEMENT * extent / largest;
-        if !wanted.is_finite() || wanted <= 1.0 {
-            return Ok(1.0);
-        }
-        let power = 10_f64.powf(wanted.log10().floor());
-        let step = [5.0, 2.0, 1.0]
-            .into_iter()
-            .find(|step| step * power <= wanted);
-        Ok(step.unwrap_or(1.0) * power)
-    }
-
-    /// Return whether the slice shows a position; true without a slice. `size` is the edge of the cell, m.
-    fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
-        match self.view {
-            View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),
-            View::Plane | View::Orthographic(_) => true,
-        }
-    }
-
-    fn is_clipped(&self, position: [f64; 3]) -> bool {
-        !self.clips.iter().all(|clip| clip.holds(position))
-    }
-
-    /// Return whether points may be left out.
-    fn is_partial(&self) -> bool {
-        let is_slice = matches!(self.view, View::Slice { .. });
-        is_slice || !self.clips.is_empty() || self.threshold.is_some()
-    }
-
-    /// Return the values for the threshold; `None` if these are the drawn values.
-    fn threshold_values(
-        &self,
-        index: usize,
-        points: ops::Range<usize>,
-    ) -> Result<Option<Vec<f64>>> {
-        let threshold = self.threshold.as_ref();
-        let Some(quantity) = threshold.and_then(|threshold| threshold.quantity.as_ref()) else {
-            return Ok(None);
-        };
-        let values = self.result.field_of(&quantity.field, index, points)?;
-        Ok(Some(quantity.of(values)))
-    }
-
-    /// Read the points of an output, block by block. Keep only the points in the slice, the half spaces and
-    /// the range of values.
-    fn points(&self, index: usize) -> Result<Points> {
-        let mut found = Points::default();
-        let count = self.result.points(index);
-        if !self.is_partial() {
-            found.positions.reserve_exact(count);
-            found.sizes.reserve_exact(count);
-            found.values.reserve_exact(count);
-        }
-        let mut paths = NearestPoints::new(&self.paths);
-        let power = 1.0 / self.dimension as f64;
-        for points in blocks(count) {
-            let values = self
-                .result
-                .field_of(&self.quantity.field, index, points.clone())?;
-            let values = self.quantity.of(values);
-            let volumes = self.result.field_of("volume", index, points.clone())?;
-            let thresholds = self.threshold_values(index, points.clone())?;
-            let scattered = self.are_scattered(index, points.clone())?;
-            let vectors = match &self.vectors {
-                Some(field) => self.result.field_of(&field.name, index, points.clone())?,
-                None => Vec::new(),
-            };
-            let places = self.result.positions_of(index, points.clone())?;
-            let displacements = self.displacements(index, points)?;
-            paths.search(&places, &displacements);
-            for (k, position) in self.drawn_positions(&places, &displacements).enumerate() {
-                let size = (volumes[k] / self.section).powf(power);
-                let value = thresholds.as_ref().map_or(values[k], |values| values[k]);
-                if self.is_clipped(position)
-                    || !self.is_in_view(position, size)
-                    || self
-                        .threshold
-                        .as_ref()
-                        .is_some_and(|range| !range.holds(value))
-                {
-                    continue;
-                }
-                found.positions.push(position);
-                found.sizes.push(size);
-                found.values.push(values[k]);
-                if let Some(vector) = vectors.chunks_exact(3).nth(k) {
-                    found.vectors.push([vector[0], vector[1], vector[2]]);
-                }
-                if let Some(scattered) = scattered.get(k) {
-                    found.scattered.push(*scattered);
-                }
-            }
-        }
-        found.lines = paths.moved_lines(self.factor);
-        Ok(found)
-    }
-
-    /// Return the drawn positions, m: reference positions plus displacements times the deformation factor.
-    fn drawn_positions<'b>(
-        &'b self,
-        places: &'b [[f64; 3]],
-        displacements: &'b [f64],
-    ) -> impl Iterator<Item = [f64; 3]> + 'b {
-        let both = places.iter().zip(displacements.chunks_exact(3));
-        both.map(|(x, u)| std::array::from_fn(|d| x[d] + self.factor * u[d]))
-    }
-
-    fn scene<'b>(&'b self, points: &'b Points) -> Scene<'b> {
-        Scene {
-            dimension: self.dimension,
-            positions: &points.positions,
-            sizes: &points.sizes,
-            scattered: &points.scattered,
-            values: &points.values,
-            field: &self.quantity.label,
-            unit: &self.quantity.unit,
-            colours: self.colours,
-            is_logarithmic: self.arguments.log,
-            title: "",
-            range: None,
-            view: self.view,
-            width: self.arguments.width,
-            lines: &points.lines,
-            contours: &[],
-            vectors: self.vectors.as_ref().map(|field| Vectors {
-                values: &points.vectors,
-                field: &field.name,
-                unit: match field.unit.as_str() {
-                    "1" => "",
-                    unit => unit,
-                },
-                longest: None,
-            }),
-            note: "",
-            bounds: None,
-        }
-    }
-
-    /// Return for each of these points whether its body has scattered points; empty if no body has scattered
-    /// points.
-    fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
-        if !self.scattered.contains(&true) {
-            return Ok(Vec::new());
-        }
-        if !self.scattered.contains(&false) {
-            return Ok(vec![true; points.len()]);
-        }
-        let bodies = self.result.field_of("block", index, points)?;
-        let is_scattered = |body: &f64| self.scattered.get(*body as usize) == Some(&true);
-        Ok(bodies.iter().map(is_scattered).collect())
-    }
-
-    /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no
-    /// outliers.
-    fn limits(&self, values: Vec<f64>) -> Option<Limits> {
-        match self.range {
-            range if self.arguments.log => Limits::logarithmic(values, range),
-            Range::Automatic if is_damage(&self.quantity.field) => Limits::of(values, Range::All),
-            range => Limits::of(values, range),
-        }
-    }
-
-    /// Return the frame that encloses an output; `None` if no point is drawn. A film uses the union of the
-    /// frames of its outputs.
-    ///
-    /// # Errors
-    /// If the result is damaged.
-    pub fn frame(&self, index: usize) -> Result<Option<Frame>> {
-        let points = self.points(index)?;
-        let scene = self.scene(&points);
-        let marks = scene.marks()?;
-        if marks.is_empty() {
-            return Ok(None);
-        }
-        Ok(Some(Frame {
-            bounds: marks.extent(),
-            limits: self.limits(marks.values()),
-            longest_vector: marks.longest_vector(),
-        }))
-    }
-
-    /// Draw an output; `time` is the text of its time. Box and limits come from `frame`, or from the output
-    /// if `frame` is `None`.
-    ///
-    /// # Errors
-    /// If the result is damaged.
-    pub fn image(&self, index: usize, time: &str, frame: Option<&Frame>) -> Result<Image> {
-        let points = self.points(index)?;
-        let scene = self.scene(&points);
-        let limits = match frame {
-            Some(frame) => frame.limits,
-            None => self.limits(scene.marks()?.values()),
-        };
-        let note = limits.map_or(String::new(), |limits| limits.note(&self.quantity.unit));
-        let mut title = format!("{}   t = {time}", self.title);
-        if self.has_displacement && self.factor != 0.0 {
-            title += &format!("   deformation × {}", self.factor);
-        }
-        let scene = Scene {
-            title: title.trim_start(),
-            range: match (self.range, limits) {
-                (Range::Values(range), _) => Some(range),
-                // The colour bar of damage starts at 0 in all pictures.
-                (_, Some(limits)) if frame.is_some() || limits.is_cut() => {
-                    let [low, high] = limits.shown;
-                    let from_zero = is_damage(&self.quantity.field) && !self.arguments.log;
-                    let low = if from_zero { low.min(0.0) } else { low };
-                    (low < high).then_some((low, high))
-                }
-                _ => None,
-            },
-            note: &note,
-            bounds: frame.map(|frame| frame.bounds),
-            vectors: scene.vectors.map(|vectors| Vectors {
-                longest: frame.map(|frame| frame.longest_vector),
-                ..vectors
-            }),
-            ..scene
-        };
-        let contours = match &self.contours {
-            None => Vec::new(),
-            Some(Contours::Count(count)) => scene.levels(*count)?,
-            Some(Contours::Values(values)) => values.clone(),
-        };
-        render(&Scene {
-            contours: &contours,
-            ..scene
-        })
-    }
-
-    /// Check that some of these outputs have points to draw. If the scale is logarithmic, some drawn values
-    /// must be above 0.
-    ///
-    /// # Errors
-    /// If no points are drawn although the outputs have points, or all drawn values are 0 or less.
-    pub fn check(&self, indices: &[usize]) -> Result<()> {
-        if !self.is_partial() && !self.arguments.log {
-            return Ok(());
-        }
-        let mut last = None;
-        let mut are_drawn = false;
-        for index in indices {
-            if self.result.points(*index) == 0 {
-                continue;
-            }
-            last = Some(*index);
-            let points = self.points(*index)?;
-            let scene = self.scene(&points);
-            let marks = scene.marks()?;
-            are_drawn |= !marks.is_empty();
-            if are_drawn && (!self.arguments.log || marks.iter().any(|mark| mark.value > 0.0)) {
-                return Ok(());
-            }
-        }
-        match last {
-            None => Ok(()),
-            Some(_) if are_drawn => Err(Error::input(format!(
-                "--log: no drawn value of {} is above 0",
-                self.quantity.label
-            ))),
-            Some(index) => Err(self.nothing_drawn(index)?),
-        }
-    }
-
-    /// Return the error for an output of which no point is drawn. It says which option leaves out the last
-    /// points, and where the points are.
-    fn nothing_drawn(&self, index: usize) -> Result<Error> {
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let include = |ends: &mut [f64; 2], value: f64| {
-            if value.is_finite() {
-                *ends = [ends[0].min(value), ends[1].max(value)];
-            }
-        };
-        // Ends of the coordinates of all points, of the coordinates of points in the half spaces, and of the
-        // values of points that are also in the slice.
-        let (mut all, mut kept, mut values) = ([none; 3], [none; 3], none);
-        let mut nearest: Option<f64> = None;
-        let power = 1.0 / self.dimension as f64;
-        for points in blocks(self.result.points(index)) {
-            let drawn = (self.result).field_of(&self.quantity.field, index, points.clone())?;
-            let drawn = self.quantity.of(drawn);
-            let thresholds = self.threshold_values(index, points.clone())?;
-            let thresholds = thresholds.unwrap_or(drawn);
-            let volumes = self.result.field_of("volume", index, points.clone())?;
-            let places = self.result.positions_of(index, points.clone())?;
-            let displacements = self.displacements(index, points)?;
-            for (k, place) in self.drawn_positions(&places, &displacements).enumerate() {
-                (all.iter_mut().zip(place)).for_each(|(ends, at)| include(ends, at));
-                if self.is_clipped(place) {
-                    continue;
-                }
-                (kept.iter_mut().zip(place)).for_each(|(ends, at)| include(ends, at));
-                if let View::Slice { axis, position } = self.view {
-                    let (at, distance) = (place[axis.index()], |at: f64| (at - position).abs());
-                    if at.is_finite() && nearest.is_none_or(|old| distance(at) < distance(old)) {
-                        nearest = Some(at);
-                    }
-                }
-                if self.is_in_view(place, (volumes[k] / self.section).powf(power)) {
-                    include(&mut values, thresholds[k]);
-                }
-            }
-        }
-        let message = match (self.view, &self.arguments.threshold) {
-            _ if kept == [none; 3] => {
-                let between = [Axis::X, Axis::Y, Axis::Z].map(|axis| {
-                    let [low, high] = all[axis.index()];
-                    format!("{} = {low:.4e} and {high:.4e} m", axis.letter())
-                });
-                let clips = self
-                    .arguments
-                    .clip
-                    .iter()
-                    .map(|clip| format!("--clip {clip}"));
-                format!(
-                    "{}: no points are drawn there; they are between {}",
-                    clips.collect::<Vec<_>>().join(" "),
-                    between[..self.dimension].join(", ")
-                )
-            }
-            (_, Some(text)) if values != none => {
-                let threshold = self.threshold.as_ref();
-                let quantity = threshold.and_then(|threshold| threshold.quantity.as_ref());
-                let quantity = quantity.unwrap_or(&self.quantity);
-                let [low, high] = values;
-                let unit = &quantity.unit;
-                format!(
-                    "--threshold {text}: no points are drawn; their values of {} are between \
-                     {low:.4e} and {high:.4e} {unit}",
-                    quantity.label
-                )
-                .trim_end()
-                .to_owned()
-            }
-            (View::Slice { axis, position }, _) => {
-                let name = axis.letter();
-                let [low, high] = kept[axis.index()];
-                let nearest = nearest.map_or(String::new(), |at| {
-                    format!("; the nearest ones are at --slice {name}={at:.4e}")
-                });
-                format!(
-                    "--slice {name}={position}: no points are drawn there; they are between \
-                     {name} = {low:.4e} and {high:.4e} m{nearest}"
-                )
-            }
-            _ => "no points are drawn: no position or value is a finite number".to_owned(),
-        };
-        Ok(Error::input(message))
-    }
 }
