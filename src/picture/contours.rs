@@ -1,6 +1,7 @@
 //! Lines of equal value between points in the plane.
 
 use delaunator::{Point, triangulate};
+use rustc_hash::FxHashMap;
 
 /// Longest edge of a triangle in which values are interpolated, in cell edges. The diagonal of a square
 /// lattice has 1.41 cell edges. Longer edges lie across holes, notches and open cracks.
@@ -15,6 +16,32 @@ pub struct Sample {
     pub size: f64,
     /// The value; triangles with a value that is not finite have no lines.
     pub value: f64,
+}
+
+/// Return the samples that no later sample covers: those whose positions are not within half a cell of a later
+/// one. A slice between two layers of points shows both, and the later points are nearer to its plane.
+pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
+    let largest = samples
+        .iter()
+        .fold(0.0, |size: f64, sample| size.max(sample.size));
+    let cell = |position: [f64; 2]| position.map(|x| (x / largest).floor() as i64);
+    let mut kept: FxHashMap<[i64; 2], Vec<Sample>> = FxHashMap::default();
+    for sample in samples.iter().rev() {
+        let [column, row] = cell(sample.position);
+        let is_covering = |later: &Sample| {
+            let [x, y] = [0, 1].map(|k| later.position[k] - sample.position[k]);
+            x.hypot(y) < later.size / 2.0
+        };
+        let mut neighbours = (0..9).map(|k| [column + k % 3 - 1, row + k / 3 - 1]);
+        let is_covered = neighbours.any(|neighbour| {
+            let later = kept.get(&neighbour);
+            later.is_some_and(|later| later.iter().any(is_covering))
+        });
+        if !is_covered {
+            kept.entry([column, row]).or_default().push(*sample);
+        }
+    }
+    kept.into_values().flatten().collect()
 }
 
 /// Return the line segments on which the interpolated value equals one of the levels. Values are interpolated
@@ -98,6 +125,28 @@ mod tests {
             length(&lines)
         );
         assert!(segments(&cone, &[7.0]).is_empty());
+    }
+
+    #[test]
+    fn layers_behind_have_no_lines() {
+        let behind = lattice(|x, _| x);
+        // The layer in front is shifted by 0.1 spacings.
+        let mut layers = behind.clone();
+        layers.extend(lattice(|_, y| y).into_iter().map(|mut sample| {
+            sample.position[0] += 0.1 / 40.0;
+            sample
+        }));
+        let shown = uncovered(&layers);
+        assert_eq!(shown.len(), behind.len());
+        let lines = segments(&shown, &[0.51]);
+        assert!((length(&lines) - 1.0).abs() < 1e-9, "{}", length(&lines));
+        assert!(
+            lines
+                .iter()
+                .flatten()
+                .all(|end| (end[1] - 0.51).abs() < 1e-9)
+        );
+        assert_eq!(uncovered(&behind).len(), behind.len());
     }
 
     #[test]

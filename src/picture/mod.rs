@@ -161,11 +161,15 @@ fn contour_lines(
         size: mark.size * layout.scale,
         value: colouring.fraction(mark.value),
     });
+    let mut samples: Vec<contours::Sample> = samples.collect();
+    if let View::Slice { .. } = scene.effective_view() {
+        samples = contours::uncovered(&samples);
+    }
     let levels = scene
         .contours
         .iter()
         .map(|level| colouring.fraction(*level));
-    let segments = contours::segments(&samples.collect::<Vec<_>>(), &levels.collect::<Vec<_>>());
+    let segments = contours::segments(&samples, &levels.collect::<Vec<_>>());
     let thickness = pen.thickness();
     // White borders make the lines visible on all colours.
     for (thickness, colour) in [(3.0 * thickness, [255; 3]), (thickness, INK)] {

@@ -336,7 +336,7 @@ fn a_cube_in_any_elements_has_its_volume_and_centre_in_any_encoding() {
     for (name, written) in cubes() {
         let mut first = None;
         for (encoding, bytes) in written.all() {
-            let path = folder.write("cube.msh", bytes);
+            let path = folder.write("cube.msh", &bytes);
             let found = points(&solid(&path, &[]));
             assert_eq!(found.len(), written.elements.len());
             let volume: f64 = found.iter().map(|(_, volume, _)| volume).sum();
@@ -528,7 +528,7 @@ fn second_order_elements_have_the_order_of_gmsh() {
             .elements
             .push((kind, 1, 1, (1..=nodes.len()).collect()));
         for (encoding, bytes) in written.all() {
-            let path = folder.write("element.msh", bytes);
+            let path = folder.write("element.msh", &bytes);
             let found = points(&solid(&path, &[]));
             assert!(
                 (found[0].1 / volume - 1.0).abs() < 1e-14,
@@ -568,7 +568,7 @@ fn plane_elements_have_an_area_times_the_thickness_from_either_side() {
         let mut written = Written::default();
         written.add_nodes(&nodes);
         written.elements.push((kind, 1, 1, nodes_of.to_vec()));
-        let path = folder.write("plane.msh", written.version_4(None));
+        let path = folder.write("plane.msh", &written.version_4(None));
         let deck = format!(
             "dimension = 'plane-strain'\nthickness = 0.25\ngrid.horizon = 1\ntime.end = 1\n\
              material.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n[body.a]\nmaterial = 'a'\n\
@@ -624,7 +624,7 @@ fn two_cubes() -> Written {
 fn groups_of_any_dimension_become_sets() {
     let folder = Folder::new("mesh-groups");
     for (encoding, bytes) in two_cubes().all() {
-        let path = folder.write("two.msh", bytes);
+        let path = folder.write("two.msh", &bytes);
         let problem = solid(&path, &["outer face", "between", "edge", "corner", "first"]);
         assert!(ids(&problem, "first").is_empty(), "before there are points");
         points(&problem);
@@ -648,7 +648,7 @@ fn the_kind_tells_groups_of_the_same_number_apart() {
     written.elements[1].1 = 2;
     written.names.clear();
     for (encoding, bytes) in written.all() {
-        let path = folder.write("two.msh", bytes);
+        let path = folder.write("two.msh", &bytes);
         let problem = solid(&path, &["surface 2", "volume 2"]);
         points(&problem);
         assert_eq!(ids(&problem, "surface 2"), [0, 1], "{encoding}");
@@ -664,7 +664,7 @@ fn the_kind_tells_groups_of_the_same_number_apart() {
 #[test]
 fn a_block_may_be_a_number_and_a_body_without_one_gets_the_rest() {
     let folder = Folder::new("mesh-blocks");
-    let path = folder.write("two.msh", two_cubes().version_2(None));
+    let path = folder.write("two.msh", &two_cubes().version_2(None));
     let deck = format!(
         "dimension = '3d'\ngrid.horizon = 1\ntime.end = 1\n\
          material.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n\
@@ -685,7 +685,7 @@ fn version_2_repeats_an_element_for_each_of_its_groups() {
     let mut again = written.elements[4].clone();
     again.1 = 2;
     written.elements.insert(5, again);
-    let path = folder.write("two.msh", written.version_2(None));
+    let path = folder.write("two.msh", &written.version_2(None));
     let problem = solid(&path, &["first"]);
     assert_eq!(points(&problem).len(), 2);
     assert_eq!(ids(&problem, "first"), [0]);
@@ -1183,7 +1183,7 @@ const WAYS: [Arrays; 4] = [
 fn an_unstructured_grid_is_read_in_any_encoding() {
     let folder = Folder::new("mesh-vtu");
     for way in WAYS {
-        let path = folder.write("two.vtu", unstructured(way));
+        let path = folder.write("two.vtu", &unstructured(way));
         let problem = solid(&path, &["material=5", "left=1"]);
         let found = points(&problem);
         assert_unit_cubes(&found, &[[0.5; 3], [1.5, 0.5, 0.5]]);
@@ -1525,8 +1525,8 @@ impl Exodus {
 #[test]
 fn exodus_files_of_both_kinds_have_blocks_and_sets() {
     let folder = Folder::new("mesh-exodus");
-    let classic = folder.write("classic.exo", exodus().classic(1));
-    let wide = folder.write("wide.g", exodus().classic(2));
+    let classic = folder.write("classic.exo", &exodus().classic(1));
+    let wide = folder.write("wide.g", &exodus().classic(2));
     let hdf5 = folder.join("hdf5.e");
     exodus().hdf5(&hdf5);
     for path in [classic, wide, hdf5] {

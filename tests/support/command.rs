@@ -30,7 +30,7 @@ impl Folder {
     }
 
     /// Write a file into the folder.
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+    pub fn write(&self, name: &str, content: &(impl AsRef<[u8]> + ?Sized)) -> PathBuf {
         let path = self.join(name);
         std::fs::write(&path, content).unwrap();
         path
