@@ -342,7 +342,7 @@ fn contours_and_vectors_are_drawn_over_plane_pictures() {
     );
     plate.reject(
         &["--vectors", "stress"],
-        "--vectors stress: must be a vector field, but a point has 6 numbers (vector fields: ",
+        "--vectors stress: must be a field with 3 components, has 6 (vector fields: ",
     );
     plate.reject(&["--vectors", "speed"], "has no field `speed`");
     let block = Drawings::new(&folder, "block", BLOCK);

@@ -63,7 +63,7 @@ pub fn vector_field<'a>(
     let vectors = fields.iter().filter(|field| field.components == 3);
     let known: Vec<&str> = vectors.map(|field| field.name.as_str()).collect();
     Err(Error::input(format!(
-        "--vectors {name}: must be a vector field, but a point has {} numbers (vector fields: {})",
+        "--vectors {name}: must be a field with 3 components, has {} (vector fields: {})",
         field.components,
         known.join(", ")
     )))
@@ -107,7 +107,7 @@ mod tests {
         let chosen = |name| vector_field(name, Path::new("result"), &fields);
         assert_eq!(chosen("displacement").unwrap().name, "displacement");
         let message = chosen("stress").unwrap_err().message;
-        assert!(message.ends_with("a point has 6 numbers (vector fields: displacement)"));
+        assert!(message.ends_with("with 3 components, has 6 (vector fields: displacement)"));
         assert!(
             chosen("speed")
                 .unwrap_err()
