@@ -9,7 +9,9 @@ use fissure::picture::Image;
 use fissure::picture::film::Film;
 
 use super::plot::check_ending;
-use super::plot::picture::{Frame, Painter, PictureArguments, beside};
+use super::plot::limits::Frame;
+use super::plot::painter::Painter;
+use super::plot::picture::{PictureArguments, beside};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 
@@ -68,6 +70,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     };
     let hint = " (an animated PNG); for other formats, write --frames and encode them with ffmpeg";
     check_ending(&path, &["png", "apng"], hint)?;
+    painter.check(&chosen)?;
     if let Some(folder) = &arguments.frames {
         create_folder(folder)?;
     }
@@ -84,7 +87,6 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
         progress.update(number as u64 + 1, 2 * count, times[*index]);
     }
     let Some(frame) = frame else {
-        painter.check_slice(chosen[0])?;
         let message = format!("{}: no output has points to draw", file.display());
         return Err(Error::input(message));
     };

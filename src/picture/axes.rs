@@ -1,10 +1,10 @@
 //! Rulers with ticks, the colour bar and the axis triad.
 
 use super::canvas::{INK, Image};
-use super::layout::Bar;
+use super::layout::{Bar, Layout};
 use super::lettering::{CAPITAL_HEIGHT, Lettering, Running};
 use super::points::Colouring;
-use super::projection::Projection;
+use super::projection::{Bounds, Projection};
 use super::scale::Scale;
 use super::scene::Axis;
 
@@ -97,7 +97,7 @@ impl Pen<'_> {
             right - left
         };
         for step in 0..length as i64 {
-            let colour = colouring.of(low + (step as f64 + 0.5) / length * (high - low));
+            let colour = colouring.of(colouring.value((step as f64 + 0.5) / length));
             let (columns, rows) = if bar.upright {
                 let row = bottom as i64 - 1 - step;
                 ([left as i64, right as i64], [row, row + 1])
@@ -111,7 +111,11 @@ impl Pen<'_> {
         let spacing = if bar.upright { 3.0 } else { 6.0 };
         let most = ((length / (spacing * self.text)) as usize).clamp(2, 8);
         let magnitude = low.abs().max(high.abs());
-        let scale = Scale::new(low, high, unit, magnitude, most);
+        let scale = if colouring.is_logarithmic {
+            Scale::logarithmic(low, high, unit, most)
+        } else {
+            Scale::new(low, high, unit, magnitude, most)
+        };
         let (from, to, outward) = if bar.upright {
             ([right, bottom], [right, top], [1.0, 0.0])
         } else {
@@ -126,6 +130,24 @@ impl Pen<'_> {
         });
     }
 
+    /// Draw the values of contour lines on the colour bar.
+    pub fn levels(&mut self, bar: &Bar, colouring: Colouring, levels: &[f64]) {
+        let ([left, right], [top, bottom]) = (bar.columns, bar.rows);
+        let fractions = levels.iter().map(|level| colouring.fraction(*level));
+        for fraction in fractions.filter(|fraction| (0.0..=1.0).contains(fraction)) {
+            let (from, to) = if bar.upright {
+                let row = bottom - fraction * (bottom - top);
+                ([left, row], [right, row])
+            } else {
+                let column = left + fraction * (right - left);
+                ([column, top], [column, bottom])
+            };
+            let thickness = self.thickness();
+            self.image.line(from, to, 3.0 * thickness, [255; 3]);
+            self.image.line(from, to, thickness, INK);
+        }
+    }
+
     /// Draw the four sides of a rectangle.
     pub fn outline(&mut self, [left, right]: [f64; 2], [top, bottom]: [f64; 2]) {
         let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
@@ -134,15 +156,38 @@ impl Pen<'_> {
         }
     }
 
-    /// Draw the directions of the three axes in the isometric view.
-    pub fn triad(&mut self, root: [f64; 2]) {
+    /// Draw the directions of the three axes of an orthographic view in the upper left or right corner of the
+    /// frame, unless the box covers both corners.
+    pub fn triad(&mut self, layout: &Layout, bounds: &Bounds, view: Projection) {
         let length = 2.4 * self.text;
-        for axis in [Axis::X, Axis::Y, Axis::Z] {
+        let axes = [Axis::X, Axis::Y, Axis::Z].map(|axis| {
             let mut step = [0.0; 3];
             step[axis.index()] = 1.0;
-            let [across, up] = Projection::Isometric.project(step);
+            let [across, up] = view.project(step);
             let size = across.hypot(up);
-            let direction = [across / size, -up / size];
+            (axis, (size > 1e-6).then(|| [across / size, -up / size]))
+        });
+        let ends = [0, 1].map(|k| {
+            let along = axes
+                .iter()
+                .filter_map(|(_, direction)| direction.map(|step| step[k]));
+            along.fold([0.0_f64; 2], |[low, high], x| [low.min(x), high.max(x)])
+        });
+        let row = layout.rows[0] + 0.8 * self.text - length * ends[1][0];
+        let margin = self.text;
+        let left = layout.columns[0] + margin - length * ends[0][0];
+        let right = layout.columns[1] - margin - length * ends[0][1];
+        let is_free = |root: &[f64; 2]| {
+            let directions = axes.iter().filter_map(|(_, direction)| *direction);
+            let labels = directions.map(|step| moved(*root, step, length + 1.1 * margin));
+            let mut ends = labels.chain([*root]);
+            !ends.any(|end| bounds.covers(layout.position(end), view))
+        };
+        let Some(root) = [[left, row], [right, row]].into_iter().find(is_free) else {
+            return;
+        };
+        for (axis, direction) in axes {
+            let Some(direction) = direction else { continue };
             let tip = moved(root, direction, length);
             self.image.line(root, tip, 1.3 * self.thickness(), INK);
             let aside = [-direction[1], direction[0]];

@@ -2,41 +2,80 @@
 
 use super::canvas::Colour;
 
-/// Colour of points without a value.
-pub const NO_VALUE: Colour = [140, 142, 146];
-
 /// A colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColourMap {
-    /// Dark violet over green to yellow, perceptually uniform ("viridis").
-    General,
+    /// Dark violet over green to yellow, perceptually uniform.
+    Viridis,
+    /// Rainbow from dark blue over green to dark red, smoother than "jet".
+    Turbo,
+    /// Blue over light grey to red: diverging, for values on both sides of a reference value.
+    Coolwarm,
+    /// Almost black to light grey.
+    Grey,
     /// Light grey over orange and red to almost black: even a crack of one point's width stands out.
     Damage,
 }
 
 impl ColourMap {
-    /// Return the map for a field. The name of the field selects the map, so that all pictures of a series
-    /// use the same map.
+    /// All maps.
+    pub const ALL: [Self; 5] = [
+        Self::Viridis,
+        Self::Turbo,
+        Self::Coolwarm,
+        Self::Grey,
+        Self::Damage,
+    ];
+
+    /// Return the name of the map.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viridis => "viridis",
+            Self::Turbo => "turbo",
+            Self::Coolwarm => "coolwarm",
+            Self::Grey => "grey",
+            Self::Damage => "damage",
+        }
+    }
+
+    /// Return the default map of a field. The name of the field selects the map, so that all pictures of a
+    /// series use the same map.
     pub fn for_field(field: &str) -> Self {
-        if field.to_lowercase().contains("damage") {
+        if is_damage(field) {
             Self::Damage
         } else {
-            Self::General
+            Self::Viridis
         }
     }
 
     /// Return the colour at `fraction` of the way from the low to the high end. Fractions beyond an end are
-    /// clamped; NaN is grey.
+    /// clamped; NaN has the colour of points without a value.
     pub fn colour(self, fraction: f64) -> Colour {
         if fraction.is_nan() {
-            return NO_VALUE;
+            return self.no_value();
         }
         let fraction = fraction.clamp(0.0, 1.0);
         match self {
-            Self::General => viridis(fraction),
+            Self::Viridis => viridis(fraction),
+            Self::Turbo => between(&TURBO, fraction),
+            Self::Coolwarm => between(&COOLWARM, fraction),
+            Self::Grey => [(GREY[0] + fraction * (GREY[1] - GREY[0])).round() as u8; 3],
             Self::Damage => damage(fraction),
         }
     }
+
+    /// Return the colour of points without a value: grey, or pale blue if the map is grey.
+    fn no_value(self) -> Colour {
+        match self {
+            Self::Grey => [150, 190, 225],
+            _ => [140, 142, 146],
+        }
+    }
+}
+
+/// Test whether a field is a damage, which is at least 0.
+pub fn is_damage(field: &str) -> bool {
+    field.to_lowercase().contains("damage")
 }
 
 /// Return the colour darkened to `brightness` (0 to 1), for faces turned away from the light.
@@ -64,6 +103,96 @@ fn viridis(fraction: f64) -> Colour {
         }
     }
     colour.map(|channel| (channel * 255.0).round() as u8)
+}
+
+/// Ends of the grey map. The high end is darker than the white background.
+const GREY: [f64; 2] = [24.0, 226.0];
+
+/// Equally spaced colours of the diverging map of K. Moreland, "Diverging color maps for scientific
+/// visualization", Proc. ISVC 2009.
+const COOLWARM: [Colour; 33] = [
+    [59, 76, 192],
+    [68, 90, 204],
+    [77, 104, 215],
+    [87, 117, 225],
+    [98, 130, 234],
+    [108, 142, 241],
+    [119, 154, 247],
+    [130, 165, 251],
+    [141, 176, 254],
+    [152, 185, 255],
+    [163, 194, 255],
+    [174, 201, 253],
+    [184, 208, 249],
+    [194, 213, 244],
+    [204, 217, 238],
+    [213, 219, 230],
+    [221, 221, 221],
+    [229, 216, 209],
+    [236, 211, 197],
+    [241, 204, 185],
+    [245, 196, 173],
+    [247, 187, 160],
+    [247, 177, 148],
+    [247, 166, 135],
+    [244, 154, 123],
+    [241, 141, 111],
+    [236, 127, 99],
+    [229, 112, 88],
+    [222, 96, 77],
+    [213, 80, 66],
+    [203, 62, 56],
+    [192, 40, 47],
+    [180, 4, 38],
+];
+
+/// Equally spaced colours of "turbo" (A. Mikhailov, Google AI Blog, 2019; Apache-2.0). Interpolated colours
+/// differ from the published 256 colours by 2 of 255 at most.
+const TURBO: [Colour; 33] = [
+    [48, 18, 59],
+    [57, 42, 115],
+    [64, 64, 161],
+    [68, 86, 199],
+    [70, 107, 227],
+    [70, 127, 246],
+    [66, 147, 255],
+    [55, 167, 250],
+    [41, 187, 236],
+    [29, 205, 216],
+    [24, 220, 195],
+    [30, 232, 176],
+    [49, 242, 153],
+    [76, 249, 126],
+    [107, 253, 100],
+    [138, 255, 77],
+    [163, 253, 60],
+    [184, 247, 53],
+    [204, 237, 52],
+    [222, 224, 55],
+    [237, 208, 58],
+    [248, 192, 58],
+    [253, 174, 53],
+    [254, 152, 44],
+    [251, 128, 34],
+    [245, 104, 23],
+    [236, 82, 15],
+    [224, 64, 9],
+    [210, 49, 5],
+    [192, 35, 2],
+    [172, 23, 1],
+    [149, 13, 1],
+    [122, 4, 3],
+];
+
+/// Return the colour at a fraction of the way through equally spaced colours.
+fn between(colours: &[Colour; 33], fraction: f64) -> Colour {
+    let at = fraction * (colours.len() - 1) as f64;
+    let lower = (at as usize).min(colours.len() - 2);
+    let part = at - lower as f64;
+    std::array::from_fn(|channel| {
+        let [from, to] = [lower, lower + 1].map(|entry| f64::from(colours[entry][channel]));
+        (from + part * (to - from)).round() as u8
+    })
 }
 
 /// Control points of the damage map: fraction and colour.
@@ -117,8 +246,8 @@ mod tests {
     }
 
     #[test]
-    fn general_map_becomes_steadily_lighter() {
-        let steps = lightnesses(ColourMap::General);
+    fn viridis_becomes_steadily_lighter() {
+        let steps = lightnesses(ColourMap::Viridis);
         assert!(steps.windows(2).all(|pair| pair[1] > pair[0]));
         assert!(steps[0] < 20.0 && steps[32] > 85.0);
     }
@@ -131,31 +260,61 @@ mod tests {
     }
 
     #[test]
+    fn grey_map_becomes_steadily_lighter() {
+        let steps = lightnesses(ColourMap::Grey);
+        assert!(steps.windows(2).all(|pair| pair[1] > pair[0]));
+        assert!(steps[0] < 15.0 && steps[32] > 85.0 && steps[32] < 95.0);
+    }
+
+    #[test]
+    fn diverging_map_is_lightest_in_the_middle_and_symmetric() {
+        let steps = lightnesses(ColourMap::Coolwarm);
+        assert!(steps[..17].windows(2).all(|pair| pair[1] > pair[0]));
+        assert!(steps[16..].windows(2).all(|pair| pair[1] < pair[0]));
+        for (low, high) in steps.iter().zip(steps.iter().rev()) {
+            assert!((low - high).abs() < 4.0, "{low} {high}");
+        }
+        assert_eq!(ColourMap::Coolwarm.colour(0.5), [221; 3]);
+    }
+
+    #[test]
     fn ends_are_those_of_the_published_maps() {
         let close = |left: Colour, right: Colour| {
             left.iter()
                 .zip(right)
                 .all(|(one, other)| one.abs_diff(other) <= 4)
         };
-        assert!(close(ColourMap::General.colour(0.0), [68, 1, 84]));
-        assert!(close(ColourMap::General.colour(0.5), [33, 145, 140]));
-        assert!(close(ColourMap::General.colour(1.0), [253, 231, 37]));
+        assert!(close(ColourMap::Viridis.colour(0.0), [68, 1, 84]));
+        assert!(close(ColourMap::Viridis.colour(0.5), [33, 145, 140]));
+        assert!(close(ColourMap::Viridis.colour(1.0), [253, 231, 37]));
+        // Entries of the 256 colours of the published table.
+        let turbo = |entry: f64| ColourMap::Turbo.colour(entry / 255.0);
+        assert!(close(turbo(0.0), [48, 18, 59]));
+        assert!(close(turbo(255.0), [122, 4, 3]));
+        assert!(close(turbo(64.0), [40, 188, 235]));
+        assert!(close(turbo(128.0), [164, 252, 60]));
+        assert!(close(turbo(192.0), [251, 126, 33]));
+        assert_eq!(ColourMap::Coolwarm.colour(0.0), [59, 76, 192]);
+        assert_eq!(ColourMap::Coolwarm.colour(1.0), [180, 4, 38]);
         assert_eq!(ColourMap::Damage.colour(0.0), [222, 224, 228]);
         assert_eq!(ColourMap::Damage.colour(1.0), [44, 6, 44]);
     }
 
     #[test]
     fn values_beyond_the_ends_and_missing_values_have_colours() {
-        for map in [ColourMap::General, ColourMap::Damage] {
+        for map in ColourMap::ALL {
             assert_eq!(map.colour(f64::NEG_INFINITY), map.colour(0.0));
             assert_eq!(map.colour(7.0), map.colour(1.0));
-            assert_eq!(map.colour(f64::NAN), NO_VALUE);
+            let steps: Vec<Colour> = (0..=255)
+                .map(|step| map.colour(f64::from(step) / 255.0))
+                .collect();
+            assert!(!steps.contains(&map.colour(f64::NAN)), "{map:?}");
         }
     }
 
     #[test]
     fn map_follows_from_the_name_of_the_field() {
         assert_eq!(ColourMap::for_field("Damage"), ColourMap::Damage);
-        assert_eq!(ColourMap::for_field("velocity"), ColourMap::General);
+        assert_eq!(ColourMap::for_field("velocity"), ColourMap::Viridis);
     }
 }

@@ -1,6 +1,7 @@
 //! Layout of a picture: frame, title, labels and colour bar.
 
-use super::projection::Projection;
+use super::projection::{Camera, Projection};
+use super::scene::Axis;
 
 /// The arrangement of a picture; lengths in pixels, downwards from the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +45,10 @@ const BOTTOM: f64 = 4.2;
 const UPRIGHT_BAR: f64 = 8.0;
 /// Room in text sizes for a horizontal colour bar and its labels.
 const LYING_BAR: f64 = 5.4;
+/// Additional room in text sizes for a ruler between the frame and the colour bar.
+const RIGHT: f64 = 3.0;
+/// Height in text sizes of the line at the bottom.
+const LEGEND: f64 = 1.5;
 /// Margin in text sizes without labels.
 const EMPTY: f64 = 2.2;
 /// Least height of the frame in text sizes.
@@ -55,7 +60,13 @@ const GREATEST_HEIGHT: f64 = 1.1;
 
 impl Layout {
     /// Create the arrangement for a drawing that extends between two positions in the drawing plane, m.
-    pub fn new(width: u32, [low, high]: [[f64; 2]; 2], projection: Projection) -> Self {
+    /// `has_legend` reserves room for a line at the bottom of the picture.
+    pub fn new(
+        width: u32,
+        [low, high]: [[f64; 2]; 2],
+        projection: Projection,
+        has_legend: bool,
+    ) -> Self {
         let width = f64::from(width);
         let text = (width * 0.0185).max(6.0);
         let left = if projection == Projection::Strip {
@@ -66,14 +77,18 @@ impl Layout {
         let extent = [0, 1].map(|direction| high[direction] - low[direction]);
         let extent = match projection {
             Projection::Strip => [extent[0], 0.0],
-            Projection::Flat(_) | Projection::Isometric => extent,
+            Projection::Flat(_) | Projection::Orthographic(_) => extent,
+        };
+        let beside = match projection {
+            Projection::Orthographic(camera) if has_ruler_on_the_right(camera) => RIGHT,
+            _ => 0.0,
         };
         let scale_beside = |right: f64| {
             let across = (width - left - right * text) / extent[0];
             across.min(GREATEST_HEIGHT * width / extent[1])
         };
-        let upright = scale_beside(UPRIGHT_BAR) * extent[1] >= UPRIGHT_HEIGHT * text;
-        let right = if upright { UPRIGHT_BAR } else { EMPTY };
+        let upright = scale_beside(UPRIGHT_BAR + beside) * extent[1] >= UPRIGHT_HEIGHT * text;
+        let right = if upright { UPRIGHT_BAR } else { EMPTY } + beside;
         let scale = scale_beside(right);
 
         let least = [LEAST_HEIGHT * 2.0 * text, LEAST_HEIGHT * text];
@@ -84,7 +99,7 @@ impl Layout {
         let rows = [0.0, size[1]].map(|offset| (TOP * text).round() + offset);
         let below = rows[1] + BOTTOM * text;
         let bar = if upright {
-            let start = (columns[1] + 1.3 * text).round();
+            let start = (columns[1] + (1.3 + beside) * text).round();
             Bar {
                 columns: [start, start + text.round()],
                 rows,
@@ -99,6 +114,7 @@ impl Layout {
             }
         };
         let height = below + if upright { 0.0 } else { LYING_BAR * text };
+        let height = height + if has_legend { LEGEND * text } else { 0.0 };
         Self {
             width,
             height: height.ceil(),
@@ -121,6 +137,14 @@ impl Layout {
         ]
     }
 
+    /// Return the position in the drawing plane of pixel coordinates.
+    pub fn position(&self, [column, row]: [f64; 2]) -> [f64; 2] {
+        [
+            self.origin[0] + (column - self.columns[0]) / self.scale,
+            self.origin[1] + (self.rows[1] - row) / self.scale,
+        ]
+    }
+
     /// Return the lower left and upper right corner of the frame in the drawing plane.
     pub fn visible(&self) -> [[f64; 2]; 2] {
         let size = [
@@ -132,9 +156,16 @@ impl Layout {
     }
 }
 
+/// Return whether the labels of a ruler extend beyond the right edge of the frame.
+fn has_ruler_on_the_right(camera: Camera) -> bool {
+    let mut outward = [Axis::X, Axis::Y, Axis::Z]
+        .into_iter()
+        .filter_map(|axis| camera.outer_edge(axis));
+    outward.any(|(_, [across, _])| across > 0.6)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::scene::Axis;
     use super::*;
 
     const PLANE: Projection = Projection::Flat([Axis::X, Axis::Y]);
@@ -142,7 +173,7 @@ mod tests {
     #[test]
     fn frame_keeps_the_shape_of_the_drawing() {
         for extent in [[2.0, 1.0], [1.0, 1.0], [1.0, 3.0]] {
-            let layout = Layout::new(1200, [[0.0; 2], extent], PLANE);
+            let layout = Layout::new(1200, [[0.0; 2], extent], PLANE, false);
             let width = layout.columns[1] - layout.columns[0];
             let height = layout.rows[1] - layout.rows[0];
             assert!((width / height - extent[0] / extent[1]).abs() < 0.01);
@@ -154,7 +185,7 @@ mod tests {
     #[test]
     fn thin_drawings_get_a_frame_of_least_height_and_a_lying_bar() {
         for extent in [[1.0, 1e-6], [1.0, 0.0]] {
-            let layout = Layout::new(1200, [[0.0; 2], extent], PLANE);
+            let layout = Layout::new(1200, [[0.0; 2], extent], PLANE, false);
             assert!(layout.rows[1] - layout.rows[0] >= LEAST_HEIGHT * layout.text - 1.0);
             assert!(!layout.bar.upright && layout.bar.rows[0] > layout.rows[1]);
         }
@@ -162,10 +193,12 @@ mod tests {
 
     #[test]
     fn middle_of_the_drawing_is_the_middle_of_the_frame() {
-        let layout = Layout::new(1000, [[1.0, 2.0], [3.0, 2.5]], PLANE);
+        let layout = Layout::new(1000, [[1.0, 2.0], [3.0, 2.5]], PLANE, false);
         let [column, row] = layout.pixel([2.0, 2.25]);
         assert!((column - (layout.columns[0] + layout.columns[1]) / 2.0).abs() < 1e-9);
         assert!((row - (layout.rows[0] + layout.rows[1]) / 2.0).abs() < 1e-9);
+        let position = layout.position([column, row]);
+        assert!((position[0] - 2.0).abs() < 1e-9 && (position[1] - 2.25).abs() < 1e-9);
         let [low, high] = layout.visible();
         assert!((low[0] + high[0] - 4.0).abs() < 1e-9 && low[1] < high[1]);
     }

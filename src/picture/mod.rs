@@ -11,23 +11,30 @@
 //!     values: &[0.0, 0.4],
 //!     field: "damage",
 //!     unit: "",
+//!     colours: None,
+//!     is_logarithmic: false,
 //!     title: "two points",
 //!     range: Some((0.0, 1.0)),
 //!     view: View::Plane,
 //!     width: 600,
 //!     lines: &[],
+//!     contours: &[],
+//!     vectors: None,
 //!     note: "",
 //!     bounds: None,
 //! };
-//! let image = render(&scene);
+//! let image = render(&scene)?;
 //! assert_eq!(image.width, 600);
+//! # Ok::<(), fissure::error::Error>(())
 //! ```
 
+mod arrows;
 mod axes;
 mod canvas;
 mod cells;
 pub mod chart;
 mod colours;
+mod contours;
 pub mod film;
 mod layout;
 mod lettering;
@@ -36,30 +43,37 @@ mod projection;
 mod scale;
 mod scene;
 
+pub use arrows::Vectors;
 pub use canvas::Image;
-pub use projection::Bounds;
+pub use colours::{ColourMap, is_damage};
+pub use projection::{Bounds, Camera};
 pub use scene::{Axis, Scene, View, is_in_slice};
 
+use crate::error::Result;
 use axes::{Pen, Ruler};
-use canvas::{Colour, PALE_INK};
+use canvas::{Colour, INK, PALE_INK};
 use layout::Layout;
 use lettering::{Lettering, Running};
-use points::Colouring;
 use projection::Projection;
 use scale::Scale;
-use scene::Mark;
+use scene::{Mark, Marks};
 
 /// Render a scene.
-pub fn render(scene: &Scene) -> Image {
-    let marks = scene.marks();
+///
+/// # Errors
+/// If the scene has too many points.
+pub fn render(scene: &Scene) -> Result<Image> {
+    let marks = scene.marks()?;
     let projection = Projection::of(scene);
     let bounds = scene.bounds.unwrap_or_else(|| Bounds::of(marks.iter()));
     let width = scene.width.clamp(200, 16_384);
-    let layout = Layout::new(width, bounds.projected(projection), projection);
-    let colouring = Colouring {
-        map: scene.colours(),
-        range: scene.colour_range(&marks),
-    };
+    let layout = Layout::new(
+        width,
+        bounds.projected(projection),
+        projection,
+        scene.vectors.is_some(),
+    );
+    let colouring = scene.colouring(&marks);
     let mut image = Image::new(width, layout.height as u32);
     let lettering = Lettering::new();
     let mut pen = Pen {
@@ -73,8 +87,8 @@ pub fn render(scene: &Scene) -> Image {
         let centre = [layout.columns, layout.rows].map(|[low, high]| (low + high) / 2.0);
         pen.write("no points", centre, Running::Across);
     } else {
-        if projection == Projection::Isometric {
-            hidden_edges(&mut pen, &layout, &bounds);
+        if let Projection::Orthographic(camera) = projection {
+            hidden_edges(&mut pen, &layout, &bounds, camera);
         }
         let are_flat = matches!(projection, Projection::Flat(_));
         let [scattered, others] = [true, false].map(|scattered| {
@@ -91,19 +105,26 @@ pub fn render(scene: &Scene) -> Image {
             projection,
         );
         if let Projection::Flat(_) = projection {
+            contour_lines(&mut pen, &layout, projection, scene, &marks);
             lines(&mut pen, &layout, projection, scene);
         }
         match projection {
             Projection::Strip => flat_frame(&mut pen, &layout, &[Axis::X]),
             Projection::Flat(axes) => flat_frame(&mut pen, &layout, &axes),
-            Projection::Isometric => box_rulers(&mut pen, &layout, &bounds),
+            Projection::Orthographic(camera) => box_rulers(&mut pen, &layout, &bounds, camera),
+        }
+        if let Some(vectors) = &scene.vectors {
+            let longest = vectors.longest.unwrap_or_else(|| marks.longest_vector());
+            let arrows = marks.with_vectors(vectors);
+            arrows::draw(&mut pen, arrows, vectors, longest, &layout, projection);
         }
     }
     pen.colour_bar(&layout.bar, colouring, scene.field, scene.unit);
+    pen.levels(&layout.bar, colouring, scene.contours);
     let rise = if scene.note.is_empty() { 1.5 } else { 2.35 };
     heading(&mut pen, &layout, scene.title, (1.15, rise));
     heading(&mut pen, &layout, scene.note, (0.85, 1.0));
-    image
+    Ok(image)
 }
 
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
@@ -118,6 +139,42 @@ fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) 
             let pixel = |place: [f64; 3]| layout.pixel(projection.project(place));
             pen.image
                 .line(pixel(ends[0]), pixel(ends[1]), thickness, colour);
+        }
+    }
+}
+
+/// Draw the lines on which the values of a scene are equal. On a logarithmic scale, the logarithms of the
+/// values are interpolated.
+fn contour_lines(
+    pen: &mut Pen,
+    layout: &Layout,
+    projection: Projection,
+    scene: &Scene,
+    marks: &Marks,
+) {
+    if scene.contours.is_empty() {
+        return;
+    }
+    let colouring = scene.colouring(marks);
+    let samples = marks.iter().map(|mark| contours::Sample {
+        position: layout.pixel(projection.project(mark.position)),
+        size: mark.size * layout.scale,
+        value: colouring.fraction(mark.value),
+    });
+    let mut samples: Vec<contours::Sample> = samples.collect();
+    if let View::Slice { .. } = scene.effective_view() {
+        samples = contours::uncovered(&samples);
+    }
+    let levels = scene
+        .contours
+        .iter()
+        .map(|level| colouring.fraction(*level));
+    let segments = contours::segments(&samples, &levels.collect::<Vec<_>>());
+    let thickness = pen.thickness();
+    // White borders make the lines visible on all colours.
+    for (thickness, colour) in [(3.0 * thickness, [255; 3]), (thickness, INK)] {
+        for [from, to] in &segments {
+            pen.image.line(*from, *to, thickness, colour);
         }
     }
 }
@@ -170,9 +227,10 @@ fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
 }
 
 /// Draw the edges of the box that meet in the corner behind the points.
-fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
-    let place = |corner| layout.pixel(Projection::Isometric.project(bounds.corner(corner)));
-    let hidden = [false, true, false];
+fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
+    let view = Projection::Orthographic(camera);
+    let place = |corner| layout.pixel(view.project(bounds.corner(corner)));
+    let hidden = camera.towards().map(|component| component < 0.0);
     for axis in 0..3 {
         let mut neighbour = hidden;
         neighbour[axis] = !neighbour[axis];
@@ -182,20 +240,25 @@ fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
     }
 }
 
-/// Draw rulers along three outer edges of the box, and the axis triad.
-fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
-    let place = |corner| layout.pixel(Projection::Isometric.project(bounds.corner(corner)));
+/// Smallest length of an edge of the box with a ruler, in text sizes.
+const LEAST_RULER: f64 = 3.0;
+
+/// Draw rulers along outer edges of the box, one for each axis, and the axis triad. An axis almost along the
+/// view has no ruler.
+fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
+    let view = Projection::Orthographic(camera);
+    let place = |corner| layout.pixel(view.project(bounds.corner(corner)));
     let magnitude = bounds.magnitude(&[Axis::X, Axis::Y, Axis::Z]);
-    let slope = 0.75_f64.sqrt();
-    let rulers = [
-        (Axis::X, [false, false, false], [-0.5, slope]),
-        (Axis::Y, [true, false, false], [0.5, slope]),
-        (Axis::Z, [false, false, false], [-1.0, 0.0]),
-    ];
-    for (axis, start, outward) in rulers {
+    for axis in [Axis::X, Axis::Y, Axis::Z] {
+        let Some((start, outward)) = camera.outer_edge(axis) else {
+            continue;
+        };
         let mut end = start;
         end[axis.index()] = true;
         let (from, to) = (place(start), place(end));
+        if (to[0] - from[0]).hypot(to[1] - from[1]) < LEAST_RULER * layout.text {
+            continue;
+        }
         let most = ticks_on(from, to, 3.4, layout.text);
         let index = axis.index();
         let scale = Scale::new(bounds.low[index], bounds.high[index], "m", magnitude, most);
@@ -208,6 +271,5 @@ fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
             name,
         });
     }
-    let corner = [layout.columns[0], layout.rows[0]];
-    pen.triad([corner[0] + layout.text, corner[1] + 3.2 * layout.text]);
+    pen.triad(layout, bounds, view);
 }

@@ -3,7 +3,7 @@
 use super::canvas::{Colour, Image, spans};
 use super::colours::{ColourMap, shaded};
 use super::layout::Layout;
-use super::projection::Projection;
+use super::projection::{Camera, Projection};
 use super::scene::Mark;
 
 /// Mapping of values to colours.
@@ -11,15 +11,36 @@ use super::scene::Mark;
 pub struct Colouring {
     /// The colour map.
     pub map: ColourMap,
-    /// Values at the ends of the map.
+    /// Values at the ends of the map; above 0 if the scale is logarithmic.
     pub range: (f64, f64),
+    /// Colours follow the logarithm of the value. Values up to 0 have the colour of points without a value.
+    pub is_logarithmic: bool,
 }
 
 impl Colouring {
     /// Return the colour of a value.
     pub fn of(&self, value: f64) -> Colour {
+        self.map.colour(self.fraction(value))
+    }
+
+    /// Return the position of a value between the ends, from 0 to 1; NaN without such a position.
+    pub fn fraction(&self, value: f64) -> f64 {
         let (low, high) = self.range;
-        self.map.colour((value - low) / (high - low))
+        match self.is_logarithmic {
+            true if value <= 0.0 => f64::NAN,
+            true => (value / low).ln() / (high / low).ln(),
+            false => (value - low) / (high - low),
+        }
+    }
+
+    /// Return the value at a position between the ends, from 0 to 1.
+    pub fn value(&self, fraction: f64) -> f64 {
+        let (low, high) = self.range;
+        if self.is_logarithmic {
+            low * (high / low).powf(fraction)
+        } else {
+            low + fraction * (high - low)
+        }
     }
 }
 
@@ -40,11 +61,19 @@ const BACKING: f64 = 1.3;
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
 const LEAST_CUBE: f64 = 2.0;
 
-/// Brightness of the top, the left and the right face of a cube.
-const BRIGHTNESS: [f64; 3] = [1.0, 0.86, 0.7];
+/// Brightness of the faces of a cube that are normal to x, y and z.
+const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 
-/// Paint the cells of all points. In flat views, a later point covers an earlier point. In the isometric
-/// view, a nearer point covers a farther point.
+/// Cosine of the angle between the view and the normal of a face below which the larger cube grows less along
+/// this normal. It is half the cosine of the isometric view.
+const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
+
+/// Smallest cosine of the angle between the normal of a painted face and the view. Other faces are seen from
+/// their edges.
+const LEAST_COSINE: f64 = 1e-3;
+
+/// Paint the cells of all points. In flat views, a later point covers an earlier point. In
+/// orthographic views, a nearer point covers a farther point.
 pub fn paint(
     image: &mut Image,
     marks: impl Iterator<Item = Mark> + Clone,
@@ -52,14 +81,13 @@ pub fn paint(
     layout: &Layout,
     projection: Projection,
 ) {
-    if projection == Projection::Isometric {
-        let mut cubes = Cubes::new(image);
+    if let Projection::Orthographic(camera) = projection {
+        let mut cubes = Cubes::new(image, camera);
         // The depth buffer stores 4-byte floats. Depths relative to the first point keep their digits far
         // from the origin.
         let mut first = None;
         for mark in marks {
-            let [x, y, z] = mark.position;
-            let depth = x - y + z;
+            let depth = camera.depth(mark.position);
             let depth = layout.scale * (depth - *first.get_or_insert(depth));
             let centre = layout.pixel(projection.project(mark.position));
             let colour = colouring.of(mark.value);
@@ -73,7 +101,7 @@ pub fn paint(
             let width = mark.size * layout.scale;
             let height = match projection {
                 Projection::Strip => STRIP_HEIGHT * layout.text,
-                Projection::Flat(_) | Projection::Isometric => width,
+                Projection::Flat(_) | Projection::Orthographic(_) => width,
             };
             let columns = edges(column, width, enlargement);
             let rows = edges(row, height, enlargement);
@@ -95,19 +123,43 @@ fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     [first, ((centre + half).round() as i64).max(first + 1)]
 }
 
-/// Painter of cubes in the isometric view, with a depth buffer: each pixel shows the nearest cube.
+/// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
 struct Cubes<'a> {
     image: &'a mut Image,
-    /// Depth x − y + z of the surface that each pixel shows, times the scale (pixels per metre). The larger
-    /// of two depths is nearer to the viewer.
+    /// Vectors in the picture, to the right and down, of edges of a cube with an edge of 1. They are parallel
+    /// to x, y and z, and start at the corner nearest to the viewer.
+    edges: [[f64; 2]; 3],
+    /// Decrease of depth along these edges. It is the cosine of the angle between the view and the axis.
+    cosines: [f64; 3],
+    /// Enlargement along x, y and z of the cube behind a cube with an edge of 1.
+    growth: [f64; 3],
+    /// Depth of the surface that each pixel shows, times the scale (pixels per metre). The larger of two
+    /// depths is nearer to the viewer.
     depths: Vec<f32>,
 }
 
 impl<'a> Cubes<'a> {
-    fn new(image: &'a mut Image) -> Self {
+    fn new(image: &'a mut Image, camera: Camera) -> Self {
         let pixels = image.width as usize * image.height as usize;
+        let towards = camera.towards();
+        let view = Projection::Orthographic(camera);
+        let cosines = towards.map(f64::abs);
         Self {
             image,
+            edges: [0, 1, 2].map(|axis| {
+                let mut step = [0.0; 3];
+                step[axis] = if towards[axis] < 0.0 { 1.0 } else { -1.0 };
+                let [across, up] = view.project(step);
+                [across, -up]
+            }),
+            cosines,
+            growth: cosines.map(|cosine| {
+                // A face that is almost parallel to the view comes nearer by a large distance if it moves
+                // outwards.
+                let is_steep = (LEAST_COSINE..STEEP_COSINE).contains(&cosine);
+                let part = if is_steep { cosine / STEEP_COSINE } else { 1.0 };
+                part * (BACKING - 1.0)
+            }),
             depths: vec![f32::NEG_INFINITY; pixels],
         }
     }
@@ -139,50 +191,56 @@ impl<'a> Cubes<'a> {
             return;
         }
         let overlap = 2.0 * OVERLAP;
-        self.paint_faces((centre, depth), edge + overlap, colour);
-        // A face that moves outwards by a distance d comes nearer by 3d. Each face of the larger cube is
-        // (BACKING − 1)/2 edges farther out, so the growth brings it nearer by 1.5 (BACKING − 1) edges. The
-        // shift of 2 (BACKING − 1) edges puts the face behind the face of its own cube. In a gap, it hides
-        // the sides of other cubes.
-        let behind = depth - 2.0 * (BACKING - 1.0) * edge;
-        self.paint_faces((centre, behind), BACKING * edge + overlap, colour);
+        self.paint_box((centre, depth), [edge + overlap; 3], colour);
+        // A face that moves outwards by a distance d comes nearer by d over its cosine. Each face of the
+        // larger cube is half of the growth farther out. The shift is 4/3 of the largest approach that
+        // results, so it puts the faces behind the faces of their own cube. In a gap, they hide the sides of
+        // other cubes.
+        let visible = self
+            .visible()
+            .map(|axis| self.growth[axis] / self.cosines[axis]);
+        let behind = depth - edge * visible.fold(0.0, f64::max) / 1.5;
+        let sizes = self.growth.map(|growth| (1.0 + growth) * edge + overlap);
+        self.paint_box((centre, behind), sizes, colour);
     }
 
-    fn paint_faces(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
-        let [left, right, down] = neighbours(edge);
-        let nearest = depth + 1.5 * edge;
-        let faces = [(left, right), (left, down), (right, down)];
-        for ((one, other), brightness) in faces.into_iter().zip(BRIGHTNESS) {
+    /// Return the axes normal to the faces that the camera sees.
+    fn visible(&self) -> impl Iterator<Item = usize> + use<> {
+        let cosines = self.cosines;
+        (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
+    }
+
+    /// Paint the visible faces of a box with these edges along x, y and z, in pixels.
+    fn paint_box(&mut self, (centre, depth): ([f64; 2], f64), sizes: [f64; 3], colour: Colour) {
+        let edges: [[f64; 2]; 3] =
+            std::array::from_fn(|axis| self.edges[axis].map(|length| sizes[axis] * length));
+        let descents: [f64; 3] = std::array::from_fn(|axis| sizes[axis] * self.cosines[axis]);
+        let nearest = depth + descents.iter().sum::<f64>() / 2.0;
+        let corner =
+            [0, 1].map(|k| centre[k] - edges.iter().map(|edge| edge[k]).sum::<f64>() / 2.0);
+        let [width, height] = [self.image.width, self.image.height].map(i64::from);
+        for normal in self.visible() {
+            let axes = [[1, 2], [0, 2], [0, 1]][normal];
+            let [one, other] = axes.map(|axis| edges[axis]);
             let corners = [[0.0; 2], one, [one[0] + other[0], one[1] + other[1]], other];
-            let corners = corners.map(|[across, below]| [centre[0] + across, centre[1] + below]);
-            let colour = shaded(colour, brightness);
+            let corners = corners.map(|[across, below]| [corner[0] + across, corner[1] + below]);
+            let colour = shaded(colour, BRIGHTNESS[normal]);
             let area = one[0] * other[1] - one[1] * other[0];
-            let [width, height] = [self.image.width, self.image.height].map(i64::from);
             for (row, [first, last]) in spans(&corners, height) {
                 for column in first.max(0)..last.min(width) {
                     let offset = [
-                        column as f64 + 0.5 - centre[0],
-                        row as f64 + 0.5 - centre[1],
+                        column as f64 + 0.5 - corner[0],
+                        row as f64 + 0.5 - corner[1],
                     ];
-                    // Fractions of the two edges of the face at this pixel. Along each edge, the depth
-                    // decreases by `edge`.
+                    // Fractions of the two edges of the face at this pixel.
                     let along = (offset[0] * other[1] - offset[1] * other[0]) / area;
                     let beside = (one[0] * offset[1] - one[1] * offset[0]) / area;
-                    let depth = nearest - edge * (along + beside);
-                    self.paint_pixel([column, row], depth, colour);
+                    let descent = along * descents[axes[0]] + beside * descents[axes[1]];
+                    self.paint_pixel([column, row], nearest - descent, colour);
                 }
             }
         }
     }
-}
-
-/// Return three edges of a cube as vectors in the picture, pixels: to the left, to the right and down. They
-/// start at the corner nearest to the viewer, which appears in the middle of the cube.
-fn neighbours(edge: f64) -> [[f64; 2]; 3] {
-    [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]].map(|direction| {
-        let [across, up] = Projection::Isometric.project(direction);
-        [edge * across, -edge * up]
-    })
 }
 
 #[cfg(test)]
@@ -191,6 +249,22 @@ mod tests {
     use super::*;
 
     const RED: Colour = [200, 0, 0];
+
+    #[test]
+    fn logarithmic_colours_follow_the_decades() {
+        let colouring = Colouring {
+            map: ColourMap::Viridis,
+            range: (1e-2, 1e4),
+            is_logarithmic: true,
+        };
+        assert!((colouring.fraction(10.0) - 0.5).abs() < 1e-12);
+        assert!((colouring.value(0.5) / 10.0 - 1.0).abs() < 1e-12);
+        assert_eq!(colouring.of(1e-9), colouring.of(1e-2));
+        assert_eq!(colouring.of(f64::INFINITY), colouring.of(1e4));
+        for without in [0.0, -1.0, f64::NEG_INFINITY, f64::NAN] {
+            assert_eq!(colouring.of(without), ColourMap::Viridis.colour(f64::NAN));
+        }
+    }
 
     #[test]
     fn neighbouring_cells_leave_no_gap_whatever_the_resolution() {
@@ -213,8 +287,12 @@ mod tests {
         assert_eq!(edges(10.5, 3.0, TOLERANCE), [9, 12]);
     }
 
+    fn isometric() -> Projection {
+        Projection::Orthographic(Camera::isometric())
+    }
+
     fn paint_cube(image: &mut Image, centre: [f64; 2], edge: f64, colour: Colour) {
-        Cubes::new(image).paint((centre, 0.0), edge, colour);
+        Cubes::new(image, Camera::isometric()).paint((centre, 0.0), edge, colour);
     }
 
     #[test]
@@ -222,8 +300,11 @@ mod tests {
         // One small cube lies behind the upper face of a large cube, although the centre of the small cube is
         // nearer. The other small cube lies in front of this face.
         let place = |[x, y, z]: [f64; 3]| {
-            let [across, up] = Projection::Isometric.project([x, y, z]);
-            ([60.0 + across, 60.0 - up], x - y + z)
+            let [across, up] = isometric().project([x, y, z]);
+            (
+                [60.0 + across, 60.0 - up],
+                Camera::isometric().depth([x, y, z]),
+            )
         };
         let large = (place([0.0; 3]), 40.0, RED);
         let behind = (place([17.0, -17.0, 10.0]), 4.0, [0, 0, 200]);
@@ -231,7 +312,7 @@ mod tests {
         let mut pictures = Vec::new();
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
             let mut image = Image::new(120, 120);
-            let mut cubes = Cubes::new(&mut image);
+            let mut cubes = Cubes::new(&mut image, Camera::isometric());
             for cube in order {
                 let (centre, edge, colour) = [large, behind, before][cube];
                 cubes.paint(centre, edge, colour);
@@ -254,23 +335,77 @@ mod tests {
         paint_cube(&mut image, [30.0, 30.0], 30.0, RED);
         assert_eq!(image.pixel(30, 20), RED);
         assert_eq!(image.pixel(20, 34), shaded(RED, BRIGHTNESS[1]));
-        assert_eq!(image.pixel(40, 34), shaded(RED, BRIGHTNESS[2]));
+        assert_eq!(image.pixel(40, 34), shaded(RED, BRIGHTNESS[0]));
         assert_eq!(image.pixel(2, 2), WHITE);
+    }
+
+    #[test]
+    fn a_layer_of_cubes_has_an_even_face_from_any_side() {
+        for (azimuth, elevation) in [(-45.0, 35.0), (200.0, -25.0), (10.0, 15.0), (-90.0, 90.0)] {
+            let camera = Camera::new(azimuth, elevation);
+            let view = Projection::Orthographic(camera);
+            let mut image = Image::new(400, 400);
+            let mut cubes = Cubes::new(&mut image, camera);
+            let edge = 9.3;
+            let pixel = |place: [f64; 3]| {
+                let [across, up] = view.project(place);
+                [200.0 + across, 200.0 - up]
+            };
+            let centre = |index: i32| edge * f64::from(index % 15 - 7);
+            for index in 0..225 {
+                let place = [centre(index), centre(index / 15), 0.0];
+                cubes.paint((pixel(place), camera.depth(place)), edge, RED);
+            }
+            let side = f64::signum(elevation) * edge / 2.0;
+            for index in 0..120 * 120 {
+                let step = |k: i32| f64::from(k % 120) - 60.0;
+                let [column, row] = pixel([step(index), step(index / 120), side]);
+                let found = image.pixel(column as u32, row as u32);
+                assert_eq!(found, RED, "{azimuth} {elevation}: {column} {row}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_sees_up_to_three_faces() {
+        let faces = |azimuth, elevation| {
+            let mut image = Image::new(60, 60);
+            let mut cubes = Cubes::new(&mut image, Camera::new(azimuth, elevation));
+            cubes.paint(([30.0, 30.0], 0.0), 30.0, RED);
+            let mut colours: Vec<Colour> = image
+                .rgb
+                .chunks(3)
+                .map(|pixel| [pixel[0], pixel[1], pixel[2]])
+                .filter(|pixel| *pixel != WHITE)
+                .collect();
+            let pixels = colours.len();
+            colours.sort_unstable();
+            colours.dedup();
+            (colours, pixels)
+        };
+        let [x, y, z] = BRIGHTNESS.map(|brightness| shaded(RED, brightness));
+        // The edge of the larger cube is 1.3 · 30 pixels, plus the overlap.
+        assert_eq!(faces(0.0, 0.0), (vec![x], 40 * 40));
+        assert_eq!(faces(90.0, 0.0), (vec![y], 40 * 40));
+        assert_eq!(faces(-90.0, -90.0), (vec![z], 40 * 40));
+        assert_eq!(faces(45.0, 0.0).0, [x, y]);
+        assert_eq!(faces(200.0, -20.0).0, [x, y, z]);
     }
 
     #[test]
     fn neighbouring_cubes_show_no_hairlines() {
         let mut image = Image::new(200, 200);
-        let mut cubes = Cubes::new(&mut image);
+        let mut cubes = Cubes::new(&mut image, Camera::isometric());
         for index in 0..20 {
             // The distances of the cubes are stretched by a tenth.
             let y = 1.1 * 7.3 * f64::from(index);
-            let [across, up] = Projection::Isometric.project([0.0, y, 0.0]);
-            cubes.paint(([20.0 + across, 120.0 - up], -y), 7.3, RED);
+            let [across, up] = isometric().project([0.0, y, 0.0]);
+            let depth = Camera::isometric().depth([0.0, y, 0.0]);
+            cubes.paint(([20.0 + across, 120.0 - up], depth), 7.3, RED);
         }
         for index in 1..19 {
             let place = [0.0, 1.1 * 7.3 * (f64::from(index) + 0.5), 0.0];
-            let [across, up] = Projection::Isometric.project(place);
+            let [across, up] = isometric().project(place);
             let (column, row) = ((20.0 + across) as u32, (120.0 - up) as u32 - 2);
             assert_eq!(image.pixel(column, row), RED);
         }

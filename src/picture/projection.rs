@@ -3,22 +3,103 @@
 use super::scene::{Axis, Mark, Scene, View};
 
 /// The projection to the drawing plane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
     /// The first coordinate only: a 1-D body, drawn as a strip.
     Strip,
     /// Two coordinates, across and up.
     Flat([Axis; 2]),
-    /// All three coordinates, viewed along the diagonal from +x, −y, +z.
-    Isometric,
+    /// All three coordinates, without perspective.
+    Orthographic(Camera),
 }
 
-/// Length across the picture of a unit vector along x or y in the isometric view.
-const SIDEWAYS: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Direction of an orthographic view. The camera is at infinity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Unit vector to the right of the picture.
+    across: [f64; 3],
+    /// Unit vector up the picture.
+    up: [f64; 3],
+    /// Unit vector from the body to the camera.
+    towards: [f64; 3],
+}
 
-/// Length up the picture of a unit vector along z in the isometric view. A unit vector along x points down by
-/// half of this length, and a unit vector along y points up by half.
-const UPWARDS: f64 = 0.816_496_580_927_726;
+/// Length in the picture of a unit vector that counts as along the view.
+const ALONG_VIEW: f64 = 1e-6;
+
+impl Camera {
+    /// Create a camera. The azimuth is the angle of the camera from +x towards +y, the elevation is its
+    /// angle above the x-y plane; both in degrees. Positive z points up the picture.
+    pub fn new(azimuth: f64, elevation: f64) -> Self {
+        // Sine and cosine are exact for multiples of 90 degrees, so that axes along the view are points.
+        let turn = |degrees: f64| match degrees.rem_euclid(360.0) {
+            0.0 => [0.0, 1.0],
+            90.0 => [1.0, 0.0],
+            180.0 => [0.0, -1.0],
+            270.0 => [-1.0, 0.0],
+            degrees => degrees.to_radians().sin_cos().into(),
+        };
+        let ([sin, cos], [rise, level]) = (turn(azimuth), turn(elevation));
+        Self {
+            across: [-sin, cos, 0.0],
+            up: [-rise * cos, -rise * sin, level],
+            towards: [level * cos, level * sin, rise],
+        }
+    }
+
+    /// Return the isometric view: along the diagonal from +x, −y, +z.
+    pub fn isometric() -> Self {
+        Self::new(-45.0, 0.5_f64.sqrt().atan().to_degrees())
+    }
+
+    /// Return the depth of a position, m; larger values are nearer to the camera.
+    pub fn depth(&self, position: [f64; 3]) -> f64 {
+        dot(self.towards, position)
+    }
+
+    /// Return the low end of the edge of a box for the ruler of an axis, and the unit vector in the picture
+    /// (to the right and down) away from the box. `None` if the axis is along the view.
+    ///
+    /// An outer edge belongs to one face that the camera sees and to one face that it does not see. Of the
+    /// two outer edges along an axis, the ruler is at the lower one, or at the left one if both are upright.
+    pub fn outer_edge(self, axis: Axis) -> Option<([bool; 3], [f64; 2])> {
+        let step = |axis: Axis| {
+            let index = axis.index();
+            [self.across[index], -self.up[index]]
+        };
+        let [across, down] = step(axis);
+        let length = across.hypot(down);
+        if length < ALONG_VIEW {
+            return None;
+        }
+        let normal = [-down / length, across / length];
+        let is_preferred = normal[1] - 0.5 * normal[0] > 0.0;
+        let outward = normal.map(|x| if is_preferred { x } else { -x });
+        // Remove the sign of zero and round-off, because captions of upright rulers run upwards.
+        let outward = outward.map(|x| if x.abs() < ALONG_VIEW { 0.0 } else { x });
+        let mut start = [false; 3];
+        for other in axis.others() {
+            let [across, down] = step(other);
+            let ahead = across * outward[0] + down * outward[1];
+            // An axis along the view has no end that is farther out, so take the end at the back.
+            start[other.index()] = if ahead.abs() < ALONG_VIEW {
+                self.towards[other.index()] < 0.0
+            } else {
+                ahead > 0.0
+            };
+        }
+        Some((start, outward))
+    }
+
+    /// Return the components along x, y and z of the unit vector from the body to the camera.
+    pub fn towards(&self) -> [f64; 3] {
+        self.towards
+    }
+}
+
+fn dot(one: [f64; 3], other: [f64; 3]) -> f64 {
+    one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+}
 
 impl Projection {
     /// Return the projection of a scene.
@@ -27,7 +108,7 @@ impl Projection {
             _ if scene.dimension < 2 => Self::Strip,
             View::Plane => Self::Flat([Axis::X, Axis::Y]),
             View::Slice { axis, .. } => Self::Flat(axis.others()),
-            View::Orthographic => Self::Isometric,
+            View::Orthographic(camera) => Self::Orthographic(camera),
         }
     }
 
@@ -36,10 +117,7 @@ impl Projection {
         match self {
             Self::Strip => [position[0], 0.0],
             Self::Flat(axes) => axes.map(|axis| position[axis.index()]),
-            Self::Isometric => {
-                let [x, y, z] = position;
-                [SIDEWAYS * (x + y), UPWARDS * (z + (y - x) / 2.0)]
-            }
+            Self::Orthographic(camera) => [dot(camera.across, position), dot(camera.up, position)],
         }
     }
 }
@@ -123,6 +201,25 @@ impl Bounds {
         })
     }
 
+    /// Test whether the projected box covers a position in the drawing plane.
+    pub fn covers(&self, position: [f64; 2], projection: Projection) -> bool {
+        let corner = |high| projection.project(self.corner(high));
+        let (low, high) = (corner([false; 3]), corner([true; 3]));
+        let offset = [0, 1].map(|k| position[k] - (low[k] + high[k]) / 2.0);
+        // The outline is a hexagon with a centre of symmetry. Its sides are parallel to the edges.
+        let edges = [0, 1, 2].map(|axis| {
+            let mut high = [false; 3];
+            high[axis] = true;
+            let end = corner(high);
+            [end[0] - low[0], end[1] - low[1]]
+        });
+        let across = |one: [f64; 2], other: [f64; 2]| (one[0] * other[1] - one[1] * other[0]).abs();
+        edges.iter().all(|side| {
+            let half: f64 = edges.iter().map(|edge| across(*edge, *side)).sum();
+            across(offset, *side) <= half / 2.0
+        })
+    }
+
     /// Return the lower left and upper right corner of the projected box.
     pub fn projected(&self, projection: Projection) -> [[f64; 2]; 2] {
         let mut ends = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
@@ -151,17 +248,57 @@ mod tests {
         }
     }
 
+    const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
     #[test]
     fn isometric_axes_are_equally_long_and_a_third_of_a_turn_apart() {
-        let steps = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-            .map(|step| Projection::Isometric.project(step));
+        let view = Projection::Orthographic(Camera::isometric());
+        let steps = AXES.map(|step| view.project(step));
         for [across, up] in steps {
-            assert!((across.hypot(up) - UPWARDS).abs() < 1e-12);
+            assert!((across.hypot(up) - (2.0_f64 / 3.0).sqrt()).abs() < 1e-12);
         }
-        assert!((UPWARDS - (2.0_f64 / 3.0).sqrt()).abs() < 1e-12);
         assert!(steps[0][0] > 0.0 && steps[0][1] < 0.0);
         assert!(steps[1][0] > 0.0 && steps[1][1] > 0.0);
         assert_eq!(steps[2][0], 0.0);
+    }
+
+    #[test]
+    fn cameras_look_along_the_axes() {
+        let view = |azimuth, elevation| {
+            let camera = Camera::new(azimuth, elevation);
+            let view = Projection::Orthographic(camera);
+            (AXES.map(|step| view.project(step)), camera.towards())
+        };
+        // From +x, y points to the right and z up.
+        assert_eq!(
+            view(0.0, 0.0),
+            ([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], AXES[0])
+        );
+        // From −y, x points to the right.
+        let (steps, towards) = view(-90.0, 0.0);
+        assert_eq!(steps, [[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]);
+        assert_eq!(towards, [0.0, -1.0, 0.0]);
+        // From above with the camera south of the body, the picture is a map.
+        let (steps, towards) = view(-90.0, 90.0);
+        assert_eq!(steps, [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]);
+        assert_eq!(towards, AXES[2]);
+    }
+
+    #[test]
+    fn cameras_keep_lengths_across_the_view() {
+        for (azimuth, elevation) in [(17.0, 33.0), (200.0, -60.0), (-45.0, 89.0)] {
+            let camera = Camera::new(azimuth, elevation);
+            let vectors = [camera.across, camera.up, camera.towards];
+            for (k, one) in vectors.into_iter().enumerate() {
+                for (l, other) in vectors.into_iter().enumerate() {
+                    let expected = f64::from(u8::from(k == l));
+                    assert!((dot(one, other) - expected).abs() < 1e-12);
+                }
+            }
+            // Right-handed: across × up points to the camera.
+            let [a, u] = [camera.across, camera.up];
+            assert!((a[0] * u[1] - a[1] * u[0] - camera.towards[2]).abs() < 1e-12);
+        }
     }
 
     #[test]
@@ -171,6 +308,45 @@ mod tests {
         assert!((bounds.low[0] + 1.25).abs() < 1e-12);
         assert!((bounds.high[0] - 9.25).abs() < 1e-12);
         assert!((bounds.high[2] - 3.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rulers_are_at_outer_edges_below_and_on_the_left() {
+        let slope = 0.75_f64.sqrt();
+        let camera = Camera::isometric();
+        for (axis, start, outward) in [
+            (Axis::X, [false, false, false], [-0.5, slope]),
+            (Axis::Y, [true, false, false], [0.5, slope]),
+            (Axis::Z, [false, false, false], [-1.0, 0.0]),
+        ] {
+            let (found, direction) = camera.outer_edge(axis).unwrap();
+            assert_eq!(found, start, "{axis:?}");
+            assert!((direction[0] - outward[0]).abs() < 1e-12, "{direction:?}");
+            assert!((direction[1] - outward[1]).abs() < 1e-12, "{direction:?}");
+        }
+        // A map, seen from above: x below, y on the left.
+        let camera = Camera::new(-90.0, 90.0);
+        assert_eq!(camera.outer_edge(Axis::X), Some(([false; 3], [0.0, 1.0])));
+        assert_eq!(camera.outer_edge(Axis::Y), Some(([false; 3], [-1.0, 0.0])));
+        assert_eq!(camera.outer_edge(Axis::Z), None);
+    }
+
+    #[test]
+    fn outline_of_a_box_is_a_hexagon() {
+        let bounds = Bounds {
+            low: [0.0; 3],
+            high: [1.0; 3],
+        };
+        let view = Projection::Orthographic(Camera::isometric());
+        let centre = view.project([0.5; 3]);
+        let covers =
+            |across: f64, up: f64| bounds.covers([centre[0] + across, centre[1] + up], view);
+        // The corners are √(2/3) away from the centre, the sides √(1/2).
+        assert!(covers(0.0, 0.81) && !covers(0.0, 0.82));
+        assert!(covers(0.70, 0.0) && !covers(0.71, 0.0));
+        assert!(!covers(0.6, 0.6));
+        let view = Projection::Orthographic(Camera::new(0.0, 0.0));
+        assert!(bounds.covers([0.99, 0.01], view) && !bounds.covers([0.5, 1.01], view));
     }
 
     #[test]

@@ -27,7 +27,7 @@ impl Scale {
         let (exponent, unit) = prefixed(unit, magnitude);
         let factor = 10_f64.powi(-exponent);
         let (step, ticks) = round_numbers(low * factor, high * factor, most);
-        let decimals = (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
+        let decimals = decimals_of(step);
         let ticks = ticks
             .into_iter()
             .map(|number| Tick {
@@ -35,6 +35,51 @@ impl Scale {
                 label: format!("{number:.decimals$}").replace('-', "−"),
             })
             .collect();
+        Self { ticks, unit }
+    }
+
+    /// Create a logarithmic scale from `low` to `high`, both above 0, with about `most` ticks or fewer. The
+    /// ticks are at powers of ten; within less than two decades, also at 2 and 5 times these.
+    pub fn logarithmic(low: f64, high: f64, unit: &str, most: usize) -> Self {
+        let (exponent, unit) = prefixed(unit, high);
+        let factor = 10_f64.powi(-exponent);
+        let decades = |decade: f64| (decade.log10() - 1e-9).ceil() as i32;
+        let (first, end) = (decades(low * factor), decades(high * factor * (1.0 + 1e-8)));
+        let fraction = |number: f64| (number / factor / low).ln() / (high / low).ln();
+        let inside = |number: &f64| (-1e-9..=1.0 + 1e-9).contains(&fraction(*number));
+        let powers = (end - first).max(0) as usize;
+        let ticks: Vec<Tick> = if powers >= 3 {
+            let stride = powers.div_ceil(most.max(2));
+            let powers = (first..end).rev().step_by(stride).collect::<Vec<i32>>();
+            let plain = powers.iter().all(|power| (-3..=4).contains(power));
+            let tick = |power: &i32| Tick {
+                fraction: fraction(10_f64.powi(*power)),
+                label: match plain {
+                    true => format!("{:.*}", (-power).max(0) as usize, 10_f64.powi(*power)),
+                    false => format!("10{}", superscript(*power)),
+                },
+            };
+            powers.iter().rev().map(tick).collect()
+        } else {
+            let digits = (first - 1..=end)
+                .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| (digit * 10_f64.powi(power), power)));
+            let digits: Vec<(f64, i32)> = digits.filter(|(number, _)| inside(number)).collect();
+            if digits.len() < 2 {
+                let (step, numbers) = round_numbers(low * factor, high * factor, most);
+                let decimals = decimals_of(step);
+                let tick = |number: f64| Tick {
+                    fraction: fraction(number),
+                    label: format!("{number:.decimals$}"),
+                };
+                numbers.into_iter().map(tick).collect()
+            } else {
+                let tick = |(number, power): (f64, i32)| Tick {
+                    fraction: fraction(number),
+                    label: format!("{number:.*}", (-power).max(0) as usize),
+                };
+                digits.into_iter().map(tick).collect()
+            }
+        };
         Self { ticks, unit }
     }
 
@@ -46,6 +91,11 @@ impl Scale {
             format!("{name} ({})", self.unit)
         }
     }
+}
+
+/// Return the number of decimals that multiples of a step need.
+fn decimals_of(step: f64) -> usize {
+    (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize
 }
 
 /// Return a step of 1, 2 or 5 times a power of ten, and the multiples of the step within `low..=high`. There
@@ -175,6 +225,30 @@ mod tests {
         assert_eq!(numbers, ["0.0", "0.2", "0.4", "0.6"]);
         assert_eq!(unit, "");
         assert_eq!(labels(0.0, 2.5e9, "Pa", 3).1, "GPa");
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_at_powers_of_ten() {
+        let scale = |low, high, most| {
+            let scale = Scale::logarithmic(low, high, "Pa", most);
+            for tick in &scale.ticks {
+                assert!((-1e-6..=1.0 + 1e-6).contains(&tick.fraction), "{tick:?}");
+            }
+            let labels = scale.ticks.iter().map(|tick| tick.label.as_str());
+            (labels.collect::<Vec<_>>().join(" "), scale.unit)
+        };
+        let (labels, unit) = scale(1e3, 1e7, 8);
+        assert_eq!((&labels[..], &unit[..]), ("0.001 0.01 0.1 1 10", "MPa"));
+        assert_eq!(scale(3e-9, 2e8, 6).0, "10⁻¹³ 10⁻¹⁰ 10⁻⁷ 10⁻⁴ 10⁻¹ 10²");
+        assert_eq!(scale(1.0, 100.0, 8).0, "1 10 100");
+        assert_eq!(scale(30.0, 600.0, 8).0, "50 100 200 500");
+        assert_eq!(
+            scale(0.03, 0.6, 8),
+            ("50 100 200 500".to_owned(), "mPa".to_owned())
+        );
+        assert_eq!(scale(21.0, 24.0, 4).0, "21 22 23 24");
+        let middle = Scale::logarithmic(1.0, 1e4, "Pa", 8).ticks;
+        assert!((middle[2].fraction - 0.5).abs() < 1e-12);
     }
 
     #[test]

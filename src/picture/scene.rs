@@ -1,7 +1,10 @@
 //! The input of a picture: points with values, and the view.
 
-use super::colours::ColourMap;
-use super::projection::Bounds;
+use super::arrows::Vectors;
+use super::colours::{ColourMap, is_damage};
+use super::points::Colouring;
+use super::projection::{Bounds, Camera, Projection};
+use crate::error::{Error, Result};
 
 /// A coordinate axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,9 +50,8 @@ pub enum View {
         /// Coordinate of the layer (m).
         position: f64,
     },
-    /// Isometric, without perspective: x to the lower right, y to the upper
-    /// right, z up.
-    Orthographic,
+    /// From a camera at infinity, without perspective.
+    Orthographic(Camera),
 }
 
 /// A point cloud with values, labels and view.
@@ -69,11 +71,15 @@ pub struct Scene<'a> {
     pub scattered: &'a [bool],
     /// Value of each point, which gives the colour; NaN is grey.
     pub values: &'a [f64],
-    /// Name of the values, for the colour bar. A name that contains "damage" selects the colour map of
-    /// damage.
+    /// Name of the values, for the colour bar. A name that contains "damage" is a damage: by default, it has
+    /// the colour map of damage and a range from 0.
     pub field: &'a str,
     /// Unit of the values without prefix; empty if dimensionless.
     pub unit: &'a str,
+    /// The colour map; `None` for the default of the field.
+    pub colours: Option<ColourMap>,
+    /// Colours follow the logarithm of the value.
+    pub is_logarithmic: bool,
     /// Line above the picture.
     pub title: &'a str,
     /// Values at the ends of the colour bar; `None` for the smallest and the largest value.
@@ -84,6 +90,10 @@ pub struct Scene<'a> {
     pub width: u32,
     /// Lines over the points of a flat view (m), each with the index of its colour.
     pub lines: &'a [(usize, Vec<[f64; 3]>)],
+    /// Values of lines over the points of a flat view on which the values are equal.
+    pub contours: &'a [f64],
+    /// Vector field that is drawn as arrows.
+    pub vectors: Option<Vectors<'a>>,
     /// Small line below the title; may be empty.
     pub note: &'a str,
     /// Drawn box, for example a common box of a series of pictures. Points outside the box are omitted.
@@ -118,9 +128,12 @@ impl Scene<'_> {
     }
 
     /// Return the points to draw, in painting order.
-    pub fn marks(&self) -> Marks<'_> {
+    ///
+    /// # Errors
+    /// If there are 2³² points or more.
+    pub fn marks(&self) -> Result<Marks<'_>> {
         let points = self.positions.len().min(self.sizes.len());
-        let points = points.min(self.values.len()) as u32;
+        let points = index_limit(points.min(self.values.len()))?;
         let is_drawn = |point: &u32| {
             let mark = self.mark(*point);
             let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
@@ -136,16 +149,16 @@ impl Scene<'_> {
         match self.effective_view() {
             View::Plane if self.dimension == 3 => sort_by_key(&|mark| mark.position[2]),
             // Where cells overlap or share a pixel, damage must stay visible.
-            View::Plane if self.colours() == ColourMap::Damage => {
+            View::Plane if is_damage(self.field) => {
                 sort_by_key(&|mark| mark.value.max(0.0));
             }
             View::Plane => {}
             // Paint the points nearest to the plane of the slice last.
             View::Slice { .. } => sort_by_key(&|mark| -self.depth(mark).abs()),
             // A depth buffer selects the visible cubes, so the order does not matter.
-            View::Orthographic => {}
+            View::Orthographic(_) => {}
         }
-        Marks { scene: self, order }
+        Ok(Marks { scene: self, order })
     }
 
     /// Return the point with this index.
@@ -169,7 +182,7 @@ impl Scene<'_> {
     fn view_holds(&self, mark: &Mark) -> bool {
         match self.effective_view() {
             View::Slice { axis, position } => is_in_slice(axis, position, mark.position, mark.size),
-            View::Plane | View::Orthographic => true,
+            View::Plane | View::Orthographic(_) => true,
         }
     }
 
@@ -177,20 +190,8 @@ impl Scene<'_> {
     pub fn depth(&self, mark: &Mark) -> f64 {
         match self.effective_view() {
             View::Slice { axis, position } => mark.position[axis.index()] - position,
-            View::Plane | View::Orthographic => 0.0,
+            View::Plane | View::Orthographic(_) => 0.0,
         }
-    }
-
-    /// Return the box of the drawn points, with a margin.
-    pub fn extent(&self) -> Bounds {
-        Bounds::of(self.marks().iter())
-    }
-
-    /// Return the finite values of the drawn points.
-    pub fn drawn_values(&self) -> Vec<f64> {
-        let marks = self.marks();
-        let values = marks.iter().map(|mark| mark.value);
-        values.filter(|value| value.is_finite()).collect()
     }
 
     /// Return the position with zeros for coordinates that the body does not have.
@@ -201,34 +202,70 @@ impl Scene<'_> {
         position
     }
 
-    /// Return the colour map of the field.
-    pub fn colours(&self) -> ColourMap {
-        ColourMap::for_field(self.field)
+    /// Return the mapping of the values of these points to colours.
+    pub fn colouring(&self, marks: &Marks) -> Colouring {
+        Colouring {
+            map: self.colours.unwrap_or(ColourMap::for_field(self.field)),
+            range: self.colour_range(marks),
+            is_logarithmic: self.is_logarithmic,
+        }
+    }
+
+    /// Return this number of values at equal distances on the colour bar, without its ends.
+    ///
+    /// # Errors
+    /// If there are 2³² points or more.
+    pub fn levels(&self, count: usize) -> Result<Vec<f64>> {
+        let colouring = self.colouring(&self.marks()?);
+        let fraction = |number: usize| number as f64 / (count + 1) as f64;
+        Ok((1..=count)
+            .map(|number| colouring.value(fraction(number)))
+            .collect())
     }
 
     /// Return the values at the ends of the colour bar, the smaller value first.
-    pub fn colour_range(&self, marks: &Marks) -> (f64, f64) {
+    fn colour_range(&self, marks: &Marks) -> (f64, f64) {
+        let is_usable = |value: &f64| value.is_finite() && (*value > 0.0 || !self.is_logarithmic);
         let given = self
             .range
-            .filter(|(low, high)| low.is_finite() && high.is_finite())
+            .filter(|(low, high)| is_usable(low) && is_usable(high))
             .map(|(low, high)| (low.min(high), low.max(high)));
         let occurring = || {
-            let finite = marks.iter().map(|mark| mark.value);
-            let (low, high) = finite
-                .filter(|value| value.is_finite())
+            let values = marks.iter().map(|mark| mark.value);
+            values
+                .filter(is_usable)
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
                     (low.min(value), high.max(value))
-                });
-            // The range of damage includes 0, so that undamaged points have the colour of the low end in all
-            // pictures.
-            match self.colours() {
-                ColourMap::Damage => (low.min(0.0), high.max(0.0)),
-                ColourMap::General => (low, high),
-            }
+                })
         };
         let (low, high) = given.unwrap_or_else(occurring);
-        widened(low, high, self.colours())
+        if self.is_logarithmic {
+            return match high / low {
+                ratio if ratio.is_nan() || ratio < 0.0 => (0.1, 1.0),
+                ratio if ratio > 1.0 + 1e-12 => (low, high),
+                _ => (low / 2.0, high * 2.0),
+            };
+        }
+        let is_damage = is_damage(self.field);
+        // The range of damage includes 0, so that undamaged points have the colour of the low end in all
+        // pictures.
+        let (low, high) = match given {
+            None if is_damage => (low.min(0.0), high.max(0.0)),
+            _ => (low, high),
+        };
+        widened(low, high, is_damage)
     }
+}
+
+/// Return the number of points, which their indices must be able to represent.
+fn index_limit(points: usize) -> Result<u32> {
+    u32::try_from(points).map_err(|_| {
+        Error::input(format!(
+            "{points} points are too many for a picture, which holds at most {}; draw a slice, or a \
+             result with fewer points",
+            u32::MAX
+        ))
+    })
 }
 
 /// The points of a scene to draw, in painting order.
@@ -248,6 +285,42 @@ impl Marks<'_> {
     pub fn iter(&self) -> impl Iterator<Item = Mark> + Clone {
         self.order.iter().map(|point| self.scene.mark(*point))
     }
+
+    /// Iterate over the points with vectors, in painting order.
+    pub fn with_vectors<'b>(
+        &'b self,
+        vectors: &'b Vectors,
+    ) -> impl Iterator<Item = (Mark, [f64; 3])> + 'b {
+        let all = self.order.iter().filter_map(|point| {
+            let vector = vectors.values.get(*point as usize)?;
+            Some((self.scene.mark(*point), *vector))
+        });
+        all.filter(|(_, vector)| vector.iter().all(|component| component.is_finite()))
+    }
+
+    /// Return the largest length in the picture of a vector of the points; 0 without vectors.
+    pub fn longest_vector(&self) -> f64 {
+        let Some(vectors) = &self.scene.vectors else {
+            return 0.0;
+        };
+        let projection = Projection::of(self.scene);
+        let lengths = self.with_vectors(vectors).map(|(_, vector)| {
+            let [across, up] = projection.project(vector);
+            across.hypot(up)
+        });
+        lengths.fold(0.0, f64::max)
+    }
+
+    /// Return the box of the points, with a margin.
+    pub fn extent(&self) -> Bounds {
+        Bounds::of(self.iter())
+    }
+
+    /// Return the finite values of the points.
+    pub fn values(&self) -> Vec<f64> {
+        let values = self.iter().map(|mark| mark.value);
+        values.filter(|value| value.is_finite()).collect()
+    }
 }
 
 /// Test whether a slice shows a point. The slice is at `position` (m) along `axis`. The point is at `place`
@@ -258,12 +331,12 @@ pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> boo
 }
 
 /// Return the range, or a wider range if the ends are equal up to round-off.
-fn widened(low: f64, high: f64, colours: ColourMap) -> (f64, f64) {
+fn widened(low: f64, high: f64, is_damage: bool) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     let spread = high - low;
     if spread.is_finite() && spread > 1e-12 * size {
         (low, high)
-    } else if !spread.is_finite() || colours == ColourMap::Damage {
+    } else if !spread.is_finite() || is_damage {
         (0.0, 1.0)
     } else if size > 0.0 {
         (low - 0.1 * size, high + 0.1 * size)
@@ -287,11 +360,15 @@ mod tests {
             values,
             field: "velocity",
             unit: "m/s",
+            colours: None,
+            is_logarithmic: false,
             title: "",
             range: None,
             view,
             width: 400,
             lines: &[],
+            contours: &[],
+            vectors: None,
             note: "",
             bounds: None,
         }
@@ -305,31 +382,80 @@ mod tests {
             position: 0.0,
         };
         let scene = scene(&positions, &[1.0, 2.0, 3.0], view);
-        let values: Vec<f64> = scene.marks().iter().map(|mark| mark.value).collect();
-        assert_eq!(values, [3.0, 1.0]);
+        assert_eq!(scene.marks().unwrap().values(), [3.0, 1.0]);
     }
 
     #[test]
     fn given_bounds_leave_out_what_is_beyond_them() {
         let positions = [[0.0; 3], [9.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         let all = scene(&positions, &[1.0, 2.0, f64::NAN], View::Plane);
-        let bounds = scene(&positions[..1], &[1.0], View::Plane).extent();
-        assert_eq!(all.drawn_values(), [1.0, 2.0]);
+        let bounds = scene(&positions[..1], &[1.0], View::Plane);
+        let bounds = bounds.marks().unwrap().extent();
+        assert_eq!(all.marks().unwrap().values(), [1.0, 2.0]);
         let bounds = bounds.union(bounds);
         let some = Scene {
             bounds: Some(bounds),
             ..all
         };
-        assert_eq!(some.drawn_values(), [1.0]);
-        assert_eq!(bounds.union(all.extent()), all.extent());
+        assert_eq!(some.marks().unwrap().values(), [1.0]);
+        let extent = all.marks().unwrap().extent();
+        assert_eq!(bounds.union(extent), extent);
+    }
+
+    #[test]
+    fn points_beyond_the_largest_index_are_an_error() {
+        assert_eq!(index_limit(7).unwrap(), 7);
+        let message = index_limit(1 << 32).unwrap_err().message;
+        assert!(
+            message.starts_with("4294967296 points are too many"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn levels_divide_the_colour_bar() {
+        let scene = Scene {
+            range: Some((1.0, 16.0)),
+            ..scene(&[[0.0; 3]], &[1.0], View::Plane)
+        };
+        assert_eq!(scene.levels(2).unwrap(), [6.0, 11.0]);
+        let scene = Scene {
+            is_logarithmic: true,
+            ..scene
+        };
+        let levels = scene.levels(3).unwrap();
+        for (level, expected) in levels.iter().zip([2.0, 4.0, 8.0]) {
+            assert!((level - expected).abs() < 1e-12, "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn longest_vector_is_measured_in_the_picture() {
+        let positions = [[0.0; 3], [0.0, 0.0, 9.0], [1.0, 0.0, 0.0]];
+        let values = [[3.0, 4.0, 9.0], [90.0; 3], [f64::NAN, 0.0, 0.0]];
+        let vectors = Vectors {
+            values: &values,
+            field: "velocity",
+            unit: "m/s",
+            longest: None,
+        };
+        let view = View::Slice {
+            axis: Axis::Z,
+            position: 0.0,
+        };
+        let scene = Scene {
+            vectors: Some(vectors),
+            ..scene(&positions, &[0.0; 3], view)
+        };
+        // The second point is not in the slice, and z is along the view.
+        assert_eq!(scene.marks().unwrap().longest_vector(), 5.0);
     }
 
     #[test]
     fn unusable_positions_are_left_out() {
         let positions = [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0; 3]];
         let scene = scene(&positions, &[1.0, 2.0, 3.0], View::Plane);
-        let values: Vec<f64> = scene.marks().iter().map(|mark| mark.value).collect();
-        assert_eq!(values, [3.0]);
+        assert_eq!(scene.marks().unwrap().values(), [3.0]);
     }
 
     #[test]
@@ -340,7 +466,7 @@ mod tests {
                 range,
                 ..scene(&[[0.0; 3]; 3], values, View::Plane)
             };
-            scene.colour_range(&scene.marks())
+            scene.colour_range(&scene.marks().unwrap())
         };
         assert_eq!(range(&[1.0, f64::NAN, 4.0], "speed", None), (1.0, 4.0));
         assert_eq!(
@@ -352,5 +478,22 @@ mod tests {
         assert_eq!(range(&[f64::NAN; 3], "speed", None), (0.0, 1.0));
         assert_eq!(range(&[0.0; 3], "damage", None), (0.0, 1.0));
         assert_eq!(range(&[0.2, 0.3, 0.4], "damage", None), (0.0, 0.4));
+    }
+
+    #[test]
+    fn logarithmic_range_leaves_out_values_up_to_zero() {
+        let range = |values: &[f64], range| {
+            let scene = Scene {
+                field: "damage",
+                is_logarithmic: true,
+                range,
+                ..scene(&[[0.0; 3]; 3], values, View::Plane)
+            };
+            scene.colour_range(&scene.marks().unwrap())
+        };
+        assert_eq!(range(&[0.0, -3.0, 0.5], None), (0.25, 1.0));
+        assert_eq!(range(&[1e-3, 0.0, 0.5], None), (1e-3, 0.5));
+        assert_eq!(range(&[0.0, -1.0, f64::NAN], None), (0.1, 1.0));
+        assert_eq!(range(&[1.0, 2.0, 3.0], Some((1e-4, 1e2))), (1e-4, 1e2));
     }
 }

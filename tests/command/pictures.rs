@@ -56,15 +56,35 @@ fn expect(output: &Output, code: i32, words: &[&str]) {
     }
 }
 
-/// Return the fraction of white pixels of a PNG file.
-fn white(path: &Path) -> f64 {
+/// Return the pixels of a PNG file.
+fn pixels(path: &Path) -> Vec<[u8; 3]> {
     let file = BufReader::new(File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut bytes).unwrap();
     let pixels = bytes.chunks_exact(3);
-    let all = pixels.len() as f64;
-    pixels.filter(|pixel| *pixel == [255; 3]).count() as f64 / all
+    pixels.map(|pixel| pixel.try_into().unwrap()).collect()
+}
+
+/// Return the fraction of the pixels of a PNG file with a property.
+fn fraction(path: &Path, has: impl Fn([u8; 3]) -> bool) -> f64 {
+    let pixels = pixels(path);
+    pixels.iter().filter(|pixel| has(**pixel)).count() as f64 / pixels.len() as f64
+}
+
+/// Return the fraction of white pixels of a PNG file.
+fn white(path: &Path) -> f64 {
+    fraction(path, |pixel| pixel == [255; 3])
+}
+
+/// Test whether a pixel is dark: a letter, a line or an arrow.
+fn is_dark(pixel: [u8; 3]) -> bool {
+    pixel.iter().all(|channel| *channel < 60)
+}
+
+/// Test whether a pixel is neither white, grey nor ink.
+fn is_coloured([red, green, blue]: [u8; 3]) -> bool {
+    red.abs_diff(green).max(green.abs_diff(blue)) > 8
 }
 
 /// Return width, height and number of frames of a PNG file; 0 frames for a still picture.
@@ -138,6 +158,235 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
         2,
         &[outside, "the nearest ones are at --slice x=5.5"],
     );
+}
+
+/// A file name that the pictures of a test share, and the pictures with given options.
+struct Drawings {
+    result: PathBuf,
+    picture: PathBuf,
+}
+
+impl Drawings {
+    fn new(folder: &Folder, name: &str, deck: &str) -> Self {
+        Self {
+            result: run(folder, name, deck, &[]),
+            picture: folder.join(format!("{name}.png")),
+        }
+    }
+
+    /// Draw a picture and return its path.
+    #[track_caller]
+    fn draw(&self, options: &[&str]) -> &Path {
+        let output = ["-o", self.picture.to_str().unwrap()];
+        let output = command("plot", &[&self.result], &[options, &output].concat());
+        expect(&output, 0, &[" at t = "]);
+        &self.picture
+    }
+
+    /// Assert that both commands reject these options before they write a file.
+    #[track_caller]
+    fn reject(&self, options: &[&str], words: &str) {
+        let _ = std::fs::remove_file(&self.picture);
+        for name in ["plot", "movie"] {
+            let output = ["-o", self.picture.to_str().unwrap()];
+            let output = command(name, &[&self.result], &[options, &output].concat());
+            expect(&output, 2, &[words]);
+            assert!(!self.picture.exists(), "{options:?}");
+        }
+    }
+}
+
+#[test]
+fn colour_maps_and_logarithmic_scales() {
+    let folder = Folder::new("colours");
+    let plate = Drawings::new(&folder, "plate", PLATE);
+    let velocity = ["--field", "velocity"];
+    let with = |options: &[&'static str]| [&velocity[..], options].concat();
+    assert!(fraction(plate.draw(&velocity), is_coloured) > 0.4);
+    let viridis = pixels(&plate.picture);
+    assert_eq!(pixels(plate.draw(&with(&["--colors", "viridis"]))), viridis);
+    assert_eq!(
+        fraction(plate.draw(&with(&["--colors", "grey"])), is_coloured),
+        0.0
+    );
+    let is_red = |[red, green, blue]: [u8; 3]| red > 150 && green < 100 && blue < 100;
+    assert_eq!(viridis.iter().filter(|pixel| is_red(**pixel)).count(), 0);
+    assert!(fraction(plate.draw(&with(&["--colors", "coolwarm"])), is_red) > 0.01);
+    // The stress is 0 or less at many points, which are grey on a logarithmic scale.
+    let grey = |pixel| pixel == [140, 142, 146];
+    let component = ["--field", "stress", "--component", "xy"];
+    let logarithmic = [&component[..], &["--log"]].concat();
+    assert!(fraction(plate.draw(&logarithmic), grey) > 0.1);
+    assert_eq!(fraction(plate.draw(&component), grey), 0.0);
+    let unknown = "--colors jet: there is no such colour map (known: viridis, ";
+    plate.reject(&["--colors", "jet"], unknown);
+    plate.reject(
+        &["--log", "--range", "0,1"],
+        "--range: with --log, LOW must be above 0, is 0",
+    );
+    let block = Drawings::new(&folder, "block", BLOCK);
+    block.reject(&["--log"], "--log: no drawn value of damage is above 0");
+}
+
+#[test]
+fn thresholds_and_half_spaces_leave_points_out() {
+    let folder = Folder::new("filters");
+    let plate = Drawings::new(&folder, "plate", PLATE);
+    let velocity = ["--field", "velocity", "--component", "x"];
+    let with = |options: &[&'static str]| [&velocity[..], options].concat();
+    let start = |options: &[&'static str]| [&with(options)[..], &["--time", "0"]].concat();
+    let all = pixels(plate.draw(&start(&[])));
+    assert_eq!(pixels(plate.draw(&start(&["--threshold", ":1e9"]))), all);
+    // v_x grows with x, so the threshold and the half space leave the same points.
+    plate.draw(&start(&["--clip", "x>0.01"]));
+    let half = pixels(&plate.picture);
+    assert_ne!(half, all);
+    let field = ["--threshold", "0.01:", "--threshold-field"];
+    let field = [&field[..], &["velocity:x"]].concat();
+    assert_eq!(pixels(plate.draw(&start(&field))), half);
+    let unit = "their values of velocity x are between ";
+    plate.reject(&with(&["--threshold", "1e9:"]), unit);
+    plate.reject(
+        &with(&["--threshold", "1e9"]),
+        "--threshold must be LOW:HIGH",
+    );
+    plate.reject(&["--threshold-field", "velocity"], "--threshold <LOW:HIGH>");
+    plate.reject(
+        &["--threshold", "1:", "--threshold-field", "speed"],
+        "has no field `speed`",
+    );
+    plate.reject(
+        &["--clip", "z<0"],
+        "this result is 2-D and has no coordinate z",
+    );
+    plate.reject(
+        &["--clip", "x<-1", "--deform", "0"],
+        "--clip x<-1: no points are drawn there; they are between x = 5.0000e-4 and 1.95",
+    );
+    let block = Drawings::new(&folder, "block", BLOCK);
+    let whole = white(block.draw(&["--camera", "-90,0"]));
+    let words = "--slice z=0.0005: no points are drawn there";
+    block.reject(
+        &["--slice", "z=0.0005", "--clip", "z>0.001", "--deform", "0"],
+        words,
+    );
+    // The two lower layers of three are as wide, but less high.
+    let (width, high, _) = png(block.draw(&["--camera", "-90,0"]));
+    let low = png(block.draw(&["--camera", "-90,0", "--clip", "z<0.002"]));
+    assert!(low.0 == width && low.1 < high && white(&block.picture) > whole);
+}
+
+#[test]
+fn cameras_look_at_solids_from_any_side() {
+    let folder = Folder::new("cameras");
+    let block = Drawings::new(&folder, "block", BLOCK);
+    let height = |camera| png(block.draw(&["--camera", camera, "--deform", "0"])).1;
+    let isometric = pixels(block.draw(&["--deform", "0"]));
+    height("-45,35.264389682754654");
+    assert_eq!(pixels(&block.picture), isometric);
+    // The block has edges of 6, 4 and 3 mm. The widths are equal, so the heights are 4/6, 3/6 and 3/4 of them.
+    let [above, front, side] = ["-90,90", "-90,0", "0,0"].map(height);
+    assert!(front < above && above < side, "{front} {above} {side}");
+    block.reject(
+        &["--camera", "10"],
+        "--camera must be AZIMUTH,ELEVATION in degrees",
+    );
+    block.reject(
+        &["--camera", "10,95"],
+        "ELEVATION must be from -90 to 90 degrees",
+    );
+    block.reject(
+        &["--camera", "0,0", "--slice", "z=0.001"],
+        "cannot be used with",
+    );
+    let plate = Drawings::new(&folder, "plate", PLATE);
+    plate.reject(&["--camera", "0,0"], "--camera is for solids");
+}
+
+#[test]
+fn contours_and_vectors_are_drawn_over_plane_pictures() {
+    let folder = Folder::new("overlays");
+    let plate = Drawings::new(&folder, "plate", PLATE);
+    let bright = [
+        "--field",
+        "velocity",
+        "--component",
+        "x",
+        "--colors",
+        "turbo",
+        "--range",
+        "-1,0.05",
+    ];
+    let with = |options: &[&'static str]| [&bright[..], options].concat();
+    let bare = fraction(plate.draw(&bright), is_dark);
+    let (width, height, _) = png(&plate.picture);
+    let few = fraction(plate.draw(&with(&["--contours", "0.01"])), is_dark);
+    let many = fraction(
+        plate.draw(&with(&["--contours", "0.006,0.009,0.012,0.015"])),
+        is_dark,
+    );
+    assert!(bare < few && few < many, "{bare} {few} {many}");
+    plate.draw(&["--field", "velocity", "--log", "--contours", "5"]);
+    let arrows = fraction(plate.draw(&with(&["--vectors", "velocity"])), is_dark);
+    assert!(arrows > bare + 1e-3, "{arrows} {bare}");
+    // The legend of the arrows is below the picture.
+    let legend = png(&plate.picture);
+    assert!(legend.0 == width && legend.1 > height);
+    plate.reject(
+        &["--contours", "0"],
+        "a number of lines must be from 1 to 100",
+    );
+    plate.reject(
+        &["--contours", "-1.5,2", "--log"],
+        "with --log, values must be above 0, one is -1.5",
+    );
+    plate.reject(
+        &["--vectors", "stress"],
+        "--vectors stress: must be a field with 3 components, has 6 (vector fields: ",
+    );
+    plate.reject(&["--vectors", "speed"], "has no field `speed`");
+    let block = Drawings::new(&folder, "block", BLOCK);
+    block.reject(
+        &["--contours", "5"],
+        "--contours is for plane problems, and for slices",
+    );
+    block.draw(&["--vectors", "displacement"]);
+    let slice = [
+        "--slice",
+        "z=0.0015",
+        "--contours",
+        "5",
+        "--vectors",
+        "displacement",
+    ];
+    block.draw(&slice);
+    // A film with all of them; outputs of equal size.
+    let film = folder.join("film.png");
+    let options = [
+        "--field",
+        "velocity",
+        "--colors",
+        "coolwarm",
+        "--log",
+        "--threshold",
+        "1e-6:",
+        "--clip",
+        "x<0.015",
+        "--contours",
+        "5",
+        "--vectors",
+        "velocity",
+        "--width",
+        "300",
+        "-o",
+        film.to_str().unwrap(),
+    ];
+    expect(
+        &command("movie", &[&plate.result], &options),
+        0,
+        &["frames of velocity"],
+    );
+    assert_eq!(png(&film).2, 5);
 }
 
 #[test]

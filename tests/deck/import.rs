@@ -1,8 +1,6 @@
 //! Import of decks of other codes: translated values, keys that are left out, invalid decks, and mutated
 //! decks.
 
-use std::path::PathBuf;
-
 use fissure::comm::threads;
 use fissure::deck::{Deck, Source};
 use fissure::import::log::Fate;
@@ -11,27 +9,35 @@ use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::survey::dry_run;
 
-use crate::support::{displace, force};
+use crate::support::{command, displace, force};
 
-/// A temporary folder, removed when dropped.
-struct Folder(PathBuf);
+/// A temporary folder of decks and their files, removed when dropped.
+struct Folder(command::Folder);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let path =
-            std::env::temp_dir().join(format!("fissure-import-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
+        Self(command::Folder::new(&format!("import-{name}")))
+    }
+
+    /// Create a folder with the points and the node set of [`STRIP`].
+    fn strip(name: &str) -> Self {
+        let folder = Self::new(name);
+        folder.write(
+            "strip.txt",
+            "# a strip\n\nheader: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+        );
+        folder.write("ends.txt", "header: global_id\n1\n2\n");
+        folder
     }
 
     fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.0.join(name), text).unwrap();
+        self.0.write(name, text);
     }
 
     /// Import a deck of this folder into the same folder.
     fn import(&self, name: &str, text: &str) -> Result<Import, String> {
         let source = Source::new(self.0.join(name), text);
-        let place = format!("{}/", self.0.display());
+        let place = format!("{}/", self.0.0.display());
         let imported = translate(&source, None, &self.0.join("new.toml"));
         imported.map_err(|error| error.message.replace(&place, ""))
     }
@@ -46,12 +52,6 @@ impl Folder {
         );
         let source = Source::new(self.0.join("new.toml"), imported.text.clone());
         Deck::new(source).unwrap().problem().unwrap()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).unwrap();
     }
 }
 
@@ -402,12 +402,7 @@ PeriLab:
 /// PeriLab uses a Poisson's ratio of 1/3 in plane strain too, so the bulk modulus equals Young's modulus.
 #[test]
 fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
-    let folder = Folder::new("bulk");
-    folder.write(
-        "strip.txt",
-        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
-    );
-    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let folder = Folder::strip("bulk");
     let constants = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
     let deck = STRIP
         .replacen(constants, "        Bulk Modulus: 7.0e+4\n", 1)
@@ -422,12 +417,7 @@ fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
 /// and its log says so.
 #[test]
 fn a_plane_material_of_perilab_without_symmetry_is_named() {
-    let folder = Folder::new("symmetry");
-    folder.write(
-        "strip.txt",
-        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
-    );
-    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let folder = Folder::strip("symmetry");
     let symmetry = "        Symmetry: \"isotropic plane stress\"\n";
     let imported = (folder.import("bare.yaml", &STRIP.replacen(symmetry, "", 1))).unwrap();
     let (fate, note) = fate(&imported, "PeriLab > Models > Material Models > Alu");
@@ -440,12 +430,7 @@ fn a_plane_material_of_perilab_without_symmetry_is_named() {
 
 #[test]
 fn a_bond_of_perilab_has_its_micromodulus() {
-    let folder = Folder::new("strip");
-    folder.write(
-        "strip.txt",
-        "# a strip\n\nheader: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
-    );
-    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let folder = Folder::strip("strip");
     let imported = folder.import("strip.yaml", STRIP).unwrap();
     assert_eq!(imported.code, Code::PeriLab);
     let problem = folder.problem(&imported);
@@ -766,12 +751,7 @@ fn temperatures_of_peridigm_count_from_the_start() {
 /// Materials of PeriLab expand if the solver enables thermal models.
 #[test]
 fn materials_of_perilab_expand() {
-    let folder = Folder::new("expansion");
-    folder.write(
-        "strip.txt",
-        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
-    );
-    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let folder = Folder::strip("expansion");
     let text = STRIP
         .replacen("Thermal Flow", "Thermal Expansion", 1)
         .replacen(
@@ -806,12 +786,7 @@ fn materials_of_perilab_expand() {
 /// Steps of PeriLab: conditions of two steps, and settings that only one step has.
 #[test]
 fn steps_of_perilab_share_damping_and_damage() {
-    let folder = Folder::new("steps");
-    folder.write(
-        "strip.txt",
-        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
-    );
-    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let folder = Folder::strip("steps");
     let from = STRIP.find("  Solver:").unwrap();
     let to = STRIP.find("  Outputs:").unwrap();
     let steps = "  Multistep Solver:
@@ -1525,14 +1500,9 @@ fn a_wrong_deck_names_file_and_line() {
 /// Every mutated deck is imported or gives an error with its location; none causes a panic.
 #[test]
 fn mutants_are_decks_or_errors() {
-    let folder = Folder::new("mutants");
+    let folder = Folder::strip("mutants");
     folder.write("bar.txt", &bar_points());
     folder.write("set.txt", "1\n5\n");
-    folder.write(
-        "strip.txt",
-        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
-    );
-    folder.write("ends.txt", "header: global_id\n1\n2\n");
     let mutants = std::env::var("FISSURE_MUTANTS").map_or(400, |count| count.parse().unwrap());
     let mut state = 7_u64;
     let mut random = |below: usize| {

@@ -1,6 +1,6 @@
 //! Meshes of other programs: all element types, encodings and sets; damaged files; a run on several ranks.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use fissure::comm::threads;
 use fissure::deck;
@@ -8,31 +8,9 @@ use fissure::mesh::{self, Format, GroupKey, Members, Mesh};
 use fissure::points::generate;
 use fissure::problem::Problem;
 
+use crate::support::command::Folder;
 use crate::support::problem;
 use crate::support::recorded::record;
-
-/// A temporary folder, removed when dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("fissure-mesh-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.join(name);
-        std::fs::write(&path, bytes).unwrap();
-        path
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).unwrap();
-    }
-}
 
 fn parse(name: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh, String> {
     let path = Path::new(name);
@@ -354,11 +332,11 @@ fn cubes() -> Vec<(&'static str, Written)> {
 
 #[test]
 fn a_cube_in_any_elements_has_its_volume_and_centre_in_any_encoding() {
-    let folder = Folder::new("cube");
+    let folder = Folder::new("mesh-cube");
     for (name, written) in cubes() {
         let mut first = None;
         for (encoding, bytes) in written.all() {
-            let path = folder.write("cube.msh", bytes);
+            let path = folder.write("cube.msh", &bytes);
             let found = points(&solid(&path, &[]));
             assert_eq!(found.len(), written.elements.len());
             let volume: f64 = found.iter().map(|(_, volume, _)| volume).sum();
@@ -538,7 +516,7 @@ const SECOND_ORDER: [(i32, &[[f64; 3]], f64); 7] = [
 
 #[test]
 fn second_order_elements_have_the_order_of_gmsh() {
-    let folder = Folder::new("second-order");
+    let folder = Folder::new("mesh-second-order");
     for (kind, nodes, volume) in SECOND_ORDER {
         let mut written = Written::default();
         // Deform the element by a shear that keeps the volume; with a wrong order of nodes the volume would
@@ -550,7 +528,7 @@ fn second_order_elements_have_the_order_of_gmsh() {
             .elements
             .push((kind, 1, 1, (1..=nodes.len()).collect()));
         for (encoding, bytes) in written.all() {
-            let path = folder.write("element.msh", bytes);
+            let path = folder.write("element.msh", &bytes);
             let found = points(&solid(&path, &[]));
             assert!(
                 (found[0].1 / volume - 1.0).abs() < 1e-14,
@@ -563,7 +541,7 @@ fn second_order_elements_have_the_order_of_gmsh() {
 
 #[test]
 fn plane_elements_have_an_area_times_the_thickness_from_either_side() {
-    let folder = Folder::new("plane");
+    let folder = Folder::new("mesh-plane");
     let square = [
         [0.0, 0.0, 3.0],
         [2.0, 0.0, 3.0],
@@ -590,7 +568,7 @@ fn plane_elements_have_an_area_times_the_thickness_from_either_side() {
         let mut written = Written::default();
         written.add_nodes(&nodes);
         written.elements.push((kind, 1, 1, nodes_of.to_vec()));
-        let path = folder.write("plane.msh", written.version_4(None));
+        let path = folder.write("plane.msh", &written.version_4(None));
         let deck = format!(
             "dimension = 'plane-strain'\nthickness = 0.25\ngrid.horizon = 1\ntime.end = 1\n\
              material.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n[body.a]\nmaterial = 'a'\n\
@@ -644,9 +622,9 @@ fn two_cubes() -> Written {
 
 #[test]
 fn groups_of_any_dimension_become_sets() {
-    let folder = Folder::new("groups");
+    let folder = Folder::new("mesh-groups");
     for (encoding, bytes) in two_cubes().all() {
-        let path = folder.write("two.msh", bytes);
+        let path = folder.write("two.msh", &bytes);
         let problem = solid(&path, &["outer face", "between", "edge", "corner", "first"]);
         assert!(ids(&problem, "first").is_empty(), "before there are points");
         points(&problem);
@@ -664,13 +642,13 @@ fn groups_of_any_dimension_become_sets() {
 
 #[test]
 fn the_kind_tells_groups_of_the_same_number_apart() {
-    let folder = Folder::new("kinds");
+    let folder = Folder::new("mesh-kinds");
     let mut written = two_cubes();
     // The face between the cubes has the number of the second cube.
     written.elements[1].1 = 2;
     written.names.clear();
     for (encoding, bytes) in written.all() {
-        let path = folder.write("two.msh", bytes);
+        let path = folder.write("two.msh", &bytes);
         let problem = solid(&path, &["surface 2", "volume 2"]);
         points(&problem);
         assert_eq!(ids(&problem, "surface 2"), [0, 1], "{encoding}");
@@ -685,8 +663,8 @@ fn the_kind_tells_groups_of_the_same_number_apart() {
 
 #[test]
 fn a_block_may_be_a_number_and_a_body_without_one_gets_the_rest() {
-    let folder = Folder::new("blocks");
-    let path = folder.write("two.msh", two_cubes().version_2(None));
+    let folder = Folder::new("mesh-blocks");
+    let path = folder.write("two.msh", &two_cubes().version_2(None));
     let deck = format!(
         "dimension = '3d'\ngrid.horizon = 1\ntime.end = 1\n\
          material.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n\
@@ -702,12 +680,12 @@ fn a_block_may_be_a_number_and_a_body_without_one_gets_the_rest() {
 
 #[test]
 fn version_2_repeats_an_element_for_each_of_its_groups() {
-    let folder = Folder::new("repeated");
+    let folder = Folder::new("mesh-repeated");
     let mut written = two_cubes();
     let mut again = written.elements[4].clone();
     again.1 = 2;
     written.elements.insert(5, again);
-    let path = folder.write("two.msh", written.version_2(None));
+    let path = folder.write("two.msh", &written.version_2(None));
     let problem = solid(&path, &["first"]);
     assert_eq!(points(&problem).len(), 2);
     assert_eq!(ids(&problem, "first"), [0]);
@@ -774,7 +752,7 @@ Second, S4
 
 #[test]
 fn parts_instances_and_sets_of_abaqus() {
-    let folder = Folder::new("abaqus");
+    let folder = Folder::new("mesh-abaqus");
     let path = folder.write("bracket.inp", ABAQUS);
     let sets = [
         "Left",
@@ -815,7 +793,7 @@ fn parts_instances_and_sets_of_abaqus() {
 
 #[test]
 fn files_of_abaqus_include_others() {
-    let folder = Folder::new("include");
+    let folder = Folder::new("mesh-include");
     folder.write(
         "nodes.txt",
         "1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n",
@@ -1203,9 +1181,9 @@ const WAYS: [Arrays; 4] = [
 
 #[test]
 fn an_unstructured_grid_is_read_in_any_encoding() {
-    let folder = Folder::new("vtu");
+    let folder = Folder::new("mesh-vtu");
     for way in WAYS {
-        let path = folder.write("two.vtu", unstructured(way));
+        let path = folder.write("two.vtu", &unstructured(way));
         let problem = solid(&path, &["material=5", "left=1"]);
         let found = points(&problem);
         assert_unit_cubes(&found, &[[0.5; 3], [1.5, 0.5, 0.5]]);
@@ -1546,10 +1524,10 @@ impl Exodus {
 
 #[test]
 fn exodus_files_of_both_kinds_have_blocks_and_sets() {
-    let folder = Folder::new("exodus");
-    let classic = folder.write("classic.exo", exodus().classic(1));
-    let wide = folder.write("wide.g", exodus().classic(2));
-    let hdf5 = folder.0.join("hdf5.e");
+    let folder = Folder::new("mesh-exodus");
+    let classic = folder.write("classic.exo", &exodus().classic(1));
+    let wide = folder.write("wide.g", &exodus().classic(2));
+    let hdf5 = folder.join("hdf5.e");
     exodus().hdf5(&hdf5);
     for path in [classic, wide, hdf5] {
         let sets = ["first", "block_20", "right edge", "surface_4"];
@@ -1564,7 +1542,7 @@ fn exodus_files_of_both_kinds_have_blocks_and_sets() {
 
 #[test]
 fn damaged_exodus_files_have_their_message() {
-    let folder = Folder::new("damaged-exodus");
+    let folder = Folder::new("mesh-damaged-exodus");
     let mut damaged = exodus();
     damaged.integers[1].2[3] = 99;
     let bytes = damaged.classic(1);
@@ -1587,7 +1565,7 @@ fn damaged_exodus_files_have_their_message() {
     );
     let mut damaged = exodus();
     damaged.integers[5].2[0] = 13;
-    let path = folder.0.join("set.e");
+    let path = folder.join("set.e");
     damaged.hdf5(&path);
     let error = parse(path.to_str().unwrap(), std::fs::read(&path).unwrap()).unwrap_err();
     assert!(

@@ -119,7 +119,11 @@ fn a_wrong_row_is_named_with_its_line() {
         for ranks in 1..4 {
             let error = start(&folder, initial, ranks).unwrap_err();
             assert!(
-                error.ends_with(&format!("wrong.txt{expected}")),
+                error
+                    .lines()
+                    .next()
+                    .unwrap()
+                    .ends_with(&format!("wrong.txt{expected}")),
                 "{name}, {ranks}: {error}"
             );
         }

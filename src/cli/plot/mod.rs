@@ -1,6 +1,13 @@
 //! `fissure plot`: a picture of a field, or curves of the history.
 
+mod absence;
+mod blocks;
+mod choice;
 pub mod curves;
+mod filter;
+pub mod limits;
+mod overlays;
+pub mod painter;
 mod paths;
 pub mod picture;
 mod quantity;
@@ -15,7 +22,7 @@ use picture::PictureArguments;
 
 /// Draw a field of a result, or curves of a history.
 ///
-/// Plane problems are drawn in their plane, solids in an oblique view or as a slice. With `--y`, or if a
+/// Plane problems are drawn in their plane, solids in a view from a camera or as a slice. With `--y`, or if a
 /// RESULT is a CSV file, columns are drawn as curves.
 #[derive(Args)]
 #[command(after_help = "\
@@ -25,6 +32,8 @@ Examples, fields:
   fissure plot out/plate --field stress --component principal_1 --range 0,50e6
   fissure plot out/plate --time all -o frames.png               frames_0000.png, …
   fissure plot out/block --slice z=0.005 --deform 0
+  fissure plot out/block --clip 'y>0.002' --camera -70,20
+  fissure plot out/plate --field velocity --log --colors turbo --vectors velocity
   fissure plot out/plate --path out/plate/crack_main.csv
 
 Examples, curves:
@@ -50,7 +59,7 @@ pub struct PlotArguments {
 
     /// Columns of the history to draw as curves.
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
-    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time"])]
+    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time", "colors", "log", "threshold", "clip", "camera", "contours", "vectors"])]
     y: Vec<String>,
 
     /// Column of the horizontal axis of curves [default: time].

@@ -65,3 +65,54 @@ pub fn read(path: &Path) -> Result<Vec<Line>> {
 fn bare_name(name: &str) -> &str {
     name.split('[').next().unwrap_or_default().trim()
 }
+
+/// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of its
+/// nearest point.
+pub struct NearestPoints<'a> {
+    /// The lines, each with the index of its file.
+    lines: Vec<(usize, &'a Line)>,
+    /// For each vertex of all lines, in order: distance of the nearest point found so far, and displacement
+    /// of this point, m.
+    nearest: Vec<(f64, [f64; 2])>,
+}
+
+impl<'a> NearestPoints<'a> {
+    /// Begin the search for the lines of these files.
+    pub fn new(files: &'a [Vec<Line>]) -> Self {
+        let files = files.iter().enumerate();
+        let lines = files.flat_map(|(number, lines)| lines.iter().map(move |line| (number, line)));
+        let lines: Vec<_> = lines.collect();
+        let vertices = lines.iter().map(|(_, line)| line.len()).sum();
+        Self {
+            lines,
+            nearest: vec![(f64::INFINITY, [0.0; 2]); vertices],
+        }
+    }
+
+    /// Search a block of points. `displacements` has three components per point, m.
+    pub fn search(&mut self, positions: &[[f64; 3]], displacements: &[f64]) {
+        let vertices = self.lines.iter().flat_map(|(_, line)| line.iter());
+        for (place, nearest) in vertices.zip(&mut self.nearest) {
+            for (point, u) in positions.iter().zip(displacements.chunks_exact(3)) {
+                let distance = (point[0] - place[0]).hypot(point[1] - place[1]);
+                if distance < nearest.0 {
+                    *nearest = (distance, [u[0], u[1]]);
+                }
+            }
+        }
+    }
+
+    /// Return the lines to draw, each with the index of its file. Each vertex is moved by the displacement of
+    /// its nearest point times `factor`.
+    pub fn moved_lines(&self, factor: f64) -> Vec<(usize, Vec<[f64; 3]>)> {
+        let mut nearest = self.nearest.iter();
+        let mut moved = |place: &[f64; 2]| {
+            let (_, [x, y]) = nearest.next().expect("one for each vertex");
+            [place[0] + factor * x, place[1] + factor * y, 0.0]
+        };
+        let lines = self.lines.iter();
+        lines
+            .map(|(number, line)| (*number, line.iter().map(&mut moved).collect()))
+            .collect()
+    }
+}

@@ -1,0 +1,91 @@
+//! Reading of all points of an output, one block after another.
+
+use std::ops;
+
+use fissure::error::Result;
+use fissure::output::ResultReader;
+
+/// Number of points that are read at once; limits the memory of a picture.
+const BLOCK: usize = 1 << 18;
+
+/// Largest difference of coordinates that count as equal, as a fraction of the extent. Points in one row of a
+/// lattice differ by round-off.
+const SAME_COORDINATE: f64 = 1e-9;
+
+/// Largest number of combinations of coordinates of a lattice with n points, divided by n^1.5. Scattered
+/// points have more combinations; see [`scattered_bodies`].
+const MOST_COMBINATIONS: f64 = 4.0;
+
+/// Divide `points` points into ranges of at most [`BLOCK`] points.
+pub fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
+    let block = move |first: usize| first..(first + BLOCK).min(points);
+    (0..points).step_by(BLOCK).map(block)
+}
+
+/// Test whether all values of a field are 0 at an output.
+///
+/// # Errors
+/// If the result is damaged.
+pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool> {
+    for points in blocks(result.points(index)) {
+        let values = result.field_of(field, index, points)?;
+        if values.iter().any(|value| *value != 0.0) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Return for each body whether its points are scattered at an output; empty for bars.
+///
+/// The number of combinations is the product of the numbers of different x, y and z. For n points of a
+/// lattice, it is about n. For n scattered points in the plane, it is n². A body with few points does not
+/// count as scattered.
+///
+/// # Errors
+/// If the result is damaged.
+pub fn scattered_bodies(
+    result: &ResultReader,
+    index: usize,
+    dimension: usize,
+) -> Result<Vec<bool>> {
+    if dimension < 2 || result.times()?.is_empty() {
+        return Ok(Vec::new());
+    }
+    // Number of points of each body.
+    let mut points_of: Vec<usize> = Vec::new();
+    for points in blocks(result.points(index)) {
+        for body in result.field_of("block", index, points)? {
+            let body = body as usize;
+            points_of.resize(points_of.len().max(body + 1), 0);
+            points_of[body] += 1;
+        }
+    }
+    let mut combinations = vec![1.0; points_of.len()];
+    for d in 0..dimension {
+        // Store the coordinates of one direction at a time, to limit the memory.
+        let of_body = points_of.iter().map(|points| Vec::with_capacity(*points));
+        let mut along: Vec<Vec<f64>> = of_body.collect();
+        for points in blocks(result.points(index)) {
+            let bodies = result.field_of("block", index, points.clone())?;
+            let positions = result.positions_of(index, points)?;
+            for (position, body) in positions.iter().zip(&bodies) {
+                along[*body as usize].push(position[d]);
+            }
+        }
+        for (along, combinations) in along.iter_mut().zip(&mut combinations) {
+            along.sort_unstable_by(f64::total_cmp);
+            let ends = along.first().zip(along.last());
+            let tolerance = ends.map_or(0.0, |(first, last)| SAME_COORDINATE * (last - first));
+            let steps = along
+                .windows(2)
+                .filter(|pair| pair[1] - pair[0] > tolerance);
+            *combinations *= 1.0 + steps.count() as f64;
+        }
+    }
+    let both = combinations.into_iter().zip(points_of);
+    let is_scattered = |(combinations, points): (f64, usize)| {
+        points > 0 && combinations > MOST_COMBINATIONS * (points as f64).powf(1.5)
+    };
+    Ok(both.map(is_scattered).collect())
+}

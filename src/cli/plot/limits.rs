@@ -1,0 +1,249 @@
+//! The range of the colours, and the settings that all frames of a film share.
+
+use fissure::error::{Error, Result};
+use fissure::picture::Bounds;
+
+use super::choice::number;
+use crate::cli::format::si;
+
+/// Percentiles at the ends of the automatic range of colours if there are outliers.
+const PERCENTILES: [f64; 2] = [0.5, 99.5];
+
+/// Ratio of the full range to the percentile range above which there are outliers.
+const OUTLIERS: f64 = 4.0;
+
+/// Number of decades that the automatic range of a logarithmic scale covers at most. Round-off of values that
+/// should be 0 would otherwise set the range.
+const DECADES: i32 = 6;
+
+/// Requested range of the colours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// All values, or [`PERCENTILES`] if there are outliers.
+    Automatic,
+    /// All values.
+    All,
+    /// Values between two percentiles.
+    Percentiles([f64; 2]),
+    /// Values between two numbers.
+    Values((f64, f64)),
+}
+
+/// Read the argument of `--range`.
+///
+/// # Errors
+/// If the text is neither two values, nor two percentiles, nor `all`.
+pub fn range_of(text: &str) -> Result<Range> {
+    let wanted = "--range must be LOW,HIGH, percentiles such as 5%,95%, or `all`";
+    if text == "all" {
+        return Ok(Range::All);
+    }
+    let wrong = || Error::input(format!("{wanted}, is `{text}`"));
+    let (low, high) = text.split_once(',').ok_or_else(wrong)?;
+    let (low, high) = (low.trim(), high.trim());
+    let percent = (low.strip_suffix('%'), high.strip_suffix('%'));
+    let percentiles = percent.0.is_some() || percent.1.is_some();
+    let (low, high) = match percent {
+        (Some(low), Some(high)) => (number(low, wanted)?, number(high, wanted)?),
+        _ => (number(low, wanted)?, number(high, wanted)?),
+    };
+    if low >= high {
+        return Err(Error::input(format!(
+            "--range {text}: LOW must be below HIGH"
+        )));
+    }
+    if !percentiles {
+        return Ok(Range::Values((low, high)));
+    }
+    if low < 0.0 || high > 100.0 {
+        return Err(wrong());
+    }
+    Ok(Range::Percentiles([low, high]))
+}
+
+/// Range of the drawn values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Values at the ends of the colour bar.
+    pub shown: [f64; 2],
+    /// Smallest and largest value.
+    all: [f64; 2],
+    cut: Cut,
+}
+
+/// Values beyond the ends of the colour bar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Cut {
+    Nothing,
+    /// Values beyond two percentiles.
+    Percentiles([f64; 2]),
+    /// Values more than [`DECADES`] below the largest value.
+    Decades,
+}
+
+impl Limits {
+    /// Return the limits of some values for a requested range; `None` without values.
+    pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
+        let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
+            let [low, high] = ends.unwrap_or([*value; 2]);
+            Some([low.min(*value), high.max(*value)])
+        })?;
+        let wanted = match range {
+            Range::Percentiles(wanted) => wanted,
+            _ => PERCENTILES,
+        };
+        let last = (values.len() - 1) as f64;
+        let between = wanted.map(|percent| {
+            let rank = (percent / 100.0 * last).round() as usize;
+            *values.select_nth_unstable_by(rank, f64::total_cmp).1
+        });
+        let spread = |ends: [f64; 2]| ends[1] - ends[0];
+        let uses = match range {
+            Range::Percentiles(_) => spread(between) > 0.0,
+            Range::Automatic => spread(between) > 0.0 && spread(all) > OUTLIERS * spread(between),
+            Range::All | Range::Values(_) => false,
+        };
+        Some(Self {
+            shown: if uses { between } else { all },
+            all,
+            cut: if uses {
+                Cut::Percentiles(wanted)
+            } else {
+                Cut::Nothing
+            },
+        })
+    }
+
+    /// Return the limits of the values above 0 on a logarithmic scale; `None` without such values.
+    pub fn logarithmic(mut values: Vec<f64>, asked: Range) -> Option<Self> {
+        values.retain(|value| *value > 0.0);
+        let range = match asked {
+            Range::Automatic => Range::All,
+            range => range,
+        };
+        let mut limits = Self::of(values, range)?;
+        let [low, high] = limits.all;
+        let least = high * 10_f64.powi(-DECADES);
+        if asked == Range::Automatic && low < least {
+            limits.shown = [least, high];
+            limits.cut = Cut::Decades;
+        }
+        Some(limits)
+    }
+
+    /// Return whether there are values beyond the ends of the colour bar.
+    pub fn is_cut(&self) -> bool {
+        self.cut != Cut::Nothing
+    }
+
+    /// Return limits that enclose those of `self` and `other`.
+    pub fn union(self, other: Self) -> Self {
+        let union = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Self {
+            shown: union(self.shown, other.shown),
+            all: union(self.all, other.all),
+            cut: if self.is_cut() { self.cut } else { other.cut },
+        }
+    }
+
+    /// Format a note about values beyond the colour bar; empty if the colour bar covers all values.
+    pub fn note(&self, unit: &str) -> String {
+        let colours = match self.cut {
+            Cut::Nothing => return String::new(),
+            Cut::Percentiles([low, high]) => format!("from percentile {low} to {high}"),
+            Cut::Decades => format!("over {DECADES} decades"),
+        };
+        let ends = self.all.map(|value| si(value, unit));
+        format!(
+            "colours {colours}; values from {} to {}",
+            ends[0].trim(),
+            ends[1].trim()
+        )
+        .replace('-', "−")
+    }
+}
+
+/// Settings that all frames of a film share.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// Box that all frames show, m.
+    pub bounds: Bounds,
+    /// Limits of the values; `None` without values.
+    pub limits: Option<Limits>,
+    /// Largest length of a vector in the picture; 0 without vectors.
+    pub longest_vector: f64,
+}
+
+impl Frame {
+    /// Return a frame that encloses `self` and `other`.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            limits: match (self.limits, other.limits) {
+                (Some(a), Some(b)) => Some(a.union(b)),
+                (a, b) => a.or(b),
+            },
+            longest_vector: self.longest_vector.max(other.longest_vector),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_do_not_set_the_range() {
+        let mut values: Vec<f64> = (0..1000).map(f64::from).collect();
+        let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
+        assert_eq!((limits.shown, limits.is_cut()), ([0.0, 999.0], false));
+        values[3] = 1e9;
+        let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
+        assert_eq!((limits.shown, limits.all), ([6.0, 995.0], [0.0, 1e9]));
+        let note = limits.note("Pa");
+        assert!(note.ends_with("values from 0 Pa to 1.000 GPa"), "{note}");
+        let limits = Limits::of(values.clone(), Range::All).unwrap();
+        assert_eq!((limits.shown, limits.note("Pa").as_str()), ([0.0, 1e9], ""));
+        let limits = Limits::of(values, Range::Percentiles([0.0, 50.0])).unwrap();
+        assert_eq!(limits.shown, [0.0, 501.0]);
+        // Few values of a pulse differ from the others; the range must include these few.
+        let pulse: Vec<f64> = (0..1000).map(|k| f64::from(u8::from(k == 7))).collect();
+        let limits = Limits::of(pulse, Range::Automatic).unwrap();
+        assert!(!limits.is_cut());
+        assert_eq!(Limits::of(Vec::new(), Range::Automatic), None);
+    }
+
+    #[test]
+    fn logarithmic_limits_cover_six_decades_of_values_above_zero() {
+        let limits = |values: &[f64], range| Limits::logarithmic(values.to_vec(), range);
+        let values = [-7.0, 0.0, 1e-20, 1.0, 1e3];
+        let automatic = limits(&values, Range::Automatic).unwrap();
+        assert_eq!(
+            (automatic.shown, automatic.all),
+            ([1e-3, 1e3], [1e-20, 1e3])
+        );
+        let note = automatic.note("");
+        assert!(
+            note.starts_with("colours over 6 decades; values from"),
+            "{note}"
+        );
+        let all = limits(&values, Range::All).unwrap();
+        assert_eq!((all.shown, all.is_cut()), ([1e-20, 1e3], false));
+        let few = limits(&values[3..], Range::Automatic).unwrap();
+        assert_eq!((few.shown, few.is_cut()), ([1.0, 1e3], false));
+        assert_eq!(limits(&values[..2], Range::Automatic), None);
+    }
+
+    #[test]
+    fn ranges_are_values_or_percentiles() {
+        assert_eq!(range_of("-1,2").unwrap(), Range::Values((-1.0, 2.0)));
+        assert_eq!(
+            range_of("5%, 95%").unwrap(),
+            Range::Percentiles([5.0, 95.0])
+        );
+        assert_eq!(range_of("all").unwrap(), Range::All);
+        for wrong in ["1", "2,1", "5%,9", "-1%,50%", "a,b"] {
+            assert!(range_of(wrong).is_err(), "{wrong}");
+        }
+    }
+}

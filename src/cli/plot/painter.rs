@@ -1,0 +1,424 @@
+//! Pictures of the outputs of a result: reading of the points that are drawn, and the settings.
+
+use std::ops;
+use std::path::Path;
+
+use fissure::error::{Error, Result};
+use fissure::output::{ResultReader, StoredField};
+use fissure::picture::{ColourMap, Image, Scene, Vectors, View, is_damage, is_in_slice, render};
+
+use super::blocks::{blocks, is_zero, scattered_bodies};
+use super::choice::{choose_field, colour_map, number, view};
+use super::filter::{Clip, Threshold};
+use super::limits::{Frame, Limits, Range, range_of};
+use super::overlays::{Contours, vector_field};
+use super::paths::{self, Line, NearestPoints};
+use super::picture::PictureArguments;
+use super::quantity::Quantity;
+
+/// Largest drawn displacement for `--deform auto`, relative to the body's size.
+const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
+
+/// Settings of all pictures of a result.
+pub struct Painter<'a> {
+    pub(super) result: &'a ResultReader,
+    pub(super) arguments: &'a PictureArguments,
+    pub(super) dimension: usize,
+    title: String,
+    /// Field and component of the drawn values, with label and unit.
+    pub quantity: Quantity,
+    has_displacement: bool,
+    pub(super) section: f64,
+    range: Range,
+    colours: Option<ColourMap>,
+    pub(super) view: View,
+    clips: Vec<Clip>,
+    pub(super) threshold: Option<Threshold>,
+    contours: Option<Contours>,
+    /// Field of the arrows.
+    vectors: Option<StoredField>,
+    factor: f64,
+    /// Whether the points of a body are scattered, by index of the body.
+    scattered: Vec<bool>,
+    /// Lines over the picture, by index of the file.
+    paths: Vec<Vec<Line>>,
+}
+
+/// The points of an output as they are drawn.
+#[derive(Default)]
+pub(super) struct Points {
+    positions: Vec<[f64; 3]>,
+    sizes: Vec<f64>,
+    /// For each point, whether its body has scattered points; empty if no body has scattered points.
+    scattered: Vec<bool>,
+    values: Vec<f64>,
+    /// Vectors for arrows; empty without arrows.
+    vectors: Vec<[f64; 3]>,
+    lines: Vec<(usize, Vec<[f64; 3]>)>,
+}
+
+impl<'a> Painter<'a> {
+    /// Create a painter of a result. An automatic displacement factor is chosen for the output `reference`.
+    ///
+    /// # Errors
+    /// If an argument is wrong for this result.
+    pub fn new(
+        arguments: &'a PictureArguments,
+        path: &Path,
+        result: &'a ResultReader,
+        reference: usize,
+    ) -> Result<Self> {
+        let attributes = result.attributes()?;
+        let attribute = |name: &str| {
+            let found = attributes.iter().find(|(known, _)| known == name);
+            found.map(|(_, value)| value.clone()).unwrap_or_default()
+        };
+        let wrong = |name: &str| {
+            let (path, value) = (path.display(), attribute(name));
+            Error::input(format!(
+                "{path}: attribute `{name}` must be a number, is `{value}`; was this written by \
+                 another version of Fissure?"
+            ))
+        };
+        let number_of = |name: &str| attribute(name).parse::<f64>().map_err(|_| wrong(name));
+        let dimension = number_of("dimension")? as usize;
+        let section = number_of("out_of_plane_measure")?;
+        let fields = result.fields()?;
+        let mut field = choose_field(arguments.field.as_deref(), path, &fields)?;
+        if arguments.field.is_none() && field.name == "velocity" {
+            // Quasi-static results have a velocity of zero, so draw the displacement instead.
+            let displacement = fields.iter().find(|field| field.name == "displacement");
+            if let Some(displacement) = displacement
+                && is_zero(result, "velocity", reference)?
+            {
+                field = displacement;
+            }
+        }
+        if dimension != 2 && !arguments.path.is_empty() {
+            return Err(Error::input("--path is for results of plane problems"));
+        }
+        let range = arguments.range.as_deref();
+        let range = range.map_or(Ok(Range::Automatic), range_of)?;
+        if let Range::Values((low, _)) = range
+            && arguments.log
+            && low <= 0.0
+        {
+            let message = format!("--range: with --log, LOW must be above 0, is {low}");
+            return Err(Error::input(message));
+        }
+        let colours = arguments.colors.as_deref().map(colour_map);
+        let clips = arguments.clip.iter().map(|clip| Clip::new(clip, dimension));
+        let threshold = arguments.threshold.as_deref().map(|text| {
+            let field = arguments.threshold_field.as_deref();
+            Threshold::new(text, field, path, &fields)
+        });
+        let contours = arguments.contours.as_deref();
+        let contours = contours.map(|text| Contours::new(text, arguments.log));
+        if contours.is_some() && dimension != 2 && arguments.slice.is_none() {
+            let message = "--contours is for plane problems, and for slices of solids";
+            return Err(Error::input(message));
+        }
+        let vectors = arguments.vectors.as_deref();
+        let vectors = vectors.map(|name| vector_field(name, path, &fields));
+        if vectors.is_some() && dimension == 1 {
+            let message = "--vectors is for plane problems and solids; this result is 1-D";
+            return Err(Error::input(message));
+        }
+        let paths = arguments.path.iter().map(|path| paths::read(path));
+        let mut painter = Self {
+            title: attribute("title"),
+            quantity: Quantity::new(field, arguments.component.as_deref())?,
+            has_displacement: fields.iter().any(|field| field.name == "displacement"),
+            section,
+            range,
+            colours: colours.transpose()?,
+            clips: clips.collect::<Result<_>>()?,
+            threshold: threshold.transpose()?,
+            contours: contours.transpose()?,
+            vectors: vectors.transpose()?.cloned(),
+            view: view(
+                arguments.slice.as_deref(),
+                arguments.camera.as_deref(),
+                dimension,
+            )?,
+            factor: 0.0,
+            scattered: scattered_bodies(result, reference, dimension)?,
+            paths: paths.collect::<Result<_>>()?,
+            result,
+            arguments,
+            dimension,
+        };
+        painter.factor = match arguments.deform.as_str() {
+            "auto" => painter.automatic_factor(reference)?,
+            text => number(text, "--deform must be `auto` or a number")?,
+        };
+        Ok(painter)
+    }
+
+    /// Return the name of the drawn quantity, for file names.
+    pub fn name(&self) -> String {
+        let field = &self.quantity.field;
+        match &self.arguments.component {
+            Some(component) => format!("{field}_{component}"),
+            None => field.clone(),
+        }
+    }
+
+    pub(super) fn displacements(
+        &self,
+        index: usize,
+        points: ops::Range<usize>,
+    ) -> Result<Vec<f64>> {
+        if self.has_displacement {
+            self.result.field_of("displacement", index, points)
+        } else {
+            Ok(vec![0.0; 3 * points.len()])
+        }
+    }
+
+    /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible.
+    fn automatic_factor(&self, index: usize) -> Result<f64> {
+        let mut largest = 0.0_f64;
+        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+        for points in blocks(self.result.points(index)) {
+            let values = self.displacements(index, points.clone())?;
+            let finite = values.iter().filter(|u| u.is_finite());
+            largest = finite.fold(largest, |a, u| a.max(u.abs()));
+            for position in self.result.positions_of(index, points)? {
+                for d in 0..3 {
+                    low[d] = low[d].min(position[d]);
+                    high[d] = high[d].max(position[d]);
+                }
+            }
+        }
+        let extent = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+        let wanted = AUTOMATIC_DISPLACEMENT * extent / largest;
+        if !wanted.is_finite() || wanted <= 1.0 {
+            return Ok(1.0);
+        }
+        let power = 10_f64.powf(wanted.log10().floor());
+        let step = [5.0, 2.0, 1.0]
+            .into_iter()
+            .find(|step| step * power <= wanted);
+        Ok(step.unwrap_or(1.0) * power)
+    }
+
+    /// Return whether the slice shows a position; true without a slice. `size` is the edge of the cell, m.
+    pub(super) fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
+        match self.view {
+            View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),
+            View::Plane | View::Orthographic(_) => true,
+        }
+    }
+
+    pub(super) fn is_clipped(&self, position: [f64; 3]) -> bool {
+        !self.clips.iter().all(|clip| clip.holds(position))
+    }
+
+    /// Return whether points may be left out.
+    pub(super) fn is_partial(&self) -> bool {
+        let is_slice = matches!(self.view, View::Slice { .. });
+        is_slice || !self.clips.is_empty() || self.threshold.is_some()
+    }
+
+    /// Return the values for the threshold; `None` if these are the drawn values.
+    pub(super) fn threshold_values(
+        &self,
+        index: usize,
+        points: ops::Range<usize>,
+    ) -> Result<Option<Vec<f64>>> {
+        let threshold = self.threshold.as_ref();
+        let Some(quantity) = threshold.and_then(|threshold| threshold.quantity.as_ref()) else {
+            return Ok(None);
+        };
+        let values = self.result.field_of(&quantity.field, index, points)?;
+        Ok(Some(quantity.of(values)))
+    }
+
+    /// Read the points of an output, block by block. Keep only the points in the slice, the half spaces and
+    /// the range of values.
+    pub(super) fn points(&self, index: usize) -> Result<Points> {
+        let mut found = Points::default();
+        let count = self.result.points(index);
+        if !self.is_partial() {
+            found.positions.reserve_exact(count);
+            found.sizes.reserve_exact(count);
+            found.values.reserve_exact(count);
+        }
+        let mut paths = NearestPoints::new(&self.paths);
+        let power = 1.0 / self.dimension as f64;
+        for points in blocks(count) {
+            let values = self
+                .result
+                .field_of(&self.quantity.field, index, points.clone())?;
+            let values = self.quantity.of(values);
+            let volumes = self.result.field_of("volume", index, points.clone())?;
+            let thresholds = self.threshold_values(index, points.clone())?;
+            let scattered = self.are_scattered(index, points.clone())?;
+            let vectors = match &self.vectors {
+                Some(field) => self.result.field_of(&field.name, index, points.clone())?,
+                None => Vec::new(),
+            };
+            let places = self.result.positions_of(index, points.clone())?;
+            let displacements = self.displacements(index, points)?;
+            paths.search(&places, &displacements);
+            for (k, position) in self.drawn_positions(&places, &displacements).enumerate() {
+                let size = (volumes[k] / self.section).powf(power);
+                let value = thresholds.as_ref().map_or(values[k], |values| values[k]);
+                if self.is_clipped(position)
+                    || !self.is_in_view(position, size)
+                    || self
+                        .threshold
+                        .as_ref()
+                        .is_some_and(|range| !range.holds(value))
+                {
+                    continue;
+                }
+                found.positions.push(position);
+                found.sizes.push(size);
+                found.values.push(values[k]);
+                if let Some(vector) = vectors.chunks_exact(3).nth(k) {
+                    found.vectors.push([vector[0], vector[1], vector[2]]);
+                }
+                if let Some(scattered) = scattered.get(k) {
+                    found.scattered.push(*scattered);
+                }
+            }
+        }
+        found.lines = paths.moved_lines(self.factor);
+        Ok(found)
+    }
+
+    /// Return the drawn positions, m: reference positions plus displacements times the deformation factor.
+    pub(super) fn drawn_positions<'b>(
+        &'b self,
+        places: &'b [[f64; 3]],
+        displacements: &'b [f64],
+    ) -> impl Iterator<Item = [f64; 3]> + 'b {
+        let both = places.iter().zip(displacements.chunks_exact(3));
+        both.map(|(x, u)| std::array::from_fn(|d| x[d] + self.factor * u[d]))
+    }
+
+    pub(super) fn scene<'b>(&'b self, points: &'b Points) -> Scene<'b> {
+        Scene {
+            dimension: self.dimension,
+            positions: &points.positions,
+            sizes: &points.sizes,
+            scattered: &points.scattered,
+            values: &points.values,
+            field: &self.quantity.label,
+            unit: &self.quantity.unit,
+            colours: self.colours,
+            is_logarithmic: self.arguments.log,
+            title: "",
+            range: None,
+            view: self.view,
+            width: self.arguments.width,
+            lines: &points.lines,
+            contours: &[],
+            vectors: self.vectors.as_ref().map(|field| Vectors {
+                values: &points.vectors,
+                field: &field.name,
+                unit: match field.unit.as_str() {
+                    "1" => "",
+                    unit => unit,
+                },
+                longest: None,
+            }),
+            note: "",
+            bounds: None,
+        }
+    }
+
+    /// Return for each of these points whether its body has scattered points; empty if no body has scattered
+    /// points.
+    fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
+        if !self.scattered.contains(&true) {
+            return Ok(Vec::new());
+        }
+        if !self.scattered.contains(&false) {
+            return Ok(vec![true; points.len()]);
+        }
+        let bodies = self.result.field_of("block", index, points)?;
+        let is_scattered = |body: &f64| self.scattered.get(*body as usize) == Some(&true);
+        Ok(bodies.iter().map(is_scattered).collect())
+    }
+
+    /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no
+    /// outliers.
+    fn limits(&self, values: Vec<f64>) -> Option<Limits> {
+        match self.range {
+            range if self.arguments.log => Limits::logarithmic(values, range),
+            Range::Automatic if is_damage(&self.quantity.field) => Limits::of(values, Range::All),
+            range => Limits::of(values, range),
+        }
+    }
+
+    /// Return the frame that encloses an output; `None` if no point is drawn. A film uses the union of the
+    /// frames of its outputs.
+    ///
+    /// # Errors
+    /// If the result is damaged.
+    pub fn frame(&self, index: usize) -> Result<Option<Frame>> {
+        let points = self.points(index)?;
+        let scene = self.scene(&points);
+        let marks = scene.marks()?;
+        if marks.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Frame {
+            bounds: marks.extent(),
+            limits: self.limits(marks.values()),
+            longest_vector: marks.longest_vector(),
+        }))
+    }
+
+    /// Draw an output; `time` is the text of its time. Box and limits come from `frame`, or from the output
+    /// if `frame` is `None`.
+    ///
+    /// # Errors
+    /// If the result is damaged.
+    pub fn image(&self, index: usize, time: &str, frame: Option<&Frame>) -> Result<Image> {
+        let points = self.points(index)?;
+        let scene = self.scene(&points);
+        let limits = match frame {
+            Some(frame) => frame.limits,
+            None => self.limits(scene.marks()?.values()),
+        };
+        let note = limits.map_or(String::new(), |limits| limits.note(&self.quantity.unit));
+        let mut title = format!("{}   t = {time}", self.title);
+        if self.has_displacement && self.factor != 0.0 {
+            title += &format!("   deformation × {}", self.factor);
+        }
+        let scene = Scene {
+            title: title.trim_start(),
+            range: match (self.range, limits) {
+                (Range::Values(range), _) => Some(range),
+                // The colour bar of damage starts at 0 in all pictures.
+                (_, Some(limits)) if frame.is_some() || limits.is_cut() => {
+                    let [low, high] = limits.shown;
+                    let from_zero = is_damage(&self.quantity.field) && !self.arguments.log;
+                    let low = if from_zero { low.min(0.0) } else { low };
+                    (low < high).then_some((low, high))
+                }
+                _ => None,
+            },
+            note: &note,
+            bounds: frame.map(|frame| frame.bounds),
+            vectors: scene.vectors.map(|vectors| Vectors {
+                longest: frame.map(|frame| frame.longest_vector),
+                ..vectors
+            }),
+            ..scene
+        };
+        let contours = match &self.contours {
+            None => Vec::new(),
+            Some(Contours::Count(count)) => scene.levels(*count)?,
+            Some(Contours::Values(values)) => values.clone(),
+        };
+        render(&Scene {
+            contours: &contours,
+            ..scene
+        })
+    }
+}
