@@ -60,6 +60,7 @@ mod fracture {
     mod failure_by_stress;
     mod fracture_energy;
     mod fronts;
+    mod j_integral;
     mod scatter;
     mod surfaces;
     mod toughness_by_direction;

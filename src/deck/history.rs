@@ -5,9 +5,11 @@ use super::names::suits_a_column;
 use super::number::{Number, Vector};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::find_set;
-use crate::component::{Component, entries, invariants};
+use super::shapes::corners_of_box;
+use crate::component::{AXES, Component, entries, invariants};
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
+use crate::message::format_number;
 use crate::problem::{self, Field, Interval};
 
 /// Validate the content and interval of the history; `horizon` is the horizon of the grid, m.
@@ -61,6 +63,9 @@ pub fn history(
     let tips = resolve_each(&history.tip, |name, table| {
         tip(scope, name, table, sets, damage_threshold)
     })?;
+    let j_integrals = resolve_each(&history.j_integral, |name, table| {
+        j_integral(scope, name, table, horizon)
+    })?;
     Ok(problem::History {
         every: rows(scope, history)?,
         reactions: history
@@ -77,6 +82,7 @@ pub fn history(
         fronts: fronts.into_values().collect(),
         cracks: cracks.into_values().collect(),
         tips: tips.into_values().collect(),
+        j_integrals: j_integrals.into_values().collect(),
     })
 }
 
@@ -333,5 +339,46 @@ fn tip(
             None => damage_threshold,
             Some(number) => damage(scope, number, &format!("{key} threshold"))?,
         },
+    })
+}
+
+/// Width of the layer inside the faces of the box of a J integral, in horizons.
+const LAYER: f64 = 1.0;
+
+fn j_integral(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::JIntegral>,
+    horizon: f64,
+) -> Result<problem::JIntegral> {
+    let key = column_name(scope, "j_integral", name, table)?;
+    if scope.dimension != 2 {
+        let message = format!(
+            "{key}: is for plane problems, this one is {}-D",
+            scope.dimension
+        );
+        return Err(scope.error(table.span(), message));
+    }
+    let rule = table.get_ref();
+    let [lower, upper] = corners_of_box(scope, &key, &rule.lower, &rule.upper)?;
+    let layer = LAYER * horizon;
+    if let Some(k) = (0..2).find(|k| upper[*k] - lower[*k] <= 2.0 * layer) {
+        let message = format!(
+            "{key}: each edge of the box must be longer than {} m, which is {} horizons, but the edge along {} is {} m \
+             long",
+            format_number(2.0 * layer),
+            2.0 * LAYER,
+            AXES[k],
+            format_number(upper[k] - lower[k])
+        );
+        return Err(scope.error(rule.upper.get_ref()[k].span(), message));
+    }
+    Ok(problem::JIntegral {
+        name: name.to_owned(),
+        span: table.span(),
+        lower,
+        upper,
+        direction: scope.direction(&rule.direction, &format!("{key} direction"))?,
+        layer,
     })
 }

@@ -45,20 +45,8 @@ fn resolve(
     };
     match shape {
         Shape::Box { lower, upper } => {
-            let low = scope.vector(lower, &format!("{key} lower"))?;
-            let high = scope.vector(upper, &format!("{key} upper"))?;
-            if let Some(k) = (0..scope.dimension).find(|k| low[*k] >= high[*k]) {
-                let message = format!(
-                    "{key} upper: must be above `lower` in every component, but {} is not above {}",
-                    format_number(high[k]),
-                    format_number(low[k])
-                );
-                return Err(scope.error(upper.get_ref()[k].span(), message));
-            }
-            Ok(problem::Shape::Box {
-                lower: low,
-                upper: high,
-            })
+            let [lower, upper] = corners_of_box(scope, key, lower, upper)?;
+            Ok(problem::Shape::Box { lower, upper })
         }
         Shape::Disc { centre, radius } => {
             only_in(2, "disc", "`cylinder` or `sphere`")?;
@@ -119,6 +107,29 @@ fn resolve(
             several(scope, key, parts, "difference").map(problem::Shape::Difference)
         }
     }
+}
+
+/// Validate the lower and upper corner of a box, m.
+///
+/// # Errors
+/// On an invalid number, or a box without extent.
+pub fn corners_of_box(
+    scope: &Scope,
+    key: &str,
+    lower: &Vector,
+    upper: &Vector,
+) -> Result<[[f64; 3]; 2]> {
+    let low = scope.vector(lower, &format!("{key} lower"))?;
+    let high = scope.vector(upper, &format!("{key} upper"))?;
+    if let Some(k) = (0..scope.dimension).find(|k| low[*k] >= high[*k]) {
+        let message = format!(
+            "{key} upper: must be above `lower` in every component, but {} is not above {}",
+            format_number(high[k]),
+            format_number(low[k])
+        );
+        return Err(scope.error(upper.get_ref()[k].span(), message));
+    }
+    Ok([low, high])
 }
 
 fn several(

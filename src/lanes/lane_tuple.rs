@@ -242,6 +242,7 @@ impl<const N: usize> LaneTuple for UpTo<N> {
 
 impl<A: LaneTuple, B: LaneTuple> LaneTuple for (A, B) {
     const COUNT: usize = A::COUNT + B::COUNT;
+    const PADDED: bool = A::PADDED || B::PADDED;
     type Columns<'a> = (A::Columns<'a>, B::Columns<'a>);
     type ColumnsMut<'a> = (A::ColumnsMut<'a>, B::ColumnsMut<'a>);
 

@@ -71,6 +71,7 @@ impl Problem {
                 fronts: Vec::new(),
                 cracks: Vec::new(),
                 tips: Vec::new(),
+                j_integrals: Vec::new(),
             },
             checkpoint: CheckpointRule::default(),
             balance: None,

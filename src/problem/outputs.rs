@@ -96,6 +96,8 @@ pub struct History {
     pub cracks: Vec<CrackPath>,
     /// Tracked crack tips.
     pub tips: Vec<Tip>,
+    /// J integrals over boxes.
+    pub j_integrals: Vec<JIntegral>,
 }
 
 /// A set whose reaction force is recorded.
@@ -191,6 +193,23 @@ pub struct Tip {
     pub set: usize,
     /// Threshold that the damage must exceed.
     pub threshold: f64,
+}
+
+/// A J integral over a box around a crack tip.
+#[derive(Debug, Clone)]
+pub struct JIntegral {
+    /// Name in the deck.
+    pub name: String,
+    /// Span in the deck.
+    pub span: Range<usize>,
+    /// Lower corner of the box, m.
+    pub lower: [f64; 3],
+    /// Upper corner of the box, m.
+    pub upper: [f64; 3],
+    /// Direction in which the crack grows, a unit vector.
+    pub direction: [f64; 3],
+    /// Width of the layer inside the faces of the box, over which the weight of the points falls to 0, m.
+    pub layer: f64,
 }
 
 /// A field of the result that is written at each output.

@@ -50,6 +50,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     problem.history.fronts.clear();
     problem.history.cracks.clear();
     problem.history.tips.clear();
+    problem.history.j_integrals.clear();
     problem.checkpoint = Default::default();
     problem.balance = None;
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")

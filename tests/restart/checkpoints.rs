@@ -31,7 +31,7 @@ fn plate(end: &str, extra: &str) -> String {
         condition.hold = {{ set = 'bottom', displacement = ['free', '-1e-8*ramp(t, 0, 1e-5)'] }}
         time = {{ end = 'end', step = 1e-8 }}
         output.every_steps = 200
-        history = {{ every_steps = 50, reactions = ['bottom'], angular_momentum = true, field.load = {{ field = 'stress', component = 'yy', set = 'top', of = ['mean', 'maximum'] }}, probe.tip.at = [0.02, 0.015], probe.tip.fields = ['strain'], front.load = {{ from = [0.03, 0.03], direction = [0, -1], field = 'velocity', component = 'y', threshold = 0.1 }}, tip.notch = {{ from = [0, 0.015], direction = [1, 0] }}, crack.notch = {{ from = [0, 0.015] }} }}
+        history = {{ every_steps = 50, reactions = ['bottom'], angular_momentum = true, field.load = {{ field = 'stress', component = 'yy', set = 'top', of = ['mean', 'maximum'] }}, probe.tip.at = [0.02, 0.015], probe.tip.fields = ['strain'], front.load = {{ from = [0.03, 0.03], direction = [0, -1], field = 'velocity', component = 'y', threshold = 0.1 }}, tip.notch = {{ from = [0, 0.015], direction = [1, 0] }}, j_integral.notch = {{ lower = [0.01, 0.007], upper = [0.03, 0.023] }}, crack.notch = {{ from = [0, 0.015] }} }}
         {extra}
         "
     )

@@ -178,6 +178,9 @@ pub struct History {
     /// Crack tips that are tracked, by name.
     #[serde(default)]
     pub tip: Tables<Tip>,
+    /// J integrals over boxes around crack tips, by name; in plane problems.
+    #[serde(default)]
+    pub j_integral: Tables<JIntegral>,
 }
 
 /// Interval of checkpoints, given by at most one of the keys.
@@ -329,6 +332,24 @@ pub struct Tip {
     /// Threshold that the damage must exceed; `damage_threshold` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold: Option<Number>,
+}
+
+/// The nonlocal J integral over a box around a crack tip, in plane problems: the energy that the crack
+/// releases per area of its growth.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JIntegral {
+    /// Lower corner of the box, m.
+    pub lower: Vector,
+    /// Upper corner of the box, m.
+    pub upper: Vector,
+    /// Direction in which the crack grows, a vector of any length; `[1, 0]` if not given.
+    #[serde(default = "default_direction")]
+    pub direction: Vector,
+}
+
+fn default_direction() -> Vector {
+    Spanned::new(0..0, [1.0, 0.0].map(default_number).to_vec())
 }
 
 #[cfg(test)]

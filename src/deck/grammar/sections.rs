@@ -53,7 +53,7 @@ use Form::{Array, Key, Named, NamedKind, Table, TableAndNamed};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
-pub const SECTIONS: [Section; 38] = [
+pub const SECTIONS: [Section; 39] = [
     Section::new("title", Key, Free),
     Section::new("dimension", Key, Fixed),
     Section::new("thickness", Key, Fixed),
@@ -93,6 +93,7 @@ pub const SECTIONS: [Section; 38] = [
     Section::new("history.front", Named, Fixed),
     Section::new("history.crack", Named, Fixed),
     Section::new("history.tip", Named, Fixed),
+    Section::new("history.j_integral", Named, Fixed),
     Section::new("checkpoint", Table, Free),
     Section::new("balance", Table, Free),
 ];
@@ -191,6 +192,7 @@ impl Deck {
         add(&mut found, "history.front", &history.front);
         add(&mut found, "history.crack", &history.crack);
         add(&mut found, "history.tip", &history.tip);
+        add(&mut found, "history.j_integral", &history.j_integral);
         found
     }
 }

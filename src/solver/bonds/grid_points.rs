@@ -76,6 +76,22 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
+    /// Insert columns over the local points before the point numbers.
+    pub fn insert_numbers(&mut self, columns: &[Column]) {
+        let by_slot = |values: &Column| {
+            let mut places = Column::new(0, self.grid.slots(), 0.0);
+            self.grid.update(Which::All, values, &mut places);
+            places
+        };
+        let columns: Vec<Column> = columns.iter().map(by_slot).collect();
+        self.numbers.splice(0..0, columns);
+    }
+
+    /// Remove the first `count` columns of the point numbers.
+    pub fn remove_numbers(&mut self, count: usize) {
+        self.numbers.drain(..count);
+    }
+
     /// Copy the thresholds of some of the local points.
     pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
         self.grid.update(which, values, &mut self.limits.thresholds);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::SMatrix;
 
 use crate::families::BlockBonds;
-use crate::lanes::{LaneTuple, Lanes};
+use crate::lanes::{Column, LaneTuple, Lanes};
 use crate::material::{Law, PlasticState, ShapeTensor};
 use crate::solver::model::Model;
 
@@ -203,6 +203,23 @@ impl<const D: usize> Forces<D> {
     }
 
     fn gradient(&mut self, model: &Model<D>, is_elastic: bool) -> Vec<SMatrix<f64, D, D>> {
+        let mut gradients = self.change_of_gradient(model, is_elastic);
+        for gradient in &mut gradients {
+            *gradient += SMatrix::identity();
+        }
+        gradients
+    }
+
+    /// Displacement gradient F − I of each owned point; see [`Self::deformation_gradient`].
+    pub fn displacement_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
+        self.change_of_gradient(model, false)
+    }
+
+    fn change_of_gradient(
+        &mut self,
+        model: &Model<D>,
+        is_elastic: bool,
+    ) -> Vec<SMatrix<f64, D, D>> {
         let kernel = measures::FamilyTensors { is_elastic };
         let columns = self.measure(model.owned(), 2 * D + D * D, |interaction, sums, source| {
             sweep_all(&mut interaction.bonds, sums, &kernel, source);
@@ -217,9 +234,33 @@ impl<const D: usize> Forces<D> {
                 ShapeTensor::new(&shape).inverse()
             };
             let change = inverse.map(|inverse| moved * inverse);
-            SMatrix::identity() + change.unwrap_or_else(SMatrix::zeros)
+            change.unwrap_or_else(SMatrix::zeros)
         };
         (0..model.owned()).map(gradient).collect()
+    }
+
+    /// Rate of change of the strain energy density of each owned point, if every point moves with its `rate`:
+    /// Σ T·(v_j − v_i) Ṽ over the intact bonds, with the force states T of the last
+    /// [evaluation](Self::evaluate). `rate` contains the components of v at the local points, including
+    /// ghosts. The unit is J/m³ times the unit of v divided by m.
+    pub fn energy_rate(&mut self, owned: usize, rate: [Column; D]) -> Vec<f64> {
+        // The kernel reads the rates as the first values of the points.
+        for grid in &mut self.grids {
+            grid.insert_numbers(&rate);
+        }
+        self.numbers.columns.splice(0..0, rate);
+        self.numbers.read += D;
+        let mut columns = self.measure(owned, 1, |interaction, sums, source| {
+            let [law, _] = interaction.laws.laws();
+            let kernel = measures::EnergyRate { law };
+            sweep_all(&mut interaction.bonds, sums, &kernel, source);
+        });
+        self.numbers.read -= D;
+        self.numbers.columns.drain(..D);
+        for grid in &mut self.grids {
+            grid.remove_numbers(D);
+        }
+        columns.swap_remove(0)
     }
 
     /// Flag singular owned points with 1, others with 0. A singular point carries no force, see

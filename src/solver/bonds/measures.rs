@@ -276,6 +276,41 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     }
 }
 
+/// Kernel that sums the rate of change of the strain energy density, Σ T·(v_j − v_i) Ṽ over the intact bonds,
+/// if every point moves with its rate v. The first values of the points are v by component. The unit is J/m³
+/// times the unit of v divided by m.
+#[derive(Clone, Copy)]
+pub struct EnergyRate {
+    /// Law of point i.
+    pub law: AnyLaw,
+}
+
+impl<const D: usize> Kernel<D> for EnergyRate {
+    type Sums = [Lanes; 1];
+    type Broken = [Lanes; 0];
+    type Point = ([Lanes; D], AnyPoint);
+    type BondHistory = AnyHistory;
+    type Rotation = [Lanes; 0];
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = wanted(false);
+
+    fn is_linear(&self) -> bool {
+        self.law.is_linear::<D>()
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
+        let [(rate_i, numbers), (rate_j, _)] = group.points();
+        let force: [Lanes; D] = self.law.force(&group.bond, numbers, &group.history[0]);
+        let mut power = Lanes::splat(0.0);
+        for d in 0..D {
+            power += force[d] * (rate_j[d] - rate_i[d]);
+        }
+        let share = power * group.weights.own() * group.force_volume;
+        sums[0] += simd.keep(share, group.intact);
+    }
+}
+
 /// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of
 /// the whole family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]

@@ -57,6 +57,8 @@ pub struct GlobalState {
     pub cracks: Vec<[f64; 2]>,
     /// State of each crack tip.
     pub tips: Vec<TipNow>,
+    /// J integrals, J/m².
+    pub j_integrals: Vec<f64>,
     /// Contact quantities, of all contacts and by pair of bodies.
     pub contact: ContactNow,
     /// Fragments; empty if the history does not contain them.

@@ -21,6 +21,7 @@ use super::crack_surface::{CrackSurface, Surface};
 use super::cracked::Cracked;
 use super::fragments::Fragments;
 use super::front::Front;
+use super::j_integral::JIntegrals;
 use super::nearest::nearest;
 use super::row_fields::RowFields;
 use super::snapshot::Snapshot;
@@ -52,6 +53,7 @@ pub struct HistoryObserver {
     /// Cracks in 3-D, with surfaces.
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
+    j_integrals: JIntegrals,
     /// Energy (J) in the first row, and number of bonds that were intact before any bond could break.
     start: Option<(f64, u64)>,
 }
@@ -100,8 +102,8 @@ impl HistoryObserver {
     /// Find the points of all sets, probes, fronts, crack paths and tips of the history.
     ///
     /// # Errors
-    /// If a set is empty, if no point lies along the line of a front, or if all points of a tip lie behind
-    /// its start. The error is the same on all ranks.
+    /// If a set is empty, if no point lies along the line of a front, if all points of a tip lie behind its
+    /// start, or if the bodies do not fill the box of a J integral. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;
@@ -153,6 +155,7 @@ impl HistoryObserver {
             cracks,
             surfaces,
             tips,
+            j_integrals: JIntegrals::new(simulation)?,
             start: None,
         })
     }
@@ -327,6 +330,7 @@ impl HistoryObserver {
         let cracks = cracks.chain(surfaces).collect();
         let tips = self.tips.iter_mut();
         let tips = tips.map(|tip| tip.row(simulation, damage)).collect();
+        let j_integrals = self.j_integrals.values(simulation, snapshot);
         let values = self.columns.row(&GlobalState {
             clock: simulation.clock,
             energies,
@@ -350,6 +354,7 @@ impl HistoryObserver {
             fronts,
             cracks,
             tips,
+            j_integrals,
             contact,
             fragments,
         });
@@ -556,6 +561,10 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
         columns.add_vector(&name, "m", move |now, d| now.tips[k].position[d]);
         columns.add(length_of(&tip.name), "m", move |now| now.tips[k].length);
         columns.add(format!("{name}_speed"), "m/s", move |now| now.tips[k].speed);
+    }
+    for (k, rule) in problem.history.j_integrals.iter().enumerate() {
+        let name = format!("j_integral_{}", rule.name);
+        columns.add(name, "J/m^2", move |now| now.j_integrals[k]);
     }
     columns
 }

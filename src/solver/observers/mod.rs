@@ -12,6 +12,7 @@ mod cracked;
 mod fragments;
 mod front;
 pub mod history;
+mod j_integral;
 pub mod nearest;
 mod reach;
 mod row_fields;

@@ -1,0 +1,208 @@
+//! Nonlocal J integrals over boxes around crack tips: energy released per area of crack growth.
+//!
+//! A box has a weight q that is 1 inside and falls to 0 over a layer inside the faces. With the unit vector e
+//! in the direction of growth, the strain energy density W, the force states T and the thickness h, the
+//! integral is
+//!
+//! J = −(1/h) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
+//!
+//! In an equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010) over
+//! the boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
+
+use crate::comm;
+use crate::comm::sum::{ExactSum, reduce};
+use crate::component::AXES;
+use crate::error::{Error, Result};
+use crate::lanes::Column;
+use crate::message::format_number;
+use crate::problem::JIntegral;
+use crate::solver::Simulation;
+
+use super::snapshot::Snapshot;
+
+/// Relative tolerance of the distance between the box and the ends of the bodies.
+const ROUND_OFF: f64 = 1e-9;
+
+/// The J integrals of a run.
+pub struct JIntegrals {
+    /// Different directions of growth.
+    directions: Vec<[f64; 3]>,
+    boxes: Vec<WeightedBox>,
+}
+
+/// The points of a box with their weights.
+struct WeightedBox {
+    /// Index of the direction of growth.
+    direction: usize,
+    points: Vec<Weight>,
+}
+
+/// Weight of an owned point.
+struct Weight {
+    /// Local index.
+    point: usize,
+    /// q, between 0 and 1.
+    value: f64,
+    /// Mean of ∂q/∂e over the cell of the point, 1/m.
+    slope: f64,
+}
+
+impl JIntegrals {
+    /// Find the points of the boxes. Collective.
+    ///
+    /// # Errors
+    /// If a box contains no point, or if the bodies end near the box in the direction of growth. The error is
+    /// the same on all ranks.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
+        let mut directions = Vec::new();
+        let mut boxes = Vec::new();
+        for rule in &simulation.problem.history.j_integrals {
+            is_in_the_bodies(simulation, rule)?;
+            let known = directions.iter().position(|known| *known == rule.direction);
+            let direction = known.unwrap_or_else(|| {
+                directions.push(rule.direction);
+                directions.len() - 1
+            });
+            boxes.push(WeightedBox {
+                direction,
+                points: weights(simulation, rule),
+            });
+        }
+        Ok(Self { directions, boxes })
+    }
+
+    /// Compute the integrals (J/m²) at the time of a snapshot. The values are bitwise the same for any number
+    /// of ranks and threads. Collective.
+    pub fn values<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) -> Vec<f64> {
+        if self.boxes.is_empty() {
+            return Vec::new();
+        }
+        let (comm, model, forces) = (simulation.comm, &simulation.model, &mut simulation.forces);
+        let gradients = forces.displacement_gradient(model);
+        let energy_rates = self.directions.iter().map(|direction| {
+            let mut rate: [Column; D] =
+                std::array::from_fn(|d| Column::new(d, model.volume.len(), 0.0));
+            for (point, gradient) in gradients.iter().enumerate() {
+                for (d, column) in rate.iter_mut().enumerate() {
+                    column[point] = (0..D).map(|k| gradient[(d, k)] * direction[k]).sum();
+                }
+            }
+            forces.bring_all(comm, &mut rate.each_mut().map(|column| &mut column[..]));
+            forces.energy_rate(model.owned(), rate)
+        });
+        let energy_rates: Vec<Vec<f64>> = energy_rates.collect();
+        let sum_of = |weighted: &WeightedBox| {
+            let energy_rate = &energy_rates[weighted.direction];
+            let mut sum = ExactSum::default();
+            for weight in &weighted.points {
+                let (point, energy) = (weight.point, &snapshot.stored.energy);
+                let change = weight.slope * energy[point] + weight.value * energy_rate[point];
+                sum.add(-change * model.volume[point]);
+            }
+            sum
+        };
+        let mut sums: Vec<ExactSum> = self.boxes.iter().map(sum_of).collect();
+        let thickness = simulation.problem.dimension.out_of_plane_measure();
+        let sums = reduce(comm, &mut sums).into_iter();
+        sums.map(|sum| sum / thickness).collect()
+    }
+}
+
+/// Weight q at a position: the product of the distances from the faces in widths of the layer, each limited to
+/// 0 and 1.
+fn weight_at(rule: &JIntegral, position: [f64; 3], dimension: usize) -> f64 {
+    let along = |d: usize| {
+        let nearest = (position[d] - rule.lower[d]).min(rule.upper[d] - position[d]);
+        (nearest / rule.layer).clamp(0.0, 1.0)
+    };
+    (0..dimension).map(along).product()
+}
+
+/// Compute the weights of the owned points; points without weight and slope are left out.
+fn weights<const D: usize>(simulation: &Simulation<'_, D>, rule: &JIntegral) -> Vec<Weight> {
+    let model = &simulation.model;
+    let of_point = |point: usize| {
+        let position = model.position(point);
+        let edges = edges(simulation, point);
+        let squares = (0..D).map(|d| (rule.direction[d] * edges[d]).powi(2));
+        let extent = squares.sum::<f64>().sqrt();
+        let at = |distance: f64| {
+            let position = std::array::from_fn(|d| position[d] + distance * rule.direction[d]);
+            weight_at(rule, position, D)
+        };
+        Weight {
+            point,
+            value: at(0.0),
+            slope: (at(0.5 * extent) - at(-0.5 * extent)) / extent,
+        }
+    };
+    let all = (0..model.owned()).map(of_point);
+    all.filter(|weight| weight.value != 0.0 || weight.slope != 0.0)
+        .collect()
+}
+
+/// Edges of the cell of an owned point, m.
+fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f64; 3] {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let spacing = problem.block(usize::from(model.block[point])).spacing();
+    spacing.unwrap_or([problem.dimension.edge(model.volume[point]); 3])
+}
+
+/// Check that the box contains points, and that the bodies reach at least one horizon beyond it in the
+/// directions of the axes along which the crack grows.
+fn is_in_the_bodies<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    rule: &JIntegral,
+) -> Result<()> {
+    let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
+    let key = format!("[history.j_integral.{}]", rule.name);
+    let grows_along = |d: usize| rule.direction[d] != 0.0;
+    let is_within = |position: [f64; 3], margin: f64| {
+        (0..D).all(|d| {
+            let margin = if grows_along(d) { margin } else { 0.0 };
+            position[d] > rule.lower[d] - margin && position[d] < rule.upper[d] + margin
+        })
+    };
+    let owned = (0..model.owned()).map(|point| (point, model.position(point)));
+    let inside = owned
+        .clone()
+        .filter(|(_, position)| is_within(*position, 0.0));
+    if comm::total(comm, inside.count() as u64) == 0 {
+        let message = format!("{key}: no point lies in the box");
+        return Err(Error::input(message).at(&rule.span));
+    }
+    let margin = problem.horizon;
+    let (mut lower, mut upper) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+    for (point, position) in owned.filter(|(_, position)| is_within(*position, 2.0 * margin)) {
+        let edges = edges(simulation, point);
+        for d in 0..D {
+            lower[d] = lower[d].min(position[d] - 0.5 * edges[d]);
+            upper[d] = upper[d].max(position[d] + 0.5 * edges[d]);
+        }
+    }
+    comm::min(comm, &mut lower);
+    comm.max(&mut upper);
+    for d in (0..D).filter(|d| grows_along(*d)) {
+        let sides = [
+            (lower[d], rule.lower[d] - lower[d]),
+            (upper[d], upper[d] - rule.upper[d]),
+        ];
+        for (end, beyond) in sides {
+            if beyond < margin * (1.0 - ROUND_OFF) {
+                let message = format!(
+                    "{key}: the crack grows along {axis}, so the bodies must reach at least one horizon ({} m) beyond \
+                     the box along {axis}, but beside the box they end at {axis} = {} m",
+                    format_number(margin),
+                    format_number(end),
+                    axis = AXES[d],
+                );
+                return Err(Error::input(message).at(&rule.span));
+            }
+        }
+    }
+    Ok(())
+}
