@@ -30,9 +30,9 @@
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
 //! - `step(a)`: 0 if `a < 0`, otherwise 1;
 //! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
-//! after `start`, it jumps at `end`;
+//!   after `start`, it jumps at `end`;
 //! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The other argument has no effect,
-//! even if it is infinite or NaN.
+//!   even if it is infinite or NaN.
 //!
 //! # Powers
 //!
