@@ -10,7 +10,7 @@ use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
 /// Build the families of a domain, sorted by pair of blocks, and the layouts of the grids.
 ///
-/// The domain must have been [arranged](super::arrange) for these grids. `cutoffs` is the symmetric `blocks`
+/// The domain must have been [arranged](super::arrange()) for these grids. `cutoffs` is the symmetric `blocks`
 /// × `blocks` matrix of longest bonds, m.
 ///
 /// # Errors

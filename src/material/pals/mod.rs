@@ -12,7 +12,7 @@
 //!
 //! Σ ω|ξ| e Ṽ = tr H, Σ σ ε² Ṽ = 2G dev H : dev H.
 //!
-//! Among all such functions, ω and σ are nearest to those of [`Ordinary`](super::Ordinary), ω₀ = d/m and σ₀ =
+//! Among all such functions, ω and σ are nearest to those of [`Ordinary`], ω₀ = d/m and σ₀ =
 //! A/m.
 //! The distance is Σ |ξ|² (ω − ω₀)² Ṽ, and the same for σ.
 //! Lagrange multipliers then give ω = n·Λ n and σ = N·S N, with N_a = n_a² and symmetric matrices Λ and S.
@@ -20,7 +20,7 @@
 //! strains.
 //!
 //! The loops multiply ω and σ by the influence function of the deck, as in all sums. Without the multipliers
-//! this is [`Ordinary`](super::Ordinary), for unbroken families.
+//! this is [`Ordinary`], for unbroken families.
 //!
 //! A critical stretch that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)), with σ_w of
 //! an untruncated family. This keeps the energy of breaking the bond.
