@@ -398,19 +398,21 @@ impl Hooke {
     /// directions (Reuss). The softest shear modes dominate it.
     pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
         let used = used(dimension);
+        // The determinant of a matrix of very small or very large entries is not representable. A power of two
+        // scales without round-off.
+        let (_, exponent) = libm::frexp(self.matrix.amax());
+        let unit = libm::ldexp(1.0, exponent);
         let own = DMatrix::from_fn(used.len(), used.len(), |a, b| {
-            self.matrix[(used[a], used[b])]
+            self.matrix[(used[a], used[b])] / unit
         });
-        let s = own
-            .try_inverse()
-            .expect("the constants have been looked at");
+        let s = own.try_inverse().expect("the matrix is positive definite");
         if used.len() == 3 {
-            return 2.0 / (s[(0, 0)] + s[(1, 1)] - 2.0 * s[(0, 1)] + s[(2, 2)]);
+            return unit * (2.0 / (s[(0, 0)] + s[(1, 1)] - 2.0 * s[(0, 1)] + s[(2, 2)]));
         }
         let normal = s[(0, 0)] + s[(1, 1)] + s[(2, 2)];
         let coupled = s[(0, 1)] + s[(1, 2)] + s[(0, 2)];
         let shear = s[(3, 3)] + s[(4, 4)] + s[(5, 5)];
-        15.0 / (4.0 * (normal - coupled) + 3.0 * shear)
+        unit * (15.0 / (4.0 * (normal - coupled) + 3.0 * shear))
     }
 
     fn least_of_unit_strain<const D: usize>(&self) -> f64 {
@@ -491,4 +493,29 @@ fn turned(own: &Matrix6<f64>, [first, second, third]: [f64; 3]) -> Matrix6<f64> 
 
 fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..3).flat_map(|a| (0..3).map(move |b| (a, b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shear_modulus_is_computed_for_moduli_of_any_size() {
+        for modulus in [1e-300, 1.0, 1e300] {
+            let mut matrix = Matrix6::identity() * modulus;
+            for a in 0..3 {
+                for b in 0..3 {
+                    matrix[(a, b)] += modulus * if a == b { 2.0 } else { 1.0 };
+                }
+            }
+            let hooke = Hooke {
+                matrix,
+                across: None,
+            };
+            for dimension in [Dimension::Space, Dimension::PlaneStrain { thickness: 1.0 }] {
+                let found = hooke.shear_modulus(dimension);
+                assert!((found / modulus - 1.0).abs() < 1e-12, "{found} {modulus}");
+            }
+        }
+    }
 }
