@@ -1,4 +1,4 @@
-//! Bodies of a deck, validated.
+//! Validation of the bodies of a deck.
 
 use std::ops::Range;
 

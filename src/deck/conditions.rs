@@ -1,4 +1,4 @@
-//! Initial values, loads and supports of a deck, validated.
+//! Validation of the initial values, loads and supports of a deck.
 
 use super::grammar::{self, Deck};
 use super::number::Vector;

@@ -1,4 +1,4 @@
-//! Contact, validated.
+//! Validation of the contact of a deck.
 
 use super::grammar::{self, ContactName, Deck};
 use super::number::Number;

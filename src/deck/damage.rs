@@ -1,4 +1,4 @@
-//! Damage laws of a deck, validated.
+//! Validation of the damage laws of a deck.
 
 use super::grammar::{self, Text};
 use super::number::{Number, Vector};

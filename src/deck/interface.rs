@@ -1,4 +1,4 @@
-//! The bonds between the bodies of a deck, validated.
+//! Validation of the bonds between the bodies of a deck.
 
 use indexmap::IndexMap;
 

@@ -1,4 +1,4 @@
-//! Materials of a deck, validated.
+//! Validation of the materials of a deck.
 
 use std::ops::Range;
 

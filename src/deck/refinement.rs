@@ -1,4 +1,4 @@
-//! Refinement of a deck, validated.
+//! Validation of the refinement of a deck.
 
 use super::grammar::{self, Deck, HorizonRule, LevelBonds};
 use super::number::Number;

@@ -1,4 +1,4 @@
-//! Rigid bodies, validated.
+//! Validation of the rigid bodies of a deck.
 
 use super::contact::{self, Keys};
 use super::grammar::{self, ContactName, Deck};

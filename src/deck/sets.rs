@@ -1,4 +1,4 @@
-//! Sets of a deck, validated.
+//! Validation of the sets of a deck.
 
 use super::grammar::{self, Deck, Text};
 use super::resolve::Scope;

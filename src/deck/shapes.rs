@@ -1,4 +1,4 @@
-//! Shapes and pre-cracks of a deck, validated.
+//! Validation of the shapes and pre-cracks of a deck.
 
 use std::ops::Range;
 

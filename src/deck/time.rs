@@ -1,4 +1,4 @@
-//! The time axis of a deck and the stages of its run, validated.
+//! Validation of the time axis of a deck and of the stages of its run.
 
 use super::grammar::{self, Deck, Text};
 use super::number::Number;

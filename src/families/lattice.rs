@@ -328,12 +328,12 @@ impl BondLattice {
         }
     }
 
-    /// Call `visit(i, j)` with the local indices of every intact bond.
+    /// See [`super::BlockBonds::for_each_intact`].
     pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
         self.for_each(|_, _, [i, j]| visit(i, j));
     }
 
-    /// Call `visit(i, j)` with the local indices of every broken bond.
+    /// See [`super::BlockBonds::for_each_broken`].
     pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
         let mut broken = vec![0; self.offsets.len()];
         for (k, vector) in self.vectors.iter().enumerate() {

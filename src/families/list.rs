@@ -194,7 +194,7 @@ impl BondList {
         }
     }
 
-    /// Call `visit(i, j)` with the local indices of every intact bond.
+    /// See [`super::BlockBonds::for_each_intact`].
     pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
         for row in 0..self.points.len() {
             for group in self.starts[row]..self.starts[row + 1] {
@@ -221,7 +221,7 @@ impl BondList {
         }
     }
 
-    /// Call `visit(i, j)` with the local indices of every broken bond.
+    /// See [`super::BlockBonds::for_each_broken`].
     pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
         for row in 0..self.points.len() {
             let i = self.points[row];

@@ -78,7 +78,8 @@ impl BlockBonds {
         with!(self, bonds => bonds.cut(selected, cut));
     }
 
-    /// Call `visit(i, j)` with the local indices of every intact bond.
+    /// Call `visit(i, j)` with the local indices of every intact bond, for each point i. A bond between two
+    /// owned points of the same block is visited twice, as (i, j) and (j, i).
     pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
         with!(self, bonds => bonds.for_each_intact(visit));
     }
@@ -96,7 +97,8 @@ impl BlockBonds {
         }
     }
 
-    /// Call `visit(i, j)` with the local indices of every broken bond.
+    /// Call `visit(i, j)` with the local indices of every broken bond, for each point i. A bond between two
+    /// owned points of the same block is visited twice, as (i, j) and (j, i).
     pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
         with!(self, bonds => bonds.for_each_broken(visit));
     }

@@ -68,7 +68,7 @@ const BY_ENERGY: [&str; 3] = [
     "bond_associated_correspondence",
 ];
 
-/// Bond-based laws.
+/// The bond-based laws among the laws that an import writes.
 const BOND_BASED: [&str; 1] = ["pmb"];
 
 /// Write the damage law of a body; return its name.

@@ -90,7 +90,8 @@ fn isotropic(exponents: [usize; 3]) -> f64 {
     }
 }
 
-/// Fit H of a point in `D` dimensions: the least-squares solution of ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (…).
+/// Fit H of a point in `D` dimensions: the least-squares solution of
+/// ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc).
 /// `sums` are the sums of |ξ| Ṽ times the monomials of degree 6 of n.
 fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> SMatrix<f64, D, D> {
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);

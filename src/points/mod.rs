@@ -203,7 +203,8 @@ fn wrong_number(file: &IdFile, ids: &[u64], id: u64, total: u64) -> String {
     let number = id + first;
     let line = id_file::line_of(path, number).map_or(String::new(), |line| format!(":{line}"));
     let last = total - 1 + first;
-    // If the numbers are 1 to the number of points, the file only counts from another first number.
+    // If the smallest number is above 0 and the largest is the number of points, the file probably numbers
+    // the points from 1.
     let hint = if *first == 0 && id == total && ids[0] > 0 {
         "; if the first point of the file has the number 1, set `first_id = 1`"
     } else {

@@ -230,8 +230,8 @@ impl<'a> Grids<'a> {
         state
     }
 
-    /// Refine to a state that [`Self::state`] returned. Return whether any of these nodes was not refined
-    /// before.
+    /// Refine and suppress the nodes of a state that [`Self::state`] returned. Return whether any of its
+    /// refined nodes was not refined before.
     pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {

@@ -101,8 +101,9 @@ fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Resul
 /// Maximum number of times that a step may be rolled back and repeated; each repeat costs as much as a step.
 const MOST_REPEATS: f64 = 100.0;
 
-/// Return an error if the adaptive rule may repeat a step too often, or if its smallest step gives too many
-/// steps. `length` is the duration of the stage (s), and `step` is the chosen step (s).
+/// Return an error if the adaptive rule may repeat a step too often, if its smallest step gives too many
+/// steps, or if its largest step is too long for viscous damping. `length` is the duration of the stage (s),
+/// and `step` is the chosen step (s).
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
     let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));

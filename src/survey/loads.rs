@@ -153,7 +153,9 @@ fn without_effect<const D: usize>(
     }
 }
 
-/// Warn of a traction or pressure whose depth differs from the thickness of its layer.
+/// Warn of a traction or pressure whose default depth `depth` (m) differs from the thickness of its layer by
+/// more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked.
+/// Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,

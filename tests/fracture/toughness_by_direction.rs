@@ -91,8 +91,9 @@ fn bonds_along_the_direction_break_last() {
         "critical_stretch",
         &directed(1.9, "[3, 0]"),
     );
-    // 1.9 is the largest ratio with the exponent k = 1: w_c = (0.1 + 2.7 (n·a)²) w, with the direction n of
-    // the bond and the direction a of the fibres.
+    // At the ratio 1.9, k of docs/src/theory/damage.md is 1, and p has its smallest allowed value, 0.1:
+    // w_c = (0.1 + 2.7 (n·a)²) w, with the direction n of the bond, the direction a of the fibres, and the
+    // critical work w of the isotropic body.
     let isotropic = deck(
         "plane-stress",
         2,

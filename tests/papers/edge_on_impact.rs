@@ -70,8 +70,9 @@ const TIP: usize = 3;
 
 #[test]
 fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
-    // A block with a load on a whole side. Waves from the other sides do not reach the front in the middle:
-    // at 22 mm they are 7 mm behind.
+    // A block with a load on a whole side. Waves from the lateral sides, 20 mm from the centre line, start at
+    // most one horizon (4 mm at m = 4) inside these sides. When the front is at 22 mm, waves of the same
+    // speed have reached at most √(22² − 16²) mm = 15 mm on the centre line.
     for (law, horizon, ratio) in [
         ("pmb", "3", 1.028),
         ("pmb", "4", 0.967),

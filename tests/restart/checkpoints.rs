@@ -256,7 +256,7 @@ fn a_signal_during_the_set_up_ends_it() {
 
 #[test]
 fn signals_are_listened_to_before_mpi_has_started() {
-    // A rank waits during the start of MPI for a rank that is never started.
+    // The rank waits during the start of MPI, because the other process is `sleep`, which never starts MPI.
     let script = "$0 run no_deck.toml & rank=$!
         for k in $(seq 300); do
             caught=$(awk '/^SigCgt/ { print $2 }' /proc/$rank/status)

@@ -36,11 +36,12 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
     Ok(true)
 }
 
-/// Return for each body whether its points are scattered at an output; empty for bars.
+/// Return for each body whether its points are scattered, that is not on a lattice, at an output. The result
+/// is empty in 1-D and without outputs.
 ///
-/// The number of combinations is the product of the numbers of different x, y and z. For n points of a
-/// lattice, it is about n. For n scattered points in the plane, it is n². A body with few points does not
-/// count as scattered.
+/// The number of combinations of a body is the product of the numbers of different x, y and z. A body of n
+/// points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. It is about n for a lattice, and
+/// n² for scattered points in the plane. There, 16 points or fewer never count as scattered.
 ///
 /// # Errors
 /// If the result is damaged.

@@ -57,7 +57,7 @@ pub fn to_rows<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64])
 pub struct ShapeTensor<const D: usize>(SMatrix<f64, D, D>);
 
 impl<const D: usize> ShapeTensor<D> {
-    /// Create K from its diagonal and mixed entries, m⁵.
+    /// Create K (m⁵) from its diagonal entries, followed by its mixed entries yz, xz, xy (xy in 2-D).
     pub fn new(entries: &[f64]) -> Self {
         Self(from_entries(entries))
     }

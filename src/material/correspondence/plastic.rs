@@ -265,8 +265,9 @@ impl Plastic {
 
     /// Return Δε̄ and ΔE_p = x S_d in plane stress.
     ///
-    /// C and the projection P to the deviator have the same eigenvectors. Each eigencomponent of the trial
-    /// stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of C P.
+    /// The final stress is S = S_trial − x C Π S, with the stiffness C in plane stress and the projection Π
+    /// to the deviator, S_d = Π S. C and Π have the same eigenvectors. Each eigencomponent of the trial
+    /// stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of C Π.
     /// q then decreases with x and is convex, so Newton's method converges to the root from one side.
     fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64) -> (f64, Matrix3<f64>) {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);

@@ -10,8 +10,8 @@ use super::measures::{PAIRS, wanted};
 
 type Vector = Vector3<f64>;
 
-/// Fraction of the trace of C that is added to the diagonal of C, so that C of a single layer of points is
-/// invertible.
+/// Fraction of the trace of C = Σ ω (ξ − ξ̄)⊗(ξ − ξ̄) Ṽ, a sum over all bonds of a point, that is added to
+/// the diagonal of C. With this fraction, C of a single layer of points is invertible.
 const LAYER: f64 = 1e-9;
 
 /// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D, with ω as in

@@ -367,7 +367,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Call `found` with the local indices of both ends of every intact bond of the owned points.
+    /// Call `found(i, j)` with the local indices of every intact bond, for each owned point i. A bond between
+    /// two owned points is visited twice, as (i, j) and (j, i).
     pub fn for_each_intact(&self, mut found: impl FnMut(usize, usize)) {
         for interaction in &self.interactions {
             interaction.bonds.for_each_intact(&mut found);
@@ -386,7 +387,8 @@ impl<const D: usize> Forces<D> {
         self.has_history
     }
 
-    /// Call `found` with the local indices of both ends of every broken bond of the owned points.
+    /// Call `found(i, j)` with the local indices of every broken bond, for each owned point i. A bond between
+    /// two owned points is visited twice, as (i, j) and (j, i).
     pub fn for_each_broken(&self, mut found: impl FnMut(usize, usize)) {
         for interaction in &self.interactions {
             interaction.bonds.for_each_broken(&mut found);

@@ -4,15 +4,15 @@
 //!
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
-//! u ← u + s x                              s = 1, or a value at which x·f(u + s x) is small
-//! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: nonlinearity of the forces
+//! u ← u + s x                              s = 1 if |x·f(u + x)| ≤ 0.9 x·f(u), otherwise by line search
+//! η ← | ‖f(u + s x)‖ − ‖f − K x‖ | / ‖f‖   at most 0.1: nonlinearity of the forces
 //! ```
 //!
 //! η follows Eisenstat & Walker 1996, the differences Knoll & Keyes 2004. f includes the reactions, so f is 0
-//! for supported components. All differences use the history of the last equilibrium with its trial update,
-//! so K is the consistent tangent at points that yield. ε is limited so that no point moves by more than
-//! `SHIFT` horizons. The relative error of the difference is then of the order of `SHIFT` for bonds that
-//! rotate, and of the order of (machine ε)/`SHIFT` from rounding.
+//! for supported components. All force evaluations use the history that an equilibrium at the displaced
+//! positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that yield. ε is
+//! limited so that no point moves by more than `SHIFT` horizons. The relative error of the difference is then
+//! of the order of `SHIFT` for bonds that rotate, and of the order of (machine ε)/`SHIFT` from rounding.
 //!
 //! K is symmetric for laws with an energy. In a body that softens or buckles, K may not be positive
 //! definite. The conjugate gradients then stop at the first direction of negative curvature. The

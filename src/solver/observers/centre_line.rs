@@ -40,7 +40,7 @@ pub struct Vertex {
 /// A branch: from the start of the crack, or from its parent branch, to its tip.
 pub type Branch = Vec<Vertex>;
 
-/// Distances that define which points are connected.
+/// Distances that define which points are connected, and how they are grouped into sections.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// Points up to this distance apart are connected, m.

@@ -112,8 +112,8 @@ impl JIntegrals {
     }
 }
 
-/// Weight q at a position: the product of the distances from the faces in widths of the layer, each limited to
-/// 0 and 1.
+/// Weight q at a position: a product with one factor per direction. The factor is the distance to the nearer
+/// face, divided by the thickness of the layer and clamped to the range from 0 to 1.
 fn weight_at(rule: &JIntegral, position: [f64; 3], dimension: usize) -> f64 {
     let along = |d: usize| {
         let nearest = (position[d] - rule.lower[d]).min(rule.upper[d] - position[d]);
