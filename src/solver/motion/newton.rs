@@ -386,8 +386,8 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Move the points along x until |x·f| is small, and compute the residual at the new positions. Returns
-    /// ‖f‖, N. Collective.
+    /// Move the points along x until |x·f| is at most 0.9 of its first value, and compute the residual at the
+    /// new positions. Returns ‖f‖, N. Collective.
     fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
         let at_base = dot(simulation, &self.force, &self.correction);
         let mut length = 1.0;
