@@ -60,10 +60,12 @@ impl Isotropic {
             _ => return None,
         };
         let stable = youngs_modulus > 0.0 && poisson_ratio > -1.0 && poisson_ratio < 0.5;
-        (stable && youngs_modulus.is_finite()).then_some(Self {
+        let solid = Self {
             youngs_modulus,
             poisson_ratio,
-        })
+        };
+        let longitudinal = solid.lame_lambda() + 2.0 * solid.shear_modulus();
+        (stable && longitudinal.is_finite()).then_some(solid)
     }
 
     /// Bulk modulus K = E / (3 (1 − 2ν)), Pa.
