@@ -4,9 +4,11 @@
 //! - Energies are compared by the work of the force states of the ends that act on the bond.
 //! - Stresses are compared by the mean of the stress measures of the ends that act on the bond.
 
+use super::direction::DirectionFactors;
+use super::stress::MeanStress;
 use super::{StressMeasure, StressRule, ToughnessByDirection};
 use crate::lanes::simd::Task;
-use crate::lanes::{LaneTuple, Lanes, Simd};
+use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, ForceState, Law};
 
@@ -271,7 +273,12 @@ impl Criterion {
             // The points of laws with forces along the bonds have no stress.
             Self::Stress(..) | Self::StressThresholds(_) if L::Force::CENTRAL => 0,
             Self::Stress(_, rule) | Self::StressThresholds(rule) => {
-                let (stress, acting) = simd.aside(MeanStress::new(simd, ends));
+                let [i, j] = ends.limits;
+                let (stress, acting) = simd.aside(MeanStress::new(
+                    simd,
+                    [i.stresses, j.stresses],
+                    ends.weights.acting(),
+                ));
                 let reached = simd.at_least(stress, self.threshold(simd, bond, ends)) & acting;
                 rule.sense.select(reached, bond)
             }
@@ -365,7 +372,10 @@ impl Criterion {
         } else {
             let reached = match *self {
                 Self::Stress(..) | Self::StressThresholds(_) => {
-                    MeanStress::new(simd, ends).run(simd).0
+                    let [i, j] = ends.limits;
+                    MeanStress::new(simd, [i.stresses, j.stresses], ends.weights.acting())
+                        .run(simd)
+                        .0
                 }
                 _ => bond.stretch,
             };
@@ -373,72 +383,6 @@ impl Criterion {
             ratio * ratio
         };
         (Lanes::splat(1.0) - ratio).max(Lanes::splat(0.0))
-    }
-}
-
-/// Computation of the mean stress measure of the ends of each bond that count (Pa), and of one bit per bond
-/// with at least one such end. An end counts if the bond is within its horizon and its point carries stress.
-/// Points i and j compute the same bits.
-struct MeanStress {
-    stresses: [Lanes; 2],
-    acting: [u8; 2],
-}
-
-impl MeanStress {
-    /// Read the stresses of both ends. The array is written out, see [`WorkRule::sum_of_acting`].
-    #[inline(always)]
-    fn new<S: Simd, L, P>(simd: S, ends: Ends<'_, L, P>) -> Self {
-        let [i, j] = ends.limits;
-        Self {
-            stresses: [simd.whole(i.stresses), simd.whole(j.stresses)],
-            acting: ends.weights.acting(),
-        }
-    }
-}
-
-impl Task for MeanStress {
-    type Output = (Lanes, u8);
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> (Lanes, u8) {
-        let [i, j] = self.stresses;
-        let acts_i = self.acting[0] & i.above(f64::NEG_INFINITY);
-        let acts_j = self.acting[1] & j.above(f64::NEG_INFINITY);
-        let sum = simd.keep(i, acts_i) + simd.keep(j, acts_j);
-        let mean = simd.select(sum * 0.5, acts_i & acts_j, sum);
-        (mean, acts_i | acts_j)
-    }
-}
-
-/// Computation of the factors of the critical work of bonds at both ends, from their directions.
-struct DirectionFactors<'a, const D: usize> {
-    directions: &'a [ToughnessByDirection; 2],
-    xi: [Lanes; D],
-    inverse: Lanes,
-}
-
-impl<'a, const D: usize> DirectionFactors<'a, D> {
-    /// Copy what the factors depend on. With a reference to the bond, all its data would stay in memory.
-    #[inline(always)]
-    fn new<S: Simd>(simd: S, directions: &'a [ToughnessByDirection; 2], bond: &Bond<D>) -> Self {
-        Self {
-            directions,
-            xi: LaneTuple::each(|d| simd.whole(bond.reference[d])),
-            inverse: simd.whole(bond.inverse),
-        }
-    }
-}
-
-impl<const D: usize> Task for DirectionFactors<'_, D> {
-    type Output = [Lanes; 2];
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> [Lanes; 2] {
-        let [i, j] = self.directions;
-        [
-            i.factor(simd, self.xi, self.inverse),
-            j.factor(simd, self.xi, self.inverse),
-        ]
     }
 }
 

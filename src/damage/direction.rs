@@ -26,7 +26,9 @@
 
 use std::f64::consts::PI;
 
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::simd::Task;
+use crate::lanes::{LaneTuple, Lanes, Simd};
+use crate::material::Bond;
 
 /// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, the few
 /// tough bonds hold the faces of cracks together.
@@ -94,12 +96,7 @@ impl ToughnessByDirection {
 
     /// Compute w_c/w of eight bonds. Both ends of a bond compute the same bits.
     #[inline(always)]
-    pub fn factor<S: Simd, const D: usize>(
-        &self,
-        simd: S,
-        xi: [Lanes; D],
-        inverse: Lanes,
-    ) -> Lanes {
+    fn factor<S: Simd, const D: usize>(&self, simd: S, xi: [Lanes; D], inverse: Lanes) -> Lanes {
         let mut along = xi[0] * self.axis[0];
         for d in 1..D {
             along = simd.multiply_add(xi[d], Lanes::splat(self.axis[d]), along);
@@ -174,6 +171,42 @@ fn means(dimension: usize, is_tough_across: bool, squarings: u32) -> [f64; 2] {
         }
     }
     means
+}
+
+/// Computation of the factors of the critical work of bonds at both ends, from their directions.
+pub(super) struct DirectionFactors<'a, const D: usize> {
+    directions: &'a [ToughnessByDirection; 2],
+    xi: [Lanes; D],
+    inverse: Lanes,
+}
+
+impl<'a, const D: usize> DirectionFactors<'a, D> {
+    /// Copy what the factors depend on. With a reference to the bond, all its data would stay in memory.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(
+        simd: S,
+        directions: &'a [ToughnessByDirection; 2],
+        bond: &Bond<D>,
+    ) -> Self {
+        Self {
+            directions,
+            xi: LaneTuple::each(|d| simd.whole(bond.reference[d])),
+            inverse: simd.whole(bond.inverse),
+        }
+    }
+}
+
+impl<const D: usize> Task for DirectionFactors<'_, D> {
+    type Output = [Lanes; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> [Lanes; 2] {
+        let [i, j] = self.directions;
+        [
+            i.factor(simd, self.xi, self.inverse),
+            j.factor(simd, self.xi, self.inverse),
+        ]
+    }
 }
 
 #[cfg(test)]

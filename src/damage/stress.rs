@@ -9,6 +9,8 @@ use nalgebra::Matrix3;
 
 use super::Sense;
 use crate::component::Component;
+use crate::lanes::simd::Task;
+use crate::lanes::{Lanes, Simd};
 use crate::material::eigenvalues;
 
 /// Scalar measure of a Cauchy stress.
@@ -80,6 +82,39 @@ pub struct StressLimit {
     pub strength: f64,
     /// Measure of the stress, and bonds that can break.
     pub rule: StressRule,
+}
+
+/// Computation of the mean stress measure of the ends of each bond that count (Pa), and of one bit per bond
+/// with at least one such end. An end counts if the bond is within its horizon and its point carries stress.
+/// Points i and j compute the same bits.
+pub(super) struct MeanStress {
+    stresses: [Lanes; 2],
+    acting: [u8; 2],
+}
+
+impl MeanStress {
+    /// Copy the stress measures of points i and j (Pa), and the bits of the bonds within the horizon of each.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Self {
+        Self {
+            stresses: [simd.whole(i), simd.whole(j)],
+            acting,
+        }
+    }
+}
+
+impl Task for MeanStress {
+    type Output = (Lanes, u8);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> (Lanes, u8) {
+        let [i, j] = self.stresses;
+        let acts_i = self.acting[0] & i.above(f64::NEG_INFINITY);
+        let acts_j = self.acting[1] & j.above(f64::NEG_INFINITY);
+        let sum = simd.keep(i, acts_i) + simd.keep(j, acts_j);
+        let mean = simd.select(sum * 0.5, acts_i & acts_j, sum);
+        (mean, acts_i | acts_j)
+    }
 }
 
 #[cfg(test)]

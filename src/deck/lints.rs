@@ -1,6 +1,8 @@
 //! Warnings about probable mistakes in a deck: unused names, columns of files that are not read, numbers in
 //! place of conditions, and stages that change the mass of moving points.
 
+use std::ops::Range;
+
 use indexmap::IndexSet;
 use toml::Value;
 
@@ -63,35 +65,32 @@ fn ignored_columns(problem: &Problem) -> Vec<Warning> {
         let Ok(Ok(layout)) = file::layout_of(problem, path) else {
             continue;
         };
-        let ignored = layout.columns.ignored();
-        if !ignored.is_empty() {
-            let message = format!(
-                "[body.{}] points file: these columns are not read: {}",
-                body.name,
-                ignored.join(", ")
-            );
-            warnings.push(Warning::new(message).at(span));
-        }
+        let key = format!("[body.{}] points file", body.name);
+        warnings.extend(not_read(&key, &layout.columns.ignored(), span));
     }
     warnings
 }
 
 /// Return a warning for each file of initial values with columns that are not read.
-fn ignored_values(problem: &Problem) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    for initial in &problem.initials {
-        if let Some(file) = &initial.file
-            && !file.columns.ignored.is_empty()
-        {
-            let message = format!(
-                "[initial.{}] file: these columns are not read: {}",
-                initial.name,
-                file.columns.ignored.join(", ")
-            );
-            warnings.push(Warning::new(message).at(&file.span));
-        }
-    }
-    warnings
+fn ignored_values(problem: &Problem) -> impl Iterator<Item = Warning> {
+    problem.initials.iter().filter_map(|initial| {
+        let file = initial.file.as_ref()?;
+        let ignored: Vec<_> = file.columns.ignored.iter().map(String::as_str).collect();
+        not_read(
+            &format!("[initial.{}] file", initial.name),
+            &ignored,
+            &file.span,
+        )
+    })
+}
+
+/// Return the warning about columns of a file that are not read; `None` without such columns.
+fn not_read(key: &str, ignored: &[&str], span: &Range<usize>) -> Option<Warning> {
+    let warning = || {
+        let names = ignored.join(", ");
+        Warning::new(format!("{key}: these columns are not read: {names}")).at(span)
+    };
+    (!ignored.is_empty()).then(warning)
 }
 
 /// Return a warning for each unreferenced table of a section whose tables have an effect only by reference.

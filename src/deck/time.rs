@@ -43,11 +43,12 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     let methods: Vec<grammar::Method> = methods.map(|(_, method)| *method.get_ref()).collect();
     let mut quasi_static = methods.iter().filter(|method| method.is_quasi_static());
     if let (Some(table), None) = (&time.relaxation, quasi_static.next()) {
-        let message = "[time] relaxation: only `method = \"relaxation\"` has these keys";
+        let message = "[time] relaxation: is for `method = \"relaxation\"`; give this `method`, or remove the table";
         return Err(scope.error(table.span(), message));
     }
     if let (Some(table), false) = (&time.newton, methods.contains(&grammar::Method::Static)) {
-        let message = "[time] static: only `method = \"static\"` has these keys";
+        let message =
+            "[time] static: is for `method = \"static\"`; give this `method`, or remove the table";
         return Err(scope.error(table.span(), message));
     }
     let stretch = TimeSegment {
@@ -86,12 +87,12 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
         let method = *method.get_ref();
         let is_explicit = !method.is_quasi_static();
         if let (Some(table), true) = (&stage.relaxation, is_explicit) {
-            let message = "[[stage]] relaxation: only `method = \"relaxation\"` has these keys";
+            let message = "[[stage]] relaxation: is for `method = \"relaxation\"`; give this `method`, or remove the table";
             return Err(scope.error(table.span(), message));
         }
         let is_newton = method == grammar::Method::Static;
         if let (Some(table), false) = (&stage.newton, is_newton) {
-            let message = "[[stage]] static: only `method = \"static\"` has these keys";
+            let message = "[[stage]] static: is for `method = \"static\"`; give this `method`, or remove the table";
             return Err(scope.error(table.span(), message));
         }
         let inherited_step = time.step.as_ref().filter(|_| is_explicit);

@@ -26,10 +26,12 @@ impl Colouring {
     /// Return the position of a value between the ends, from 0 to 1; NaN without such a position.
     pub fn fraction(&self, value: f64) -> f64 {
         let (low, high) = self.range;
-        match self.is_logarithmic {
-            true if value <= 0.0 => f64::NAN,
-            true => (value / low).ln() / (high / low).ln(),
-            false => (value - low) / (high - low),
+        if !self.is_logarithmic {
+            (value - low) / (high - low)
+        } else if value > 0.0 {
+            (value / low).ln() / (high / low).ln()
+        } else {
+            f64::NAN
         }
     }
 

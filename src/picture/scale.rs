@@ -54,9 +54,10 @@ impl Scale {
             let plain = powers.iter().all(|power| (-3..=4).contains(power));
             let tick = |power: &i32| Tick {
                 fraction: fraction(10_f64.powi(*power)),
-                label: match plain {
-                    true => format!("{:.*}", (-power).max(0) as usize, 10_f64.powi(*power)),
-                    false => format!("10{}", superscript(*power)),
+                label: if plain {
+                    format!("{:.*}", (-power).max(0) as usize, 10_f64.powi(*power))
+                } else {
+                    format!("10{}", superscript(*power))
                 },
             };
             powers.iter().rev().map(tick).collect()

@@ -62,16 +62,14 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
     let mut ignored = heading.names.clone();
     ignored.retain(|name| !known.iter().any(|other| name.eq_ignore_ascii_case(other)));
     for known in &known {
-        let mut columns = heading.names.iter();
+        let columns = heading.names.iter();
         if columns
-            .by_ref()
-            .any(|name| name.eq_ignore_ascii_case(known))
-            && columns.any(|name| name.eq_ignore_ascii_case(known))
+            .filter(|name| name.eq_ignore_ascii_case(known))
+            .count()
+            > 1
         {
-            return Err(format!(
-                "{name}:{}: has two columns `{known}`",
-                heading.line
-            ));
+            let line = heading.line;
+            return Err(format!("{name}:{line}: has two columns `{known}`"));
         }
     }
     let column = |name: &str| {

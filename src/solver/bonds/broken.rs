@@ -12,7 +12,7 @@ use crate::comm::{self, Communicator};
 use crate::families::Which;
 use crate::solver::model::Model;
 
-use super::evaluate::{Acting, AtPoints, ForceTimes, HaloContent};
+use super::evaluate::{Acting, ForceTimes, HaloContent};
 use super::force::BondUpdate;
 use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
@@ -122,12 +122,7 @@ impl<const D: usize> Forces<D> {
         acting: &mut Acting<'_, D>,
         bond_update: BondUpdate,
     ) {
-        let Acting {
-            force,
-            plastic,
-            thermal_stretch,
-            ..
-        } = acting;
+        let Acting { force, plastic, .. } = acting;
         let before = self.held(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
             if pass != Pass::PointSum(0) {
@@ -135,11 +130,7 @@ impl<const D: usize> Forces<D> {
             }
             self.clear(pass, points.clone());
             self.run(pass, points.clone(), force, BondUpdate::None);
-            let at_points = AtPoints {
-                plastic: &mut *plastic,
-                thermal_stretch: thermal_stretch.as_deref(),
-            };
-            self.finish(pass, points.clone(), model, bond_update, at_points);
+            self.finish(pass, points.clone(), model, bond_update, plastic);
         }
         // Lattice bonds read copies of the point numbers in the grids, so update these copies.
         self.update(HaloContent::OwnedOnly, Which::Owned);

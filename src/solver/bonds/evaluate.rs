@@ -77,14 +77,6 @@ pub struct Acting<'a, const D: usize> {
     pub plastic: PlasticColumns<'a>,
 }
 
-/// Fields of the owned points from which point values are computed.
-pub(super) struct AtPoints<'a, 'b> {
-    /// Plastic states; only an evaluation at the end of a step changes them.
-    pub plastic: &'a mut PlasticColumns<'b>,
-    /// Thermal stretches; `None` in runs without temperatures.
-    pub thermal_stretch: Option<&'a [f64]>,
-}
-
 impl<const D: usize> Forces<D> {
     /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
     /// written the data of the owned points. `bond_update` selects which bond states change. Afterwards,
@@ -151,11 +143,17 @@ impl<const D: usize> Forces<D> {
             self.update(content, Which::Ghosts);
             let border = model.interior..owned;
             self.run(pass, border, force, bond_update);
-            let at_points = AtPoints {
-                plastic: &mut plastic,
-                thermal_stretch: thermal_stretch.as_deref(),
-            };
-            self.finish(pass, 0..owned, model, bond_update, at_points);
+            self.finish(pass, 0..owned, model, bond_update, &mut plastic);
+            // Only evaluations in which bonds can break read the stresses.
+            if pass == Pass::PointSum(0) && bond_update.is_stored() {
+                let read = StressInputs {
+                    model,
+                    blocks: &self.blocks,
+                    plastic: &plastic,
+                    thermal_stretch: thermal_stretch.as_deref(),
+                };
+                (self.numbers).find_stresses(&read, &mut self.limits.stresses);
+            }
             in_bonds += start.elapsed();
         }
         times.bonds += in_bonds;
@@ -364,20 +362,15 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Compute the thresholds, or the point numbers, rotations and stress measures, of some points from the
-    /// sums of a pass.
+    /// Compute the thresholds, or the point numbers and rotations, of some points from the sums of a pass.
     pub(super) fn finish(
         &mut self,
         pass: Pass,
         points: Range<usize>,
         model: &Model<D>,
         bond_update: BondUpdate,
-        at_points: AtPoints<'_, '_>,
+        plastic: &mut PlasticColumns<'_>,
     ) {
-        let AtPoints {
-            plastic,
-            thermal_stretch,
-        } = at_points;
         let blocks = &self.blocks;
         match pass {
             Pass::SmallestStretch => {
@@ -406,18 +399,7 @@ impl<const D: usize> Forces<D> {
                     (self.numbers).find_rotations(points.clone(), model, blocks, rotations);
                 }
                 self.numbers
-                    .finish(number, points.clone(), model, blocks, plastic, keeps);
-                // Only evaluations in which bonds can break read the stresses.
-                if number == 0 && bond_update.is_stored() {
-                    let stresses = &mut self.limits.stresses;
-                    let read = StressInputs {
-                        model,
-                        blocks,
-                        plastic,
-                        thermal_stretch,
-                    };
-                    (self.numbers).find_stresses(points, &read, stresses);
-                }
+                    .finish(number, points, model, blocks, plastic, keeps);
             }
             Pass::Force => {}
         }

@@ -1,7 +1,5 @@
 //! Stress measures of points, computed from the Cauchy stress, for failure criteria.
 
-use std::ops::Range;
-
 use nalgebra::{Matrix3, SMatrix};
 
 use crate::damage::StressMeasure;
@@ -26,16 +24,16 @@ pub struct StressInputs<'a, 'b, const D: usize> {
 }
 
 impl PointNumbers {
-    /// Compute the stress measures of some owned points (Pa) from the sums of the first pass. Measures with
+    /// Compute the stress measures of the owned points (Pa) from the sums of the first pass. Measures with
     /// empty columns are skipped.
     pub fn find_stresses<const D: usize>(
         &self,
-        points: Range<usize>,
         read: &StressInputs<'_, '_, D>,
         stresses: &mut [Column; StressMeasure::ALL.len()],
     ) {
+        let owned = 0..read.model.owned();
         let columns = stresses.each_mut().map(|column| {
-            let own = column.get_mut(points.clone());
+            let own = column.get_mut(owned.clone());
             own.unwrap_or_default()
         });
         if columns.iter().all(|column| column.is_empty()) {
@@ -43,7 +41,7 @@ impl PointNumbers {
         }
         let plastic: [&[f64]; PlasticState::COUNT] =
             read.plastic.each_ref().map(|column| &**column);
-        over_points(points, columns, &|points, columns| {
+        over_points(owned, columns, &|points, columns| {
             for (k, point) in points.enumerate() {
                 let block = &read.blocks[usize::from(read.model.block[point])];
                 let mut sums = [0.0; MOST.sum];
