@@ -9,6 +9,7 @@
 //! the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014, eq. 5).
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 use crate::material::Influence;
 
@@ -18,7 +19,15 @@ const LENGTHS: u32 = 64;
 const ANGLES: u32 = 64;
 
 /// Return b and τ in G0 = δ s0² (A b + κ τ), in `dimension` 2 or 3; τ to about 10⁻³.
+///
+/// The quadrature takes tens of milliseconds, so each result is kept for the next material.
 pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
+    static RESULTS: [[OnceLock<[f64; 2]>; 4]; 2] = [const { [const { OnceLock::new() }; 4] }; 2];
+    let result = &RESULTS[usize::from(dimension == 3)][influence as usize];
+    *result.get_or_init(|| quadrature(dimension, influence))
+}
+
+fn quadrature(dimension: i32, influence: Influence) -> [f64; 2] {
     // δ = 1; thickness and solid angle are omitted because these cancel.
     let moment = influence.moment(dimension + 1);
     let (mass, share) = match dimension {
