@@ -19,8 +19,8 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Largest length of a vector in the picture; the longest arrow has this length. `None` for the largest
-    /// length of the drawn points.
+    /// Length of the vectors that have the longest arrow; the arrows of longer vectors are cut. `None` to
+    /// choose it from the drawn points.
     pub longest: Option<f64>,
 }
 
@@ -40,8 +40,8 @@ const WHITE: Colour = [255; 3];
 
 /// Draw arrows in the middle of which are the points, and the legend.
 ///
-/// The length of an arrow is proportional to the projection of the vector. Only some points have arrows, so
-/// that arrows do not overlap.
+/// The length of an arrow is proportional to the projection of the vector, up to the length `longest` of a
+/// vector. Only some points have arrows, so that arrows do not overlap.
 pub fn draw(
     pen: &mut Pen,
     marks: impl Iterator<Item = (Mark, [f64; 3])>,
@@ -54,9 +54,13 @@ pub fn draw(
     let scale = if longest > 0.0 { reach / longest } else { 0.0 };
     let roots = marks.map(|(mark, vector)| {
         let [across, up] = projection.project(vector);
+        let length = across.hypot(up);
+        let is_cut = length > longest * (1.0 + 1e-9);
+        let scale = if is_cut { reach / length } else { scale };
         Root {
             place: layout.pixel(projection.project(mark.position)),
             arrow: [scale * across, -scale * up],
+            is_cut,
             depth: match projection {
                 Projection::Orthographic(camera) => camera.depth(mark.position),
                 Projection::Strip | Projection::Flat(_) => 0.0,
@@ -64,10 +68,12 @@ pub fn draw(
         }
     });
     let thickness = pen.thickness();
+    let mut any_cut = false;
     for root in thinned(roots, cell, reach) {
         arrow(pen.image, root.place, root.arrow, layout.text, thickness);
+        any_cut |= root.is_cut;
     }
-    legend(pen, vectors, longest, layout);
+    legend(pen, vectors, longest, any_cut, layout);
 }
 
 /// A candidate for an arrow.
@@ -77,6 +83,8 @@ struct Root {
     place: [f64; 2],
     /// The arrow, in pixels.
     arrow: [f64; 2],
+    /// The arrow is shorter than in proportion to its vector.
+    is_cut: bool,
     /// Depth of the point; larger depths are nearer to the camera.
     depth: f64,
 }
@@ -144,9 +152,12 @@ fn arrow(image: &mut Image, middle: [f64; 2], vector: [f64; 2], text: f64, thick
     }
 }
 
-/// Draw the legend below the picture: name, an arrow and its length.
-fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, layout: &Layout) {
-    let (length, label) = legend_entry(longest, vectors.unit);
+/// Draw the legend below the picture: name, an arrow, its length, and a note if arrows are cut.
+fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout: &Layout) {
+    let (length, mut label) = legend_entry(longest, vectors.unit);
+    if any_cut {
+        label += " (longer arrows are cut)";
+    }
     let pixels = LONGEST_ARROW * layout.text * length / longest.max(f64::MIN_POSITIVE);
     let texts = [vectors.field, &label];
     let lengths = texts.map(|text| pen.lettering.length(text, layout.text));
@@ -195,6 +206,7 @@ mod tests {
             (0..10_000).map(move |k| Root {
                 place: [f64::from(k % 100) * spacing, f64::from(k / 100) * spacing],
                 arrow: [1.0, 0.0],
+                is_cut: false,
                 depth,
             })
         };

@@ -35,6 +35,7 @@ mod cells;
 pub mod chart;
 mod colours;
 mod contours;
+mod cubes;
 pub mod film;
 mod layout;
 mod lettering;

@@ -1,9 +1,10 @@
 //! Painting the cells of the points.
 
-use super::canvas::{Colour, Image, spans};
-use super::colours::{ColourMap, shaded};
+use super::canvas::{Colour, Image};
+use super::colours::ColourMap;
+use super::cubes::Cubes;
 use super::layout::Layout;
-use super::projection::{Camera, Projection};
+use super::projection::Projection;
 use super::scene::Mark;
 
 /// Mapping of values to colours.
@@ -48,31 +49,13 @@ impl Colouring {
 
 /// Enlargement of cells on each side in a first pass, pixels. Otherwise a small strain would open gaps
 /// between rounded edges.
-const OVERLAP: f64 = 0.5;
+pub const OVERLAP: f64 = 0.5;
 
 /// Enlargement of cells on each side against round-off of positions and sizes, pixels.
 const TOLERANCE: f64 = 0.01;
 
 /// Height of the strip that represents a bar, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
-
-/// Edge of a larger cube painted behind each cube, divided by the edge of the cube. A drawn deformation opens
-/// gaps between cubes; the larger cubes fill these gaps.
-const BACKING: f64 = 1.3;
-
-/// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
-const LEAST_CUBE: f64 = 2.0;
-
-/// Brightness of the faces of a cube that are normal to x, y and z.
-const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
-
-/// Cosine of the angle between the view and the normal of a face below which the larger cube grows less along
-/// this normal. It is half the cosine of the isometric view.
-const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
-
-/// Smallest cosine of the angle between the normal of a painted face and the view. Other faces are seen from
-/// their edges.
-const LEAST_COSINE: f64 = 1e-3;
 
 /// Paint the cells of all points. In flat views, a later point covers an earlier point. In
 /// orthographic views, a nearer point covers a farther point.
@@ -95,6 +78,7 @@ pub fn paint(
             let colour = colouring.of(mark.value);
             cubes.paint((centre, depth), mark.size * layout.scale, colour);
         }
+        cubes.shade();
         return;
     }
     for enlargement in [OVERLAP, TOLERANCE] {
@@ -115,7 +99,7 @@ pub fn paint(
 /// Return the first pixel of a cell, and the first pixel after the cell.
 ///
 /// Both edges are rounded in the same way: where one cell ends, the next cell begins.
-fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
+pub fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     if width + 2.0 * enlargement < 1.0 {
         let pixel = centre.floor() as i64;
         return [pixel, pixel + 1];
@@ -125,132 +109,9 @@ fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     [first, ((centre + half).round() as i64).max(first + 1)]
 }
 
-/// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
-struct Cubes<'a> {
-    image: &'a mut Image,
-    /// Vectors in the picture, to the right and down, of edges of a cube with an edge of 1. They are parallel
-    /// to x, y and z, and start at the corner nearest to the viewer.
-    edges: [[f64; 2]; 3],
-    /// Decrease of depth along these edges. It is the cosine of the angle between the view and the axis.
-    cosines: [f64; 3],
-    /// Enlargement along x, y and z of the cube behind a cube with an edge of 1.
-    growth: [f64; 3],
-    /// Depth of the surface that each pixel shows, times the scale (pixels per metre). The larger of two
-    /// depths is nearer to the viewer.
-    depths: Vec<f32>,
-}
-
-impl<'a> Cubes<'a> {
-    fn new(image: &'a mut Image, camera: Camera) -> Self {
-        let pixels = image.width as usize * image.height as usize;
-        let towards = camera.towards();
-        let view = Projection::Orthographic(camera);
-        let cosines = towards.map(f64::abs);
-        Self {
-            image,
-            edges: [0, 1, 2].map(|axis| {
-                let mut step = [0.0; 3];
-                step[axis] = if towards[axis] < 0.0 { 1.0 } else { -1.0 };
-                let [across, up] = view.project(step);
-                [across, -up]
-            }),
-            cosines,
-            growth: cosines.map(|cosine| {
-                // A face that is almost parallel to the view comes nearer by a large distance if it moves
-                // outwards.
-                let is_steep = (LEAST_COSINE..STEEP_COSINE).contains(&cosine);
-                let part = if is_steep { cosine / STEEP_COSINE } else { 1.0 };
-                part * (BACKING - 1.0)
-            }),
-            depths: vec![f32::NEG_INFINITY; pixels],
-        }
-    }
-
-    /// Paint a pixel, unless it shows a nearer surface.
-    fn paint_pixel(&mut self, [column, row]: [i64; 2], depth: f64, colour: Colour) {
-        let columns = i64::from(self.image.width);
-        if !(0..columns).contains(&column) || !(0..i64::from(self.image.height)).contains(&row) {
-            return;
-        }
-        let pixel = (row * columns + column) as usize;
-        if depth as f32 > self.depths[pixel] {
-            self.depths[pixel] = depth as f32;
-            self.image
-                .fill_rectangle([column, column + 1], [row, row + 1], colour);
-        }
-    }
-
-    /// Paint the three visible faces of a cube. `centre` is the pixel position of its centre, `depth` the
-    /// depth of its centre, and `edge` its edge in pixels.
-    fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
-        if edge < LEAST_CUBE {
-            let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
-            for row in rows[0]..rows[1] {
-                for column in columns[0]..columns[1] {
-                    self.paint_pixel([column, row], depth, colour);
-                }
-            }
-            return;
-        }
-        let overlap = 2.0 * OVERLAP;
-        self.paint_box((centre, depth), [edge + overlap; 3], colour);
-        // A face that moves outwards by a distance d comes nearer by d over its cosine. Each face of the
-        // larger cube is half of the growth farther out. The shift is 4/3 of the largest approach that
-        // results, so it puts the faces behind the faces of their own cube. In a gap, they hide the sides of
-        // other cubes.
-        let visible = self
-            .visible()
-            .map(|axis| self.growth[axis] / self.cosines[axis]);
-        let behind = depth - edge * visible.fold(0.0, f64::max) / 1.5;
-        let sizes = self.growth.map(|growth| (1.0 + growth) * edge + overlap);
-        self.paint_box((centre, behind), sizes, colour);
-    }
-
-    /// Return the axes normal to the faces that the camera sees.
-    fn visible(&self) -> impl Iterator<Item = usize> + use<> {
-        let cosines = self.cosines;
-        (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
-    }
-
-    /// Paint the visible faces of a box with these edges along x, y and z, in pixels.
-    fn paint_box(&mut self, (centre, depth): ([f64; 2], f64), sizes: [f64; 3], colour: Colour) {
-        let edges: [[f64; 2]; 3] =
-            std::array::from_fn(|axis| self.edges[axis].map(|length| sizes[axis] * length));
-        let descents: [f64; 3] = std::array::from_fn(|axis| sizes[axis] * self.cosines[axis]);
-        let nearest = depth + descents.iter().sum::<f64>() / 2.0;
-        let corner =
-            [0, 1].map(|k| centre[k] - edges.iter().map(|edge| edge[k]).sum::<f64>() / 2.0);
-        let [width, height] = [self.image.width, self.image.height].map(i64::from);
-        for normal in self.visible() {
-            let axes = [[1, 2], [0, 2], [0, 1]][normal];
-            let [one, other] = axes.map(|axis| edges[axis]);
-            let corners = [[0.0; 2], one, [one[0] + other[0], one[1] + other[1]], other];
-            let corners = corners.map(|[across, below]| [corner[0] + across, corner[1] + below]);
-            let colour = shaded(colour, BRIGHTNESS[normal]);
-            let area = one[0] * other[1] - one[1] * other[0];
-            for (row, [first, last]) in spans(&corners, height) {
-                for column in first.max(0)..last.min(width) {
-                    let offset = [
-                        column as f64 + 0.5 - corner[0],
-                        row as f64 + 0.5 - corner[1],
-                    ];
-                    // Fractions of the two edges of the face at this pixel.
-                    let along = (offset[0] * other[1] - offset[1] * other[0]) / area;
-                    let beside = (one[0] * offset[1] - one[1] * offset[0]) / area;
-                    let descent = along * descents[axes[0]] + beside * descents[axes[1]];
-                    self.paint_pixel([column, row], nearest - descent, colour);
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    const WHITE: [u8; 3] = [255; 3];
     use super::*;
-
-    const RED: Colour = [200, 0, 0];
 
     #[test]
     fn logarithmic_colours_follow_the_decades() {
@@ -287,129 +148,5 @@ mod tests {
         assert_eq!(edges(10.7, 0.0, TOLERANCE), [10, 11]);
         assert_eq!(edges(10.2, 0.1, TOLERANCE), [10, 11]);
         assert_eq!(edges(10.5, 3.0, TOLERANCE), [9, 12]);
-    }
-
-    fn isometric() -> Projection {
-        Projection::Orthographic(Camera::isometric())
-    }
-
-    fn paint_cube(image: &mut Image, centre: [f64; 2], edge: f64, colour: Colour) {
-        Cubes::new(image, Camera::isometric()).paint((centre, 0.0), edge, colour);
-    }
-
-    #[test]
-    fn the_nearest_cube_is_seen_in_any_order_and_size() {
-        // One small cube lies behind the upper face of a large cube, although the centre of the small cube is
-        // nearer. The other small cube lies in front of this face.
-        let place = |[x, y, z]: [f64; 3]| {
-            let [across, up] = isometric().project([x, y, z]);
-            (
-                [60.0 + across, 60.0 - up],
-                Camera::isometric().depth([x, y, z]),
-            )
-        };
-        let large = (place([0.0; 3]), 40.0, RED);
-        let behind = (place([17.0, -17.0, 10.0]), 4.0, [0, 0, 200]);
-        let before = (place([17.0, -17.0, 25.0]), 4.0, [0, 200, 0]);
-        let mut pictures = Vec::new();
-        for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
-            let mut image = Image::new(120, 120);
-            let mut cubes = Cubes::new(&mut image, Camera::isometric());
-            for cube in order {
-                let (centre, edge, colour) = [large, behind, before][cube];
-                cubes.paint(centre, edge, colour);
-            }
-            assert!(
-                !image
-                    .rgb
-                    .chunks(3)
-                    .any(|pixel| pixel[2] > 100 && pixel[0] == 0)
-            );
-            assert!(image.rgb.chunks(3).any(|pixel| pixel[1] == 200));
-            pictures.push(image);
-        }
-        assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]));
-    }
-
-    #[test]
-    fn faces_of_a_cube_are_shaded_from_top_to_right() {
-        let mut image = Image::new(60, 60);
-        paint_cube(&mut image, [30.0, 30.0], 30.0, RED);
-        assert_eq!(image.pixel(30, 20), RED);
-        assert_eq!(image.pixel(20, 34), shaded(RED, BRIGHTNESS[1]));
-        assert_eq!(image.pixel(40, 34), shaded(RED, BRIGHTNESS[0]));
-        assert_eq!(image.pixel(2, 2), WHITE);
-    }
-
-    #[test]
-    fn a_layer_of_cubes_has_an_even_face_from_any_side() {
-        for (azimuth, elevation) in [(-45.0, 35.0), (200.0, -25.0), (10.0, 15.0), (-90.0, 90.0)] {
-            let camera = Camera::new(azimuth, elevation);
-            let view = Projection::Orthographic(camera);
-            let mut image = Image::new(400, 400);
-            let mut cubes = Cubes::new(&mut image, camera);
-            let edge = 9.3;
-            let pixel = |place: [f64; 3]| {
-                let [across, up] = view.project(place);
-                [200.0 + across, 200.0 - up]
-            };
-            let centre = |index: i32| edge * f64::from(index % 15 - 7);
-            for index in 0..225 {
-                let place = [centre(index), centre(index / 15), 0.0];
-                cubes.paint((pixel(place), camera.depth(place)), edge, RED);
-            }
-            let side = f64::signum(elevation) * edge / 2.0;
-            for index in 0..120 * 120 {
-                let step = |k: i32| f64::from(k % 120) - 60.0;
-                let [column, row] = pixel([step(index), step(index / 120), side]);
-                let found = image.pixel(column as u32, row as u32);
-                assert_eq!(found, RED, "{azimuth} {elevation}: {column} {row}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_camera_sees_up_to_three_faces() {
-        let faces = |azimuth, elevation| {
-            let mut image = Image::new(60, 60);
-            let mut cubes = Cubes::new(&mut image, Camera::new(azimuth, elevation));
-            cubes.paint(([30.0, 30.0], 0.0), 30.0, RED);
-            let mut colours: Vec<Colour> = image
-                .rgb
-                .chunks(3)
-                .map(|pixel| [pixel[0], pixel[1], pixel[2]])
-                .filter(|pixel| *pixel != WHITE)
-                .collect();
-            let pixels = colours.len();
-            colours.sort_unstable();
-            colours.dedup();
-            (colours, pixels)
-        };
-        let [x, y, z] = BRIGHTNESS.map(|brightness| shaded(RED, brightness));
-        // The edge of the larger cube is 1.3 · 30 pixels, plus the overlap.
-        assert_eq!(faces(0.0, 0.0), (vec![x], 40 * 40));
-        assert_eq!(faces(90.0, 0.0), (vec![y], 40 * 40));
-        assert_eq!(faces(-90.0, -90.0), (vec![z], 40 * 40));
-        assert_eq!(faces(45.0, 0.0).0, [x, y]);
-        assert_eq!(faces(200.0, -20.0).0, [x, y, z]);
-    }
-
-    #[test]
-    fn neighbouring_cubes_show_no_hairlines() {
-        let mut image = Image::new(200, 200);
-        let mut cubes = Cubes::new(&mut image, Camera::isometric());
-        for index in 0..20 {
-            // The distances of the cubes are stretched by a tenth.
-            let y = 1.1 * 7.3 * f64::from(index);
-            let [across, up] = isometric().project([0.0, y, 0.0]);
-            let depth = Camera::isometric().depth([0.0, y, 0.0]);
-            cubes.paint(([20.0 + across, 120.0 - up], depth), 7.3, RED);
-        }
-        for index in 1..19 {
-            let place = [0.0, 1.1 * 7.3 * (f64::from(index) + 0.5), 0.0];
-            let [across, up] = isometric().project(place);
-            let (column, row) = ((20.0 + across) as u32, (120.0 - up) as u32 - 2);
-            assert_eq!(image.pixel(column, row), RED);
-        }
     }
 }

@@ -268,6 +268,11 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
+/// If the largest length of a vector exceeds `LONG_ARROWS` times the length up to which this fraction of the
+/// vectors reaches, longer arrows are cut.
+const WHOLE_ARROWS: f64 = 0.995;
+const LONG_ARROWS: f64 = 4.0;
+
 /// The points of a scene to draw, in painting order.
 pub struct Marks<'a> {
     scene: &'a Scene<'a>,
@@ -298,7 +303,10 @@ impl Marks<'_> {
         all.filter(|(_, vector)| vector.iter().all(|component| component.is_finite()))
     }
 
-    /// Return the largest length in the picture of a vector of the points; 0 without vectors.
+    /// Return the length of the vectors that have the longest arrow; 0 without vectors.
+    ///
+    /// It is the largest length in the picture. If few vectors are much longer than all others, such as the
+    /// velocities of splinters, it is a percentile of the lengths, and longer arrows are cut.
     pub fn longest_vector(&self) -> f64 {
         let Some(vectors) = &self.scene.vectors else {
             return 0.0;
@@ -308,7 +316,18 @@ impl Marks<'_> {
             let [across, up] = projection.project(vector);
             across.hypot(up)
         });
-        lengths.fold(0.0, f64::max)
+        let mut lengths: Vec<f64> = lengths.collect();
+        if lengths.is_empty() {
+            return 0.0;
+        }
+        let largest = lengths.iter().copied().fold(0.0, f64::max);
+        let rank = (WHOLE_ARROWS * (lengths.len() - 1) as f64).round() as usize;
+        let whole = *lengths.select_nth_unstable_by(rank, f64::total_cmp).1;
+        if whole > 0.0 && largest > LONG_ARROWS * whole {
+            whole
+        } else {
+            largest
+        }
     }
 
     /// Return the box of the points, with a margin.
@@ -449,6 +468,32 @@ mod tests {
         };
         // The second point is not in the slice, and z is along the view.
         assert_eq!(scene.marks().unwrap().longest_vector(), 5.0);
+    }
+
+    #[test]
+    fn few_fast_points_do_not_shorten_the_other_arrows() {
+        let positions: Vec<[f64; 3]> = (0..1000).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        let longest = |slow: f64, fast: f64| {
+            let values: Vec<[f64; 3]> = (0..1000)
+                .map(|k| [if k == 500 { fast } else { slow }, 0.0, 0.0])
+                .collect();
+            let vectors = Vectors {
+                values: &values,
+                field: "velocity",
+                unit: "m/s",
+                longest: None,
+            };
+            let zeros = vec![0.0; 1000];
+            let scene = Scene {
+                vectors: Some(vectors),
+                ..scene(&positions, &zeros, View::Plane)
+            };
+            scene.marks().unwrap().longest_vector()
+        };
+        assert_eq!(longest(2.0, 900.0), 2.0);
+        assert_eq!(longest(2.0, 7.0), 7.0);
+        // A pulse moves few points.
+        assert_eq!(longest(0.0, 900.0), 900.0);
     }
 
     #[test]

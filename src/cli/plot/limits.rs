@@ -170,7 +170,7 @@ pub struct Frame {
     pub bounds: Bounds,
     /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
-    /// Largest length of a vector in the picture; 0 without vectors.
+    /// Length of the vectors that have the longest arrow; 0 without vectors.
     pub longest_vector: f64,
 }
 
