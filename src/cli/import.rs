@@ -97,26 +97,27 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     };
     file.write_all(imported.text.as_bytes())
         .map_err(|error| file_error(&target, "write", &error))?;
+    if verbosity == Verbosity::Quiet {
+        return Ok(());
+    }
     let name = target.display();
-    if verbosity > Verbosity::Quiet {
-        outln!(
-            " line  what became of the keys of {}",
-            arguments.deck.display()
-        );
-        for entry in &imported.entries {
-            outln!("{entry}");
-        }
-        outln!(
-            "wrote {name} from a deck of {}: {} keys taken, {} approximated, {} left out",
-            imported.code,
-            imported.count(Fate::Taken),
-            imported.count(Fate::Approximated),
-            imported.count(Fate::LeftOut)
-        );
-        match &imported.fault {
-            None => outln!("next: fissure check {name}, then fissure run {name}"),
-            Some(_) => outln!("next: correct {name}"),
-        }
+    outln!(
+        " line  what became of the keys of {}",
+        arguments.deck.display()
+    );
+    for entry in &imported.entries {
+        outln!("{entry}");
+    }
+    outln!(
+        "wrote {name} from a deck of {}: {} keys taken, {} approximated, {} left out",
+        imported.code,
+        imported.count(Fate::Taken),
+        imported.count(Fate::Approximated),
+        imported.count(Fate::LeftOut)
+    );
+    match &imported.fault {
+        None => outln!("next: fissure check {name}, then fissure run {name}"),
+        Some(_) => outln!("next: correct {name}"),
     }
     if let Some(fault) = &imported.fault {
         errln!("warning: the new deck is not valid yet: {fault}");

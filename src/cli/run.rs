@@ -77,7 +77,6 @@ fn run_deck(
     let constraint = problem.dimension.constraint();
     let constraint = constraint.map_or(String::new(), |words| format!("1-D, {words}\n"));
     let mut log = Log {
-        rank: world.rank(),
         prints,
         verbose: verbosity == Verbosity::Verbose,
         title: format!(
@@ -105,8 +104,7 @@ fn run_deck(
 
 /// Observer that prints the messages and the progress of a run.
 struct Log {
-    rank: usize,
-    /// This rank prints messages and progress, not only errors and warnings.
+    /// This rank prints messages, warnings and progress.
     prints: bool,
     /// This rank also prints verbose messages.
     verbose: bool,
@@ -140,7 +138,7 @@ impl Observer for Log {
                     outln!("the run was complete already");
                 }
             }
-            Message::SetAside { reason, renamed } if self.rank == 0 => {
+            Message::SetAside { reason, renamed } if self.prints => {
                 let renamed: Vec<String> = renamed
                     .iter()
                     .map(|path| path.display().to_string())
@@ -195,7 +193,7 @@ impl Observer for Log {
                     );
                 });
             }
-            Message::Warning(text) if self.rank == 0 => {
+            Message::Warning(text) if self.prints => {
                 self.progress.aside(|| errln!("warning: {text}"));
             }
             _ => {}

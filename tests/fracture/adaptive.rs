@@ -66,16 +66,21 @@ fn no_step_breaks_more_bonds_of_a_point_than_it_may() {
 #[test]
 fn steps_that_are_long_for_bonds_that_break_are_told() {
     let folder = Folder::new("overshoot");
-    let warned = |time: &str| {
+    let warned = |time: &str, options: &[&str]| {
         let deck = folder.write("deck.toml", &torn(time).replace("0.05*", "0.1*"));
         let mut command = fissure(1);
-        command.arg("run").arg(deck).arg("--overwrite");
+        command
+            .arg("run")
+            .arg(deck)
+            .arg("--overwrite")
+            .args(options);
         let output = finish(command.arg("--output").arg(folder.join("out")));
         assert!(output.status.success(), "{}", text(&output));
         text(&output).contains("bonds broke up to one step late")
     };
-    assert!(warned("safety = 0.8"));
-    assert!(!warned("safety = 0.02"));
+    assert!(warned("safety = 0.8", &[]));
+    assert!(!warned("safety = 0.02", &[]));
+    assert!(!warned("safety = 0.8", &["--quiet"]));
 }
 
 #[test]
