@@ -126,8 +126,8 @@ Give each rank as many cores as it has threads: --bind-to none or --map-by slot:
 The loops use the largest vector instruction set that all ranks have; AVX-512 and AVX2 give the same bits.
 FISSURE_INSTRUCTIONS (avx2, avx512) limits it.
 
-SIGTERM, SIGINT or SIGUSR1 to any rank: all finish the step, write a checkpoint and leave with exit
-code 75; a second signal ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
+SIGTERM, SIGINT or SIGUSR1 to any rank: within a few steps, the run writes a checkpoint and ends with exit
+code 75. Another signal more than a second later ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
 struct RunArguments {
     /// Deck to run.
     deck: PathBuf,

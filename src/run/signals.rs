@@ -15,7 +15,8 @@ const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// Receiver of the signals of this process.
 ///
-/// - SIGTERM, SIGINT, SIGUSR1: stop after the current step. A second of these signals exits at once.
+/// - SIGTERM, SIGINT, SIGUSR1: stop within a few steps. Another of these signals more than a second later
+///   exits at once.
 /// - SIGUSR2: write a checkpoint.
 #[derive(Clone)]
 pub struct Signals {

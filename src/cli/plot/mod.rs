@@ -59,7 +59,7 @@ pub struct PlotArguments {
 
     /// Columns of the history to draw as curves.
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
-    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time", "colors", "log", "threshold", "clip", "camera", "contours", "vectors"])]
+    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time", "colors", "log", "threshold", "threshold_field", "clip", "camera", "contours", "vectors"])]
     y: Vec<String>,
 
     /// Column of the horizontal axis of curves [default: time].

@@ -43,7 +43,7 @@ pub enum Restart {
     Fixed,
     /// No changes, and no other order of the tables: later tables take precedence over earlier tables.
     FixedOrder,
-    /// Tables may be added or removed; the content of a table is compared where it is referenced.
+    /// Tables may be added or removed. A table that both decks have must not change.
     WhereUsed,
     /// Any changes.
     Free,
