@@ -154,9 +154,9 @@ pub enum Crack {
     Rectangle {
         /// A corner.
         corner: Vector,
-        /// The edge from the corner to a neighbouring one.
+        /// The vector in m from `corner` to an adjacent corner.
         edge_a: Vector,
-        /// The edge from the corner to the other neighbouring one.
+        /// The vector in m from `corner` to the other adjacent corner.
         edge_b: Vector,
         /// Width of a slot in m, half on each side of the surface; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]
