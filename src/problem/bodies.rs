@@ -252,7 +252,7 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The mean stress of the two points of the bond.
+    /// The mean of the stress measures of the bond's two points.
     Stress(StressRule),
 }
 
@@ -272,7 +272,7 @@ pub enum Toughness {
 /// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// Points in the cells of a lattice, if the centre of the cell lies within a shape.
+    /// Points in those cells of a lattice whose centre lies within a shape.
     Lattice {
         /// The region that the cells fill.
         shape: Shape,
@@ -287,7 +287,7 @@ pub enum PointSource {
     File {
         /// Path, relative to the working directory or absolute.
         path: PathBuf,
-        /// Block number of the rows that are used; `None` for all rows.
+        /// Block number of the rows that are used; `None` for all rows that belong to no other body.
         block: Option<u32>,
         /// Meaning of the columns; `None` if the deck does not name them.
         columns: Option<Columns>,

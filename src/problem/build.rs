@@ -195,7 +195,7 @@ impl Material {
 }
 
 impl Damage {
-    /// Create a damage law by critical stretch or work, without scatter and no-failure sets.
+    /// Create a damage law with α = 0, without scatter, dependence on direction and no-failure sets.
     pub fn new(rule: DamageRule, toughness: Toughness) -> Self {
         Self {
             rule,

@@ -55,8 +55,8 @@ pub struct Condition {
     pub quantity: &'static str,
     /// Span of this key in the deck.
     pub place: Range<usize>,
-    /// Thickness (m) of the layer that carries a traction or pressure, if the deck does not give it. It is
-    /// then the spacing.
+    /// Default thickness (m) of the layer that carries a traction or pressure: the spacing. `None` if the
+    /// deck gives the thickness, and for other quantities.
     pub default_depth: Option<f64>,
     /// The prescribed quantity and its values.
     pub action: Action,

@@ -58,8 +58,8 @@ impl Law {
         Ok(self)
     }
 
-    /// Check that all required keys are given and that the law supports this dimension. Return the first
-    /// fault.
+    /// Return the first fault of the law: a missing key, an invalid combination of values, or a dimension
+    /// that the law does not support. `None` if there is no fault.
     pub fn fault(&self, dimension: Dimension) -> Option<LawFault> {
         for key in self.declaration.keys {
             let required = matches!(key.kind, Kind::Number { .. });

@@ -103,6 +103,7 @@ pub struct Places {
     pub end: Range<usize>,
     /// The time step; the span of the end time if the step is automatic.
     pub step: Range<usize>,
-    /// The first setting of `[time.adaptive]`; the span of the end time without an adaptive step.
+    /// The first table `adaptive` of the run or of its stages; the span of the end time if there is no such
+    /// table.
     pub adaptive: Range<usize>,
 }

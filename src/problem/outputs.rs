@@ -86,7 +86,7 @@ pub struct History {
     pub angular_momentum: bool,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
-    /// Sums and extremes of fields over sets.
+    /// Sums, means and extremes of fields over sets.
     pub statistics: Vec<FieldStatistics>,
     /// Probes: positions; the history contains values of the point nearest to each.
     pub probes: Vec<Probe>,

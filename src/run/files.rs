@@ -71,7 +71,8 @@ impl Files {
     /// Create the folder and lock it until the returned file is dropped. Called on rank 0.
     ///
     /// # Errors
-    /// If the folder cannot be created, its path is not UTF-8, or another run has locked it.
+    /// If the folder or its lock file cannot be created, the path is not UTF-8, or another run has locked
+    /// the folder.
     pub fn lock(&self) -> Result<fs::File> {
         if self.folder.to_str().is_none() {
             return Err(Error::input(format!(
@@ -103,8 +104,8 @@ impl Files {
         }
     }
 
-    /// Rename existing files of a result, so that new ones can be created. Return the new paths. Called on
-    /// rank 0.
+    /// Rename existing files of a result, so that new files can be created. The new names contain `number`,
+    /// the step of the restart. Return the new paths. Called on rank 0.
     ///
     /// # Errors
     /// If a file cannot be renamed.

@@ -41,7 +41,7 @@ pub enum Message {
     SetUp {
         /// The time step, s.
         step: f64,
-        /// Stable step × `safety`, s.
+        /// Stable step of the first stage, with the scaled density of this stage, s.
         stable_step: f64,
         /// Figures and warnings.
         survey: Survey,

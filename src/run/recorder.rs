@@ -142,7 +142,7 @@ impl<'a> Recorder<'a> {
     /// Write the due outputs and history row, and pass the row to `observer`. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn record<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -166,7 +166,7 @@ impl<'a> Recorder<'a> {
     /// Write outputs to all files, and a history row. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write_all<const D: usize>(&mut self, simulation: &mut Simulation<'_, D>) -> Result<()> {
         self.write(simulation, |_| true, true)
     }
@@ -174,7 +174,7 @@ impl<'a> Recorder<'a> {
     /// Write an output to each new file, and a history row if the main file is new. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write_first<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -186,7 +186,7 @@ impl<'a> Recorder<'a> {
     /// Write outputs to the files for which `is_chosen` is true, and with `row` a history row. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     fn write<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -241,7 +241,7 @@ impl<'a> Recorder<'a> {
     /// Write the state of a failed run to the files that have no output at this step. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write_failure<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -254,7 +254,7 @@ impl<'a> Recorder<'a> {
     /// Close all result files. With `will_resume`, unused space in the files is not freed. Collective.
     ///
     /// # Errors
-    /// If the disk is full, or an earlier write failed.
+    /// If this write or an earlier write fails, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let mut files = self.files.into_iter();
         files.try_for_each(|file| file.close(will_resume))
@@ -263,7 +263,7 @@ impl<'a> Recorder<'a> {
     /// Write buffered rows and fsync the results. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn sync(&mut self) -> Result<()> {
         self.write_rows()?;
         let mut files = self.files.iter_mut();

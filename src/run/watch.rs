@@ -146,7 +146,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration. Returns whether a decision is due. `step` is the clock if the iteration has
+    /// Count an iteration. Return whether a decision is due. `step` is the clock if the iteration has
     /// completed a step.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;

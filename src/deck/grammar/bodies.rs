@@ -47,7 +47,8 @@ pub struct Points {
     /// Path of the mesh, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Text>,
-    /// Block number of the rows, or group of the elements, that the body uses; all if not given.
+    /// Block number of the rows, or group of the elements, that the body uses. If not given, all rows or
+    /// elements that belong to no other body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
     /// Names of the columns of a file without a header: coordinates, `volume`, `block`, and any other names.

@@ -165,7 +165,7 @@ pub enum Damage {
     CriticalStretch(Spanned<CriticalStretch>),
     /// A bond breaks permanently when the work done on it reaches a critical value.
     Energy(Spanned<BondEnergy>),
-    /// A bond breaks permanently when the mean stress of its points reaches a strength.
+    /// A bond breaks permanently when the mean of the stress measures of its two points reaches a strength.
     Stress(Spanned<Stress>),
 }
 

@@ -65,7 +65,8 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
-/// Return the error of `wan2019` with anisotropic constants for which C : I is not positive definite.
+/// Return the error of `wan2019` with anisotropic constants for which C : I is not positive definite;
+/// `None` otherwise.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let least = hooke::least_under_dilation(values, dimension)?;
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {

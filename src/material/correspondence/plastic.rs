@@ -1,5 +1,5 @@
-//! J2 plasticity with isotropic hardening, in the strain of each point's family. This file holds small
-//! strains; [`logarithmic`] holds large strains.
+//! J2 plasticity with isotropic hardening, in the strain of each point's family. This file implements small
+//! strains; [`logarithmic`] implements large strains.
 //!
 //! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic strain, E = E_e + E_p. The
 //! stress is S = C : E_e, P = F S.
@@ -79,7 +79,7 @@ const SURFACE: f64 = 1e-12;
 /// of b_e is larger, because it scales with the square of the stretches.
 const LOGARITHMIC_SURFACE: f64 = 1e-9;
 
-/// Return the error in the values of the keys.
+/// Return the error in the values of the keys; `None` if there is no error.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let fault = |key: &Key, message: &str| {
         Some(LawFault {
