@@ -271,7 +271,8 @@ impl Parser<'_> {
         token.error(message)
     }
 
-    /// Return the error for a token after a value inside a parenthesis that does not close it.
+    /// Return the error for a next token that follows a value inside the parenthesis `open`, but does not
+    /// close this parenthesis.
     fn unclosed(&self, open: Token) -> ExpressionError {
         if self.peek().kind == Kind::End {
             return open.error("unbalanced parenthesis: this `(` is never closed");

@@ -12,8 +12,8 @@ impl Table {
     /// Create a table of times (s) and values of the same count.
     ///
     /// # Errors
-    /// If there are fewer than two rows, or the times do not increase. The error holds the row index, from 0,
-    /// and a message.
+    /// If there are fewer than two rows, the counts differ, or the times do not increase. The error holds
+    /// the row index, from 0, and a message.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
         if times.len() < 2 || times.len() != values.len() {
             let message = format!("needs two rows or more, has {}", times.len());

@@ -53,7 +53,7 @@ impl Constants {
         Some(*value)
     }
 
-    /// Number of constants.
+    /// Return the number of constants.
     pub fn count(&self) -> usize {
         self.given.len()
     }

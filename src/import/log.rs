@@ -220,7 +220,8 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note is left out.
+    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note has the
+    /// outcome `LeftOut`.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);

@@ -298,7 +298,8 @@ impl<'a> CollectiveFile<'a> {
     /// be empty.
     ///
     /// # Errors
-    /// If the values are not whole rows within the dataset, or a write fails, for example because the disk is full.
+    /// If the values are not whole rows within the dataset, or a write fails, for example because the disk is
+    /// full.
     pub fn write_rows<T: hdf5::H5Type>(
         &mut self,
         dataset: &Dataset,

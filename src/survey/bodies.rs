@@ -147,7 +147,8 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     found
 }
 
-/// Warning for a body whose points have a volume that differs from its shape or spacing.
+/// Return a warning if the volume of a body's points does not fit the volume of its shape, or the spacing
+/// of its points.
 fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {

@@ -21,7 +21,8 @@ const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 /// Bytes of a bond in a lattice: one bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
-/// Memory of a rank without points, bytes: without a launcher, and with one (which needs MPI buffers).
+/// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which
+/// need MPI buffers.
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 

@@ -33,7 +33,7 @@ pub struct DryRun {
     pub ghosts: f64,
     /// Memory and disk space.
     pub cost: Cost,
-    /// Stable step × `safety`, s.
+    /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
     /// For each stage: first step (s) and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,

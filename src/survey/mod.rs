@@ -126,7 +126,8 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
         .collect()
 }
 
-/// Warn of pairs of bodies that are bonded by default and also have contact.
+/// Warn of pairs of bodies that have contact, and are bonded although the deck has no `[interface.pair]`
+/// for them.
 fn touching_joints(problem: &Problem, joints: &[([usize; 2], u64)], warnings: &mut Vec<Warning>) {
     let Some(contact) = &problem.contact else {
         return;

@@ -224,7 +224,8 @@ impl<'a> ResultFile<'a> {
     /// [`create`](Self::create).
     ///
     /// # Errors
-    /// If the points of the result never change, a field has the wrong length, or a write fails, for example because the disk is full.
+    /// If the points of the result never change, or a field has the wrong length. If a write fails, for
+    /// example because the disk is full.
     pub fn set_points(&mut self, contents: &Contents) -> Result<()> {
         let Contents {
             piece,
@@ -389,7 +390,8 @@ impl<'a> ResultFile<'a> {
     /// next step also flushes the rows to the result file.
     ///
     /// # Errors
-    /// If there is no history, a row has the wrong length, or a write fails, for example because the disk is full.
+    /// If there is no history, or a row has the wrong length. If a write fails, for example because the disk
+    /// is full.
     pub fn append_history(&mut self, rows: &[Vec<f64>]) -> Result<()> {
         match &mut self.history {
             Some(history) => history.append(&mut self.file, rows),
