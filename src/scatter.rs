@@ -22,8 +22,8 @@ pub struct Weibull {
 }
 
 impl Weibull {
-    /// The strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform random
-    /// number u. The probability that it is below x is 1 − exp(−x^m).
+    /// Return the strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform
+    /// random number u. The probability that it is below x is 1 − exp(−x^m).
     pub fn strength(self, id: u64) -> f64 {
         let survival = uniform(self.seed, Scattered::Strength, id);
         libm::pow(-libm::log(survival), 1.0 / self.modulus)

@@ -78,17 +78,17 @@ impl Parser<'_> {
         token
     }
 
-    /// Text of a token.
+    /// Return the text of a token.
     fn text_of(&self, token: Token) -> &str {
         &self.text[token.start..token.end]
     }
 
-    /// Text in a byte range, trimmed.
+    /// Return the text in a byte range, trimmed.
     fn trimmed(&self, start: usize, end: usize) -> &str {
         self.text[start..end].trim()
     }
 
-    /// Byte index after the last consumed token.
+    /// Return the byte index after the last consumed token.
     fn end_of_last(&self) -> usize {
         self.next
             .checked_sub(1)

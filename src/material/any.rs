@@ -103,7 +103,7 @@ impl AnyLaw {
         with_law!(self, law => law.described())
     }
 
-    /// Whether the law is [linear](Law::LINEAR).
+    /// Test whether the law is [linear](Law::LINEAR).
     pub fn is_linear<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::LINEAR
@@ -111,7 +111,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Whether the law defines [`Law::bond_stress_across`].
+    /// Test whether the law defines [`Law::bond_stress_across`].
     pub fn has_bond_stress_across<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::HAS_BOND_STRESS_ACROSS
@@ -119,7 +119,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Whether the law defines [`Law::lost_stiffness`].
+    /// Test whether the law defines [`Law::lost_stiffness`].
     pub fn softens<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::SOFTENS

@@ -80,12 +80,12 @@ impl Declaration {
         }
     }
 
-    /// Whether the law breaks bonds without a damage law.
+    /// Test whether the law breaks bonds without a damage law.
     pub fn breaks_by_itself(&self) -> bool {
         self.own_critical_stretch.is_some()
     }
 
-    /// Whether the law exists in this dimension, with the defaults of its keys.
+    /// Test whether the law exists in this dimension, with the defaults of its keys.
     pub fn is_for(&self, dimension: Dimension) -> bool {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }
@@ -194,7 +194,7 @@ pub struct Word {
 }
 
 impl Word {
-    /// A word that every dimension supports.
+    /// Return a word that every dimension supports.
     pub const fn new(word: &'static str) -> Self {
         let no_line = None;
         Self { word, no_line }
@@ -235,7 +235,7 @@ impl From<&str> for Value {
 pub struct Values(Vec<(&'static str, Option<Value>)>);
 
 impl Values {
-    /// The defaults of these keys.
+    /// Return the defaults of these keys.
     pub fn defaults(keys: &[Key]) -> Self {
         let default = |key: &Key| match &key.kind {
             Kind::Number { default, .. } => default.map(Value::Number),
@@ -319,7 +319,7 @@ pub struct Built {
 }
 
 impl Built {
-    /// A law without influence function.
+    /// Return a law without influence function.
     pub fn plain(law: impl Into<AnyLaw>) -> Self {
         Self {
             law: law.into(),
@@ -327,7 +327,7 @@ impl Built {
         }
     }
 
-    /// A law with an influence function of the bond's length (m).
+    /// Return a law with an influence function of the bond's length (m).
     pub fn with_influence(
         law: impl Into<AnyLaw>,
         influence: impl Fn(f64) -> f64 + Sync + 'static,

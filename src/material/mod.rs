@@ -215,13 +215,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Counts::of::<Self, D>()
     }
 
-    /// Whether points store a [`PlasticState`].
+    /// Test whether points store a [`PlasticState`].
     fn has_plasticity(&self) -> bool {
         false
     }
 
-    /// Whether a pass reads the bond history after the step. Otherwise the pass reads the history before the
-    /// step.
+    /// Test whether a pass reads the bond history after the step. Otherwise the pass reads the history before
+    /// the step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
@@ -342,13 +342,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Whether points need enough bonds in all directions, compared with their family before pre-cracks.
+    /// Test whether points need enough bonds in all directions, compared with their family before pre-cracks.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Whether a point carries no force, because its intact bonds are too few for the law, or because the law
-    /// has no stress at its deformation.
+    /// Test whether a point carries no force, because its intact bonds are too few for the law, or because
+    /// the law has no stress at its deformation.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
@@ -371,8 +371,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Ṽ. For bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
 
-    /// Whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k |η|²
-    /// Ṽ.
+    /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k
+    /// |η|² Ṽ.
     fn resists_across(&self) -> bool {
         false
     }

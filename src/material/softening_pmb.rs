@@ -527,7 +527,7 @@ impl<const D: usize> Law<D> for SofteningPmb {
         squares * bond.length * (0.25 * self.elastic.micromodulus)
     }
 
-    /// Work of loading to κ, minus the work that unloading returns.
+    /// Return the work of loading to κ, minus the work that unloading returns.
     #[inline(always)]
     fn dissipated(&self, length: Lanes, [largest]: &[Lanes; 1]) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {

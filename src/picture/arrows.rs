@@ -19,12 +19,12 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Largest length of a vector in the picture; the longest arrow has this length. `None` for the largest
-    /// length of the drawn points.
+    /// Length of the vector that the longest arrow stands for, measured in the picture. `None` for the
+    /// longest vector of the drawn points.
     pub longest: Option<f64>,
 }
 
-/// Length of the longest arrow, in text sizes. Arrows are at least this far apart.
+/// Length of the longest arrow, in text sizes. The middles of arrows are at least this far apart.
 const LONGEST_ARROW: f64 = 2.4;
 
 /// Edge of the cells of the picture with one arrow each, in text sizes.
@@ -38,7 +38,7 @@ const HEAD: [f64; 2] = [0.5, 0.2];
 
 const WHITE: Colour = [255; 3];
 
-/// Draw arrows in the middle of which are the points, and the legend.
+/// Draw arrows whose middles are at the points, and the legend.
 ///
 /// The length of an arrow is proportional to the projection of the vector. Only some points have arrows, so
 /// that arrows do not overlap.

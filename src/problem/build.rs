@@ -161,7 +161,7 @@ impl Problem {
 }
 
 impl Action {
-    /// The deck's key for this condition. A traction or pressure is stored as a body force.
+    /// Return the deck's key for this condition. A traction or pressure is stored as a body force.
     fn quantity(&self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",
@@ -174,7 +174,7 @@ impl Action {
 }
 
 impl Problem {
-    /// Whether any bonds can break.
+    /// Test whether any bonds can break.
     pub fn has_damage(&self) -> bool {
         self.bodies.iter().any(Body::can_break)
             || (self.interface.pairs.iter()).any(|pair| pair.own_damage().is_some())

@@ -24,7 +24,7 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// Whether the initial values include displacements.
+    /// Test whether the initial values include displacements.
     pub fn displaces(&self) -> bool {
         let by_file = |file: &InitialFile| file.columns.has_displacement();
         self.displacement.is_some() || self.file.as_ref().is_some_and(by_file)
@@ -78,12 +78,12 @@ pub enum Action {
 }
 
 impl Action {
-    /// Whether the condition adds forces.
+    /// Test whether the condition adds forces.
     pub fn is_load(&self) -> bool {
         matches!(self, Self::BodyForce(..) | Self::Force(_))
     }
 
-    /// Whether the condition prescribes displacement or velocity.
+    /// Test whether the condition prescribes displacement or velocity.
     pub fn is_support(&self) -> bool {
         matches!(self, Self::Displacement(_) | Self::Velocity(_))
     }

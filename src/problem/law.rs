@@ -89,7 +89,7 @@ impl Law {
         })
     }
 
-    /// Reason why bodies of this law cannot have this damage; `None` if they can.
+    /// Return the reason why bodies of this law cannot have this damage; `None` if they can.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
@@ -179,7 +179,7 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     }
 }
 
-/// Description of the values that a key allows, for error messages.
+/// Return the description of the values that a key allows, for error messages.
 pub fn wanted(key: &Key) -> String {
     match &key.kind {
         Kind::Number { .. } | Kind::Optional { .. } | Kind::OfLength => {
@@ -196,7 +196,7 @@ fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     format!("unknown name `{name}`{}", suggestion(name, known))
 }
 
-/// Names of laws in backticks, such as `a`, `b` and `c`. `and` is the last conjunction.
+/// Format names of laws in backticks, such as `a`, `b` and `c`. `and` is the last conjunction.
 pub fn names(laws: impl IntoIterator<Item = &'static Declaration>, and: &str) -> String {
     listed(laws.into_iter().map(|law| format!("`{}`", law.name)), and)
 }

@@ -25,7 +25,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// The files of a run in a folder.
+    /// Return the files of a run in a folder.
     pub fn new(problem: &Problem, folder: PathBuf) -> Self {
         let further = problem.further_outputs.iter();
         Self {
@@ -38,7 +38,7 @@ impl Files {
         }
     }
 
-    /// The results, the main one first.
+    /// Return the results, the main one first.
     pub fn results(&self) -> impl Iterator<Item = &Path> {
         let all = [&self.result].into_iter().chain(&self.further);
         all.map(PathBuf::as_path)
@@ -135,7 +135,7 @@ impl Files {
     }
 }
 
-/// Path of the result of an output; of the main result if `name` is `None`.
+/// Return the path of the result of an output; of the main result if `name` is `None`.
 fn result_of(folder: &Path, name: Option<&str>) -> PathBuf {
     match name {
         None => folder.join("result.vtkhdf"),

@@ -564,7 +564,7 @@ impl<'a> Job<'a> {
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Attributes of the result that describe its origin: deck, version and settings of the run.
+    /// Return the attributes of the result that describe its origin: deck, version and settings of the run.
     fn metadata<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -107,7 +107,7 @@ impl<'a> OutputFile<'a> {
         Ok(())
     }
 
-    /// Whether the output contains a field that needs the energies of the bonds.
+    /// Test whether the output contains a field that needs the energies of the bonds.
     pub fn has_energies(&self) -> bool {
         self.output.fields.contains(&Field::StrainEnergyDensity)
     }

@@ -95,7 +95,7 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// The main result.
+    /// Return the main result.
     pub fn main(&self) -> &ResultFile<'a> {
         &self.files[0].file
     }
@@ -111,8 +111,8 @@ impl<'a> Recorder<'a> {
         outputs.map(result).collect()
     }
 
-    /// Causes of non-collective writes to any result, as bits defined by HDF5; 0 if all writes were
-    /// collective.
+    /// Return the causes of non-collective writes to any result, as bits defined by HDF5; 0 if all writes
+    /// were collective.
     pub fn no_collective_cause(&self) -> u32 {
         let causes = self
             .files
@@ -232,7 +232,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The row of the history at the current step; `None` if no row was due.
+    /// Return the row of the history at the current step; `None` if no row was due.
     pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
         let is_now = |row: &&HistoryRow| row.number == clock.number();
         self.last_row.as_ref().filter(is_now)
@@ -347,10 +347,10 @@ pub enum Continuation {
     New(Option<String>),
 }
 
-/// Reason why the result file of an output cannot be continued; `None` if it can. The file may be missing or
-/// damaged, or have other points, fields or columns. `outputs` is the number of outputs that the checkpoint
-/// counts. For the main result, `history` has the observer, the number of rows, and the changes of the column
-/// definitions. Collective.
+/// Return the reason why the result file of an output cannot be continued; `None` if it can. The file may be
+/// missing or damaged, or have other points, fields or columns. `outputs` is the number of outputs that the
+/// checkpoint counts. For the main result, `history` has the observer, the number of rows, and the changes of
+/// the column definitions. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

@@ -60,12 +60,12 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Whether a stop was requested.
+    /// Test whether a stop was requested.
     pub(super) fn stop(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Whether a checkpoint was requested since the last call.
+    /// Test whether a checkpoint was requested since the last call.
     pub(super) fn take_request(&self) -> bool {
         self.request.swap(false, Ordering::Relaxed)
     }

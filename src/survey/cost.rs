@@ -144,12 +144,13 @@ impl Cost {
         cost(problem, counts, clock)
     }
 
-    /// Size of all results at the end, bytes.
+    /// Return the size of all results at the end, bytes.
     pub fn all_results(&self) -> f64 {
         self.results.iter().map(|result| result.bytes).sum()
     }
 
-    /// Peak memory of one of `ranks` ranks, bytes. `ghosts` is the number of ghosts per owned point.
+    /// Return the peak memory of one of `ranks` ranks, bytes. `ghosts` is the number of ghosts per owned
+    /// point.
     pub fn memory_of_a_rank(&self, ranks: u32, ghosts: f64) -> f64 {
         let several = usize::from(ranks > 1);
         let points = self.set_up.max(self.time_loop[several]) / f64::from(ranks);
@@ -157,7 +158,7 @@ impl Cost {
     }
 }
 
-/// Bytes of history per bond of a body; each bond stores the history for both ends.
+/// Return the bytes of history per bond of a body; each bond stores the history for both ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {

@@ -220,7 +220,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// The `safety` factors of the explicit stages with an automatic step.
+/// Return the `safety` factors of the explicit stages with an automatic step.
 fn safeties(problem: &Problem) -> Vec<f64> {
     let moving = problem
         .all_stages()
@@ -233,8 +233,8 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     moving.filter_map(safety).collect()
 }
 
-/// Stiffness of a family with bonds stretched by s, divided by the stiffness that the stable step assumes. A
-/// stretched bond resists rotation with s/(1 + s) of its stiffness.
+/// Return the stiffness of a family with bonds stretched by s, divided by the stiffness that the stable step
+/// assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }

@@ -85,7 +85,8 @@ pub fn size(problem: &Problem) -> Result<Size> {
     Ok(size)
 }
 
-/// Mean number of neighbours that a point of a body has on the lattices of all bodies, from sampled points.
+/// Return the mean number of neighbours that a point of a body has on the lattices of all bodies, from
+/// sampled points.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
@@ -119,7 +120,7 @@ struct Rows {
     output_points: Vec<f64>,
 }
 
-/// Figures of the bodies whose points come from files or meshes, by body.
+/// Return the figures of the bodies whose points come from files or meshes, by body.
 fn from_files(problem: &Problem) -> Vec<Rows> {
     let none = Rows {
         output_points: vec![0.0; 1 + problem.further_outputs.len()],
@@ -156,7 +157,7 @@ fn from_files(problem: &Problem) -> Vec<Rows> {
     rows
 }
 
-/// Volume of a complete family of a body, m³.
+/// Return the volume of a complete family of a body, m³.
 fn family_volume(problem: &Problem, body: usize) -> f64 {
     let horizon = problem.bodies[body].horizon;
     match problem.dimension {

@@ -263,7 +263,7 @@ fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     (all.eigenvalues[softest], parts.join(", "))
 }
 
-/// Indices of the components of Hooke's matrix that a dimension uses.
+/// Return the indices of the components of Hooke's matrix that a dimension uses.
 fn used(dimension: Dimension) -> Vec<usize> {
     match dimension {
         Dimension::Space => (0..6).collect(),
@@ -433,7 +433,7 @@ impl Hooke {
     }
 }
 
-/// Indices in Voigt's order of the components in `D` dimensions.
+/// Return the indices in Voigt's order of the components in `D` dimensions.
 fn components<const D: usize>() -> impl Iterator<Item = usize> {
     const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
     let used: &[usize] = match D {
@@ -444,7 +444,7 @@ fn components<const D: usize>() -> impl Iterator<Item = usize> {
     used.iter().copied()
 }
 
-/// Index of a component in Voigt's order.
+/// Return the index of a component in Voigt's order.
 fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }

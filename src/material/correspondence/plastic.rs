@@ -139,7 +139,7 @@ impl Plastic {
         })
     }
 
-    /// Properties for display.
+    /// Return the properties for display.
     pub fn described(&self) -> [(&'static str, Property); 3] {
         let strain = if self.is_logarithmic {
             "logarithmic"
@@ -348,7 +348,7 @@ mod tests {
         Plastic::of(&given(dimension, &values)).unwrap()
     }
 
-    /// Displacement gradients of a random walk, with some large steps.
+    /// Generate displacement gradients of a random walk, with some large steps.
     fn walk<const D: usize>() -> impl Iterator<Item = SMatrix<f64, D, D>> {
         let mut number = 0.0_f64;
         let mut place = SMatrix::<f64, D, D>::zeros();
