@@ -91,7 +91,7 @@ impl Dimension {
         )
     }
 
-    /// Name of the dimension and its condition, for messages.
+    /// Return the name of the dimension and its condition, for messages.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};
         match self {

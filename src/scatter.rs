@@ -57,9 +57,9 @@ mod tests {
 
     const COUNT: u64 = 20_000;
 
-    /// Bound on the largest difference between the empirical distribution function of `count` values and the
-    /// true one. One in a million samples exceeds the bound (Dvoretzky, Kiefer & Wolfowitz, with Massart's
-    /// constant).
+    /// Return the bound on the largest difference between the empirical distribution function of `count`
+    /// values and the true one. One in a million samples exceeds the bound (Dvoretzky, Kiefer & Wolfowitz,
+    /// with Massart's constant).
     fn bound(count: u64) -> f64 {
         (libm::log(2e6) / (2.0 * count as f64)).sqrt()
     }

@@ -77,7 +77,7 @@ pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 pub struct Losses {
     /// Lines of initial values, loads and supports.
     pub conditions: Vec<usize>,
-    /// Lines of damage models that blocks use.
+    /// Lines of damage models that blocks use, or of their criteria.
     pub damages: Vec<usize>,
     /// Lines of unknown values of `Omit Bonds Between Blocks`.
     pub bonds: Vec<usize>,

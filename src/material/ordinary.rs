@@ -76,7 +76,7 @@ impl Ordinary {
         0.5 * self.volumetric * dilatation.powi(2)
     }
 
-    /// Number of dimensions d.
+    /// Return the number of dimensions d.
     pub fn dimension(&self) -> f64 {
         self.dimension
     }

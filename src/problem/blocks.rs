@@ -60,14 +60,14 @@ impl<'a> Block<'a> {
 }
 
 impl Problem {
-    /// Number of blocks.
+    /// Return the number of blocks.
     pub fn block_count(&self) -> usize {
         let levels = self.refinement.as_ref().map(|refinement| refinement.levels);
         let parts = levels.map_or(1, |finest| KINDS * (finest as usize + 1));
         parts * self.bodies.len()
     }
 
-    /// Number of the block with this body, level and kind.
+    /// Return the number of the block with this body, level and kind.
     pub fn block_number(&self, body: usize, level: u32, kind: Kind) -> usize {
         body + self.bodies.len() * (KINDS * level as usize + kind as usize)
     }

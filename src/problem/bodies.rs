@@ -96,7 +96,7 @@ pub enum Quadrature {
 }
 
 impl Quadrature {
-    /// Number of points in a cell of this dimension.
+    /// Return the number of points in a cell of this dimension.
     pub fn points(self, dimension: usize) -> u32 {
         match self {
             Self::Midpoint => 1,

@@ -138,7 +138,8 @@ impl Law {
         ))
     }
 
-    /// Name of the key whose value is an expression of the bond's length; `None` if no key has such a value.
+    /// Return the name of the key whose value is an expression of the bond's length; `None` if no key has
+    /// such a value.
     pub fn key_of_length(&self) -> Option<&'static str> {
         let mut names = self.declaration.keys.iter().map(|key| key.name);
         names.find(|name| self.values.of_length(name).is_some())

@@ -298,7 +298,7 @@ impl Field {
         Self::Rank,
     ];
 
-    /// Name of the field in decks and results.
+    /// Return the name of the field in decks and results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Displacement => "displacement",
@@ -351,8 +351,8 @@ impl Field {
         }
     }
 
-    /// Number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for other
-    /// tensors. Vectors and tensors are padded in 1-D and 2-D.
+    /// Return the number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for
+    /// other tensors. Vectors and tensors are padded in 1-D and 2-D.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement

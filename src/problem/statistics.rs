@@ -38,7 +38,7 @@ pub enum Statistic {
 }
 
 impl Statistic {
-    /// Name in decks and columns.
+    /// Return the name in decks and columns.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sum => "sum",

@@ -84,7 +84,7 @@ pub struct Static {
 }
 
 impl Method {
-    /// Name in decks.
+    /// Return the name in decks.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Explicit => "explicit",
@@ -103,7 +103,7 @@ impl Method {
         }
     }
 
-    /// Number of load steps; `None` for the explicit method.
+    /// Return the number of load steps; `None` for the explicit method.
     pub fn load_steps(&self) -> Option<u64> {
         match self {
             Self::Explicit => None,

@@ -119,13 +119,13 @@ pub enum Message {
 /// # }
 /// ```
 pub trait RunState {
-    /// Number of the step reached.
+    /// Return the number of the step reached.
     fn number(&self) -> u64;
 
-    /// Number of the last step.
+    /// Return the number of the last step.
     fn last(&self) -> u64;
 
-    /// Time reached, s.
+    /// Return the time reached, s.
     fn time(&self) -> f64;
 
     /// Return the length of a step, s.
@@ -281,7 +281,7 @@ impl Row<'_> {
         self.row.energies
     }
 
-    /// Number of bonds broken since the start.
+    /// Return the number of bonds broken since the start.
     pub fn broken_bonds(&self) -> u64 {
         self.row.broken
     }

@@ -100,7 +100,7 @@ impl<'a> Recorder<'a> {
         &self.files[0].file
     }
 
-    /// Name and number of outputs of each further result, for a checkpoint.
+    /// Return the name and number of outputs of each further result, for a checkpoint.
     pub fn further<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<FurtherResult> {
         let problem = simulation.problem;
         let outputs = problem.further_outputs.iter().zip(&self.files[1..]);

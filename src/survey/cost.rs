@@ -185,8 +185,8 @@ fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measure
     Measured { peak, resident }
 }
 
-/// Number of ghosts per owned point of a rank, for a box with these edges (m). Cuts between ranks are
-/// perpendicular to the longest edges.
+/// Return the number of ghosts per owned point of a rank, for a box with these edges (m). Cuts between ranks
+/// are perpendicular to the longest edges.
 pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     let mut parts = vec![1_u32; edges.len()];
     let (mut remaining, mut factor) = (ranks, 2);
@@ -207,7 +207,7 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Number of values per point in a checkpoint.
+/// Return the number of values per point in a checkpoint.
 fn saved_width(problem: &Problem) -> usize {
     fn width<const D: usize>(problem: &Problem) -> usize {
         let mut blocks = problem.blocks();

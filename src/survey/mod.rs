@@ -110,7 +110,7 @@ impl Survey {
     }
 }
 
-/// Number of bonds of each pair of different bodies, over all ranks.
+/// Return the number of bonds of each pair of different bodies, over all ranks.
 fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
     let count = simulation.problem.bodies.len();
     let mut bonds = vec![0; count * count];
@@ -273,7 +273,7 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Number of points of each set, with warnings of sets by position that have very few points.
+/// Return the number of points of each set, with warnings of sets by position that have very few points.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

@@ -27,12 +27,12 @@ pub struct Size {
 }
 
 impl Size {
-    /// Number of all points.
+    /// Return the number of all points.
     pub fn all_points(&self) -> f64 {
         self.points.iter().sum()
     }
 
-    /// Number of bonds, counted at both ends.
+    /// Return the number of bonds, counted at both ends.
     pub fn directed_bonds(&self) -> f64 {
         self.bonds.iter().sum()
     }
@@ -179,8 +179,8 @@ fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f
     })
 }
 
-/// Number of points in the result of an output, from sampled points of each body. `number` is the index of
-/// the output, and `set` is its set.
+/// Return the number of points in the result of an output, from sampled points of each body. `number` is the
+/// index of the output, and `set` is its set.
 fn output_points(
     problem: &Problem,
     (number, set): (usize, Option<usize>),

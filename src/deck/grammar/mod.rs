@@ -69,7 +69,7 @@ pub struct Deck {
     pub table: Tables<Table>,
     /// Spacing and horizon.
     pub grid: Spanned<Grid>,
-    /// The bonds between blocks.
+    /// Bonds between bodies.
     #[serde(default)]
     pub interface: Interface,
     /// Contact between points that no bond joins; none if not given.

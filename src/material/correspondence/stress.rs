@@ -60,7 +60,7 @@ impl Stress {
         }
     }
 
-    /// Name for display.
+    /// Return the name for display.
     pub fn name(&self) -> &'static str {
         match self {
             Self::StVenantKirchhoff(_) => "St. Venant–Kirchhoff",
