@@ -25,7 +25,8 @@ pub struct Isotropic {
 }
 
 impl Isotropic {
-    /// Compute both from two different constants in any order; `None` if no stable solid has these values.
+    /// Compute the solid from two different constants in any order; `None` if no stable solid has these
+    /// values.
     pub fn from_two(a: (Constant, f64), b: (Constant, f64)) -> Option<Self> {
         use Constant::{Bulk, Lame, Poisson, Shear, Young};
         let order = |constant| match constant {

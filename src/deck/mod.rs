@@ -42,7 +42,7 @@ use crate::error::{Error, Result, Warning};
 use crate::problem::Problem;
 use resolve::Scope;
 
-/// The commented deck that `fissure init` writes.
+/// The commented deck that `fissure init` writes by default.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
 /// A deck whose text follows the grammar, not yet validated.

@@ -208,7 +208,8 @@ mod tests {
                     assert!(x.hypot(y) > 23.9, "{spacing}");
                 }
             }
-            // At least a quarter of the cells have an arrow, and all of far points.
+            // At least a quarter of the cells have an arrow. If the points are farther apart than a cell,
+            // all points have one.
             let cells = (99.0 * spacing / 30.0).powi(2).min(10_000.0);
             assert!(kept.len() as f64 > cells / 4.0, "{spacing}: {}", kept.len());
             assert_eq!(kept.len() == 10_000, spacing > 30.0);

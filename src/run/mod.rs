@@ -109,7 +109,7 @@ pub fn start_mpi() -> Result<World> {
 /// - a signal stopped the run before the first step;
 /// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
-/// - the disk is full;
+/// - a file cannot be read or written;
 /// - the motion of a point or rigid body is not finite;
 /// - a load step has no equilibrium;
 /// - the energy grows without limit;

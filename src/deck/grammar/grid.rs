@@ -87,14 +87,14 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// The bonds between blocks.
+/// Bonds between bodies.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interface {
-    /// Constants of the bonds between blocks. `"own"`: each end exerts its half of the force with its own
+    /// Constants of the bonds between bodies. `"own"`: each end exerts its half of the force with its own
     /// modulus and horizon. `"average"` and `"minimum"`: both ends use the mean or the smaller modulus and
-    /// horizon. `"none"`: blocks are not bonded, whatever their distance. The default is `"own"`, or `"none"`
-    /// with `[contact]`.
+    /// horizon. `"none"`: bodies are not bonded, whatever their distance. The default is `"own"`, or
+    /// `"none"` with `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
     /// Pairs of bodies with their own rule or damage law, by a freely chosen name.
@@ -122,7 +122,7 @@ pub struct Pair {
     pub strength: Option<Number>,
 }
 
-/// Constants of the bonds between blocks.
+/// Constants of the bonds between bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
