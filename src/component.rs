@@ -28,7 +28,7 @@ pub enum Component {
     Determinant,
 }
 
-/// Names of the components of a field with this number of values per point; empty for a scalar.
+/// Return the names of the components of a field with this number of values per point; empty for a scalar.
 pub fn names(components: usize) -> &'static [&'static str] {
     match components {
         2 => &AXES[..2],
@@ -39,8 +39,8 @@ pub fn names(components: usize) -> &'static [&'static str] {
     }
 }
 
-/// Index and name of each component that a field has in a problem of this dimension. A scalar has one
-/// component, without a name. Stress and strain have three normal components in any dimension.
+/// Return the index and name of each component that a field has in a problem of this dimension. A scalar has
+/// one component, without a name. Stress and strain have three normal components in any dimension.
 pub fn entries(
     components: usize,
     dimension: usize,
@@ -57,7 +57,7 @@ pub fn entries(
     all.iter().copied().enumerate().filter(is_there)
 }
 
-/// Names of the invariants of a field with this number of values per point.
+/// Return the names of the invariants of a field with this number of values per point.
 pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
     match components {
         2 | 3 => &[("magnitude", Component::Magnitude)],
@@ -113,7 +113,7 @@ impl Component {
     }
 }
 
-/// The six stored components of a symmetric tensor, in the order of [`SYMMETRIC`].
+/// Return the six stored components of a symmetric tensor, in the order of [`SYMMETRIC`].
 fn six(values: &[f64]) -> [f64; 6] {
     std::array::from_fn(|k| values[k])
 }

@@ -34,7 +34,7 @@ pub enum Constraint {
 }
 
 impl Dimension {
-    /// 1, 2 or 3.
+    /// Return the number of dimensions: 1, 2 or 3.
     pub fn count(self) -> usize {
         match self {
             Self::Line { .. } => 1,
@@ -43,7 +43,8 @@ impl Dimension {
         }
     }
 
-    /// Factor that converts a length, area or volume to a volume: cross-section (m²), thickness (m) or 1.
+    /// Return the factor that converts a length, area or volume to a volume: cross-section (m²), thickness
+    /// (m) or 1.
     pub fn out_of_plane_measure(self) -> f64 {
         match self {
             Self::Line { cross_section, .. } => cross_section,
@@ -52,13 +53,13 @@ impl Dimension {
         }
     }
 
-    /// Edge (m) of the line, square or cube with this volume (m³).
+    /// Return the edge (m) of the line, square or cube with this volume (m³).
     pub fn edge(self, volume: f64) -> f64 {
         let extent = volume / self.out_of_plane_measure();
         libm::pow(extent, 1.0 / self.count() as f64)
     }
 
-    /// Poisson's ratio of bond-based laws, where they have a fixed one.
+    /// Return Poisson's ratio of bond-based laws, where they have a fixed one.
     pub fn bond_based_poisson_ratio(self) -> f64 {
         match self {
             Self::PlaneStress { .. } => 1.0 / 3.0,
@@ -66,8 +67,8 @@ impl Dimension {
         }
     }
 
-    /// Whether bond-based laws allow any Poisson's ratio. This is true for a bar in uniaxial stress, whose
-    /// stiffness is E.
+    /// Test whether bond-based laws allow any Poisson's ratio. This is true for a bar in uniaxial stress,
+    /// whose stiffness is E.
     pub fn allows_any_poisson_ratio(self) -> bool {
         matches!(
             self,
@@ -78,7 +79,7 @@ impl Dimension {
         )
     }
 
-    /// Whether the strain perpendicular to the plane or bar is 0.
+    /// Test whether the strain perpendicular to the plane or bar is 0.
     pub fn is_confined(self) -> bool {
         matches!(
             self,
@@ -90,7 +91,7 @@ impl Dimension {
         )
     }
 
-    /// Name of the dimension and its condition, for messages.
+    /// Return the name of the dimension and its condition, for messages.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};
         match self {
@@ -104,7 +105,7 @@ impl Dimension {
         }
     }
 
-    /// Description of the condition perpendicular to a bar; `None` in 2-D and 3-D.
+    /// Return the description of the condition perpendicular to a bar; `None` in 2-D and 3-D.
     pub fn constraint(self) -> Option<&'static str> {
         match self {
             Self::Line { constraint, .. } => Some(match constraint {

@@ -25,7 +25,8 @@ pub struct Isotropic {
 }
 
 impl Isotropic {
-    /// Compute both from two different constants in any order; `None` if no stable solid has these values.
+    /// Compute the solid from two different constants in any order; `None` if no stable solid has these
+    /// values.
     pub fn from_two(a: (Constant, f64), b: (Constant, f64)) -> Option<Self> {
         use Constant::{Bulk, Lame, Poisson, Shear, Young};
         let order = |constant| match constant {
@@ -68,17 +69,17 @@ impl Isotropic {
         (stable && longitudinal.is_finite()).then_some(solid)
     }
 
-    /// Bulk modulus K = E / (3 (1 − 2ν)), Pa.
+    /// Return the bulk modulus K = E / (3 (1 − 2ν)), Pa.
     pub fn bulk_modulus(&self) -> f64 {
         self.youngs_modulus / (3.0 * (1.0 - 2.0 * self.poisson_ratio))
     }
 
-    /// Shear modulus G = E / (2 (1 + ν)), Pa.
+    /// Return the shear modulus G = E / (2 (1 + ν)), Pa.
     pub fn shear_modulus(&self) -> f64 {
         self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// Lamé's first parameter λ = K − 2G/3, Pa.
+    /// Return Lamé's first parameter λ = K − 2G/3, Pa.
     pub fn lame_lambda(&self) -> f64 {
         self.bulk_modulus() - 2.0 * self.shear_modulus() / 3.0
     }

@@ -13,8 +13,8 @@ pub enum ErrorKind {
     Input,
     /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
     Run,
-    /// A signal has stopped the run before its first step: exit code 75, which `sysexits.h` defines as "try
-    /// again".
+    /// A signal has stopped a run before its first step, or a sweep: exit code 75, which `sysexits.h`
+    /// defines as "try again".
     Stopped,
 }
 
@@ -44,8 +44,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// Format a user's text for a message: in backticks, without control characters, at most `EXCERPT`
-/// characters.
+/// Format a user's text for a message: in backticks, with escaped control characters, at most `EXCERPT`
+/// characters of the text.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {
@@ -80,7 +80,7 @@ impl Error {
         Self::new(ErrorKind::Run, message)
     }
 
-    /// Create an error for a run that a signal has stopped before its first step.
+    /// Create an error for a run that a signal has stopped before its first step, or for a stopped sweep.
     pub fn stopped(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Stopped, message)
     }
@@ -93,13 +93,13 @@ impl Error {
         }
     }
 
-    /// Whether a signal has stopped the run, which is not a failure.
+    /// Test whether a signal has stopped the run, which is not a failure.
     pub fn is_stop(&self) -> bool {
         self.kind == ErrorKind::Stopped
     }
 
-    /// The process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments, 75 for a run
-    /// that can be started again.
+    /// Return the process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments, 75 for a
+    /// run that can be started again.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Run => 1,

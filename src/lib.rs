@@ -27,7 +27,7 @@ pub mod survey;
 
 pub use run::run;
 
-/// Version and, in a release build from a checkout, commit.
+/// Return the version and, in a release build from a checkout, the commit.
 pub fn version() -> String {
     match option_env!("FISSURE_COMMIT") {
         Some(commit) => format!("{} (commit {commit})", env!("CARGO_PKG_VERSION")),

@@ -30,7 +30,7 @@ pub fn check_room(needed: u64) -> Result<(), Shortage> {
     Ok(())
 }
 
-/// Available memory, bytes: the minimum over address-space limit (`ulimit -v`), control group and
+/// Return the available memory, bytes: the minimum over address-space limit (`ulimit -v`), control group and
 /// machine; `u64::MAX` on systems that report none of them.
 fn available() -> u64 {
     let limits = [address_space(), control_group(), machine()];
@@ -51,7 +51,7 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Memory left in the control group (version 2), bytes.
+/// Return the memory left in the control group (version 2), bytes.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::"))?;
@@ -80,7 +80,7 @@ fn kibibytes(path: &str, name: &str) -> Option<u64> {
     entry(&fs::read_to_string(path).ok()?, name).map(|kibibytes| 1024 * kibibytes)
 }
 
-/// The number after `name` at the start of a line.
+/// Return the number after `name` at the start of a line.
 fn entry(text: &str, name: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()

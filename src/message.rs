@@ -12,7 +12,7 @@ pub fn format_number(value: f64) -> String {
     }
 }
 
-/// The entry of `known` that resembles `name` most; `None` if none is similar.
+/// Return the entry of `known` that resembles `name` most; `None` if none is similar.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
@@ -26,7 +26,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Suggestion for an error on an unknown name: `; did you mean …? (known: …)`.
+/// Return the suggestion for an error on an unknown name: `; did you mean …? (known: …)`.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let mean = nearest(name, known.iter().copied())

@@ -22,8 +22,8 @@ pub struct Weibull {
 }
 
 impl Weibull {
-    /// The strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform random
-    /// number u. The probability that it is below x is 1 − exp(−x^m).
+    /// Return the strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform
+    /// random number u. The probability that it is below x is 1 − exp(−x^m).
     pub fn strength(self, id: u64) -> f64 {
         let survival = uniform(self.seed, Scattered::Strength, id);
         libm::pow(-libm::log(survival), 1.0 / self.modulus)
@@ -57,9 +57,9 @@ mod tests {
 
     const COUNT: u64 = 20_000;
 
-    /// Bound on the largest difference between the empirical distribution function of `count` values and the
-    /// true one. One in a million samples exceeds the bound (Dvoretzky, Kiefer & Wolfowitz, with Massart's
-    /// constant).
+    /// Return the bound on the largest difference between the empirical distribution function of `count`
+    /// values and the true one. One in a million samples exceeds the bound (Dvoretzky, Kiefer & Wolfowitz,
+    /// with Massart's constant).
     fn bound(count: u64) -> f64 {
         (libm::log(2e6) / (2.0 * count as f64)).sqrt()
     }

@@ -53,7 +53,7 @@ enum From {
 /// Translate a deck and write the new one.
 ///
 /// # Errors
-/// If the deck cannot be translated, or the new one exists or cannot be written.
+/// If the deck cannot be translated, or the new one exists, has the same path or cannot be written.
 pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let target = arguments.output.clone();
     let target = target.unwrap_or_else(|| default_target(&arguments.deck));

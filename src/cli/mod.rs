@@ -340,7 +340,7 @@ pub fn main() -> ExitCode {
 /// Run `work` on all decks, even after an error. Print all errors except the last one, which is returned.
 ///
 /// # Errors
-/// Returns the last error of `work`.
+/// The last error of `work`.
 fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<()> {
     let mut latest = Ok(());
     for deck in decks {

@@ -54,7 +54,8 @@ pub struct MovieArguments {
 /// Draw the film of a result.
 ///
 /// # Errors
-/// If the file is not a result, the field or component is missing, or a file cannot be written.
+/// If the file is not a result, an argument is wrong, the field or component is missing, or a file cannot
+/// be written.
 pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     let file = result_file(&arguments.result);
     let result = ResultReader::open(&file)?;

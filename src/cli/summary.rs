@@ -1,4 +1,4 @@
-//! Printed figures of a completed run.
+//! Printed figures of a run.
 
 use crate::cli::outln;
 use fissure::run::{Outcome, Phases, Summary};

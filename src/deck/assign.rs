@@ -26,8 +26,8 @@ pub fn is_key(source: &Source, name: &str) -> bool {
 
 /// Return the text of a deck with these values assigned to keys; missing keys are added.
 ///
-/// A text that is a TOML value keeps its type. Any other text, such as a bare word or an expression, becomes
-/// a string.
+/// A text that is a TOML value keeps its type. Any other text, such as a bare word or an
+/// expression, becomes a string. If the deck is not valid TOML, its text is returned unchanged.
 ///
 /// # Errors
 /// If a key has an empty part, passes through a list or a value, or names a section.

@@ -23,8 +23,10 @@ const MOST_BODIES: usize = 256;
 /// Validate the bodies.
 ///
 /// # Errors
-/// On too many bodies, an unknown material or damage law, an invalid shape, a body without exactly one source
-/// of points, and bodies that contradict each other about a file.
+/// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage
+/// law that the material does not support, an invalid number or shape, or a body without exactly
+/// one source of points. If two bodies request the same rows or elements of a file, or name
+/// different columns of it.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -100,10 +102,11 @@ pub fn bodies(
     })
 }
 
-/// Set the grid origins of a deck without `origin`. Bodies with the same cells share an origin, so that their
-/// points stay aligned. In each direction, the origin follows from the first body that is a whole number of
-/// cells long between flat faces. The origin is 0 if cells from 0 fill this body exactly, otherwise the lower
-/// face of the body. Without such a body, the origin is 0.
+/// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin,
+/// so that their points stay aligned. In each direction, the origin follows from the first body
+/// with this spacing that is a whole number of cells long between flat faces. The origin is 0 if
+/// cells from 0 fill this body exactly, otherwise the lower face of the body. Without such a body,
+/// the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -152,8 +155,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     is_whole(upper - lower).then_some(if is_whole(lower) { 0.0 } else { lower })
 }
 
-/// Return the positions of the two faces that bound a shape along an axis, m; `None` if a face is round. For
-/// a polygon, return the smallest and largest coordinate of its corners.
+/// Return the positions of the two faces that bound a shape along an axis, m; `None` if a face is
+/// round. For the base of a prism or a polygon, return the smallest and largest coordinate of its
+/// corners. For a difference, return the faces of its first shape.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
@@ -175,8 +179,9 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// Return an error if a body requests rows of a point file, or elements of a mesh, that belong to an earlier
-/// body.
+/// Return the bodies unchanged. Return an error if a body requests rows of a point file, or
+/// elements of a mesh, that belong to an earlier body, or if two bodies name different columns of a
+/// file.
 fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
     let rows = |body: &problem::Body| match &body.points {
         problem::PointSource::File {

@@ -14,8 +14,9 @@ use crate::problem::{self, Action};
 /// Validate the initial values.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression or file, a table without values, or a velocity in a run that begins
-/// with a method that computes equilibria.
+/// On an unknown set, an invalid expression or file, a table without values, or a table with both a
+/// file and expressions. On a velocity in a run that begins with a method that computes equilibria,
+/// and on a file in a deck with `[refinement]`.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,
@@ -68,7 +69,8 @@ pub fn initials(
         .collect()
 }
 
-/// Read the columns that an initial file has. Its path is relative to the folder of the deck.
+/// Read the header of an initial file to find its columns. The path of the file is relative to the
+/// folder of the deck.
 fn initial_file(
     scope: &Scope,
     deck: &Deck,
@@ -91,10 +93,12 @@ fn initial_file(
     })
 }
 
-/// Validate the loads and supports.
+/// Validate the loads, supports and temperatures. `spacing` (m) is the default depth of a traction
+/// or pressure.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression, or a table without exactly one quantity.
+/// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth`
+/// or `normal` that is missing or has no effect.
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,

@@ -22,11 +22,12 @@ pub(super) struct Keys<'a> {
     pub restitution: Option<&'a Number>,
 }
 
-/// Validate contact.
+/// Validate contact. Return `None` for a deck without `[contact]`.
 ///
 /// # Errors
-/// On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not support
-/// contact.
+/// On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not
+/// support contact. On a pair with another model than `[contact]` that inherits the stiffness of
+/// `[contact]`.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
@@ -196,7 +197,8 @@ pub(super) fn rule(
     }))
 }
 
-/// Return the names of the bodies of a pair.
+/// Return the names of the two bodies of a pair; return an error on an unknown body or another
+/// number of names.
 fn pair(
     scope: &Scope,
     key: &str,

@@ -19,7 +19,9 @@ type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
 /// Validate a damage law.
 ///
 /// # Errors
-/// On an invalid number, an unknown set, or a table without exactly one measure of toughness.
+/// On an invalid number, an unknown set, or a table without exactly one measure of toughness. On a
+/// calibration that is not available in this dimension, and on incomplete keys of a toughness by
+/// direction.
 pub fn damage(
     scope: &Scope,
     sets: &[problem::Set],
@@ -184,7 +186,7 @@ impl<'a> Directed<'a> {
         let toughness = ToughnessByDirection::new(scope.dimension, axis, ratio);
         if toughness.is_none() {
             let [least, most] = ToughnessByDirection::limits(scope.dimension);
-            // The printed limits are themselves allowed.
+            // Round the limits inwards, so that the printed values are allowed.
             let limits =
                 [(100.0 * least).ceil(), (100.0 * most).floor()].map(|limit| limit / 100.0);
             let message = format!(

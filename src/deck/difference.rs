@@ -17,8 +17,8 @@ const FREE_KEYS: [&str; 1] = ["time.end"];
 /// Keys of the history that set the interval of rows.
 const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
 
-/// Return the differences in the physics of two decks with all defaults filled in: one line per key, with its
-/// old and new value.
+/// Return the differences in the physics of two decks: one line per key, with its old and new
+/// value. Keys that only one deck has are compared with the default of the other deck.
 ///
 /// # Errors
 /// If a deck cannot be parsed.
@@ -120,7 +120,7 @@ impl Comparison<'_> {
             return;
         }
         match (old, new) {
-            // Sections that are compared where they are used are compared here only if both decks have them.
+            // Tables that may be added or removed are compared only if both decks have them.
             (None, _) | (_, None) if counts_where_used(key) => {}
             (Some(Value::Table(old)), Some(Value::Table(new))) => {
                 let order = |table: &Table| table.keys().cloned().collect::<Vec<_>>();
@@ -161,7 +161,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Return a value as an expression of position and time, with the parameters of its deck inserted.
+    /// Return a value as an expression of position and time, with the parameters of its deck
+    /// inserted; `None` if the value is not an expression.
     fn expression(&self, deck: usize, value: Option<&Value>) -> Option<Expression> {
         let written = match value? {
             Value::Integer(value) => Written::Value(*value as f64),
@@ -176,7 +177,8 @@ impl Comparison<'_> {
     }
 }
 
-/// Return whether the section of a key is compared where it is used.
+/// Return whether a restart may add or remove tables of the section of a key
+/// ([`Restart::WhereUsed`]).
 fn counts_where_used(key: &str) -> bool {
     let section = key.split('.').next().and_then(Section::find);
     section.is_some_and(|section| section.restart == Restart::WhereUsed)

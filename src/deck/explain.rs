@@ -181,7 +181,8 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the grid's spacing if it is the same in all directions.
+/// Return the grid's spacing if it is one number for all directions; `None` if it is a list or not
+/// given.
 fn edge(grid: &Grid) -> Option<Number> {
     let spacing = grid.spacing.as_ref()?;
     match spacing.get_ref() {

@@ -15,7 +15,8 @@ use crate::problem::{self, Field, Interval};
 /// Validate the content and interval of the history; `horizon` is the horizon of the grid, m.
 ///
 /// # Errors
-/// On an unknown set or field, or an invalid position or number.
+/// On an unknown set or field, or an invalid position, number or name. On an entry that is named twice, and
+/// on a quantity that does not exist in this dimension.
 pub fn history(
     scope: &Scope,
     deck: &Deck,
@@ -162,8 +163,8 @@ fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
     Ok(fields[find(scope.source, name, names, key)?])
 }
 
-/// Return the component or invariant that a table requests. The default is the scalar, or the magnitude of a
-/// vector.
+/// Return the component or invariant that a table requests. The default is the scalar, or the magnitude of
+/// a vector; a tensor without `component` is an error.
 fn component(
     scope: &Scope,
     key: &str,

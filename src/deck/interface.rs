@@ -15,7 +15,7 @@ use crate::problem::{self, DamageRule, InterfaceDamage, InterfacePair, Interface
 /// Value of `damage` for a pair whose bonds never break.
 const UNBREAKABLE: &str = "none";
 
-/// The largest ratio of the stiffnesses of two bodies whose interface has a strength.
+/// The largest ratio of the tensile moduli of two bodies whose interface has a strength.
 const MAX_STIFFNESS_RATIO: f64 = 10.0;
 
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
@@ -102,7 +102,8 @@ struct Damages<'a> {
 }
 
 impl Damages<'_> {
-    /// Return the damage of the bonds, and the byte range of this setting.
+    /// Return the damage of the bonds, and the byte range of this setting; the byte range is `0..0` if the
+    /// pair gives neither `damage` nor `strength`.
     fn damage(
         &self,
         table: &grammar::Pair,
@@ -146,7 +147,8 @@ impl Damages<'_> {
         Ok((InterfaceDamage::Own(damages[index].clone()), span))
     }
 
-    /// Return the damage law whose critical stretch follows from a strength.
+    /// Return the damage law whose critical stretch follows from a strength. Return an error if the law of
+    /// a body cannot have this criterion, or if the stiffnesses of the bodies differ too much.
     fn of_strength(&self, strength: &Number) -> Result<problem::Damage> {
         let key = format!("{} strength", self.key);
         let stress = self.scope.positive(strength, &key)?;

@@ -14,7 +14,8 @@ use crate::message::format_number;
 use crate::points::file;
 use crate::problem::{PointSource, Problem, Selector, changes_density_scale};
 
-/// Return a warning for each probable mistake; `scope` is the scope of the validated deck.
+/// Return a warning for each probable mistake. `scope` must be the scope of the validation, which records
+/// the names that the deck uses.
 ///
 /// # Errors
 /// If the deck cannot be serialized for the search of unused parameters.

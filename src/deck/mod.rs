@@ -42,7 +42,7 @@ use crate::error::{Error, Result, Warning};
 use crate::problem::Problem;
 use resolve::Scope;
 
-/// The commented deck that `fissure init` writes.
+/// The commented deck that `fissure init` writes by default.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
 /// A deck whose text follows the grammar, not yet validated.
@@ -51,10 +51,12 @@ pub struct Deck {
     grammar: grammar::Deck,
 }
 
-/// Read a deck. `set` replaces parameters by name (with values or expressions) and keys by section and name.
+/// Read a deck. `set` has pairs of a name and a value or expression; the name is a parameter, or a key with
+/// its section, such as `time.safety`.
 ///
 /// # Errors
-/// An input error with file, line, column, key and the allowed values.
+/// If the file cannot be read, or its text does not follow the grammar. The message has file, line, column,
+/// key and the allowed values.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
     read_with(path, &[], set)
 }
@@ -88,10 +90,10 @@ pub fn read_with(path: &Path, overlays: &[PathBuf], set: &[(String, String)]) ->
 }
 
 impl Deck {
-    /// Read a deck from its text.
+    /// Parse the text of a deck.
     ///
     /// # Errors
-    /// As [`read`].
+    /// If the text does not follow the grammar; the message is as in [`read`].
     pub fn new(source: Source) -> Result<Self> {
         let grammar = toml::from_str(&source.text)
             .map_err(|error| toml_error::toml_error(&source, &error))?;
@@ -114,10 +116,10 @@ impl Deck {
         self.source.locate_warning(warning)
     }
 
-    /// Validate the deck.
+    /// Validate the deck, and return its problem with the warnings about the deck.
     ///
     /// # Errors
-    /// As [`read`].
+    /// If a value is invalid; the message is as in [`read`].
     pub fn problem(&self) -> Result<Problem> {
         self.problem_in(&Scope::of(&self.source, &self.grammar)?)
     }
@@ -132,17 +134,17 @@ impl Deck {
     /// files.
     ///
     /// # Errors
-    /// As [`read`].
+    /// If the deck is invalid, as in [`Self::problem`], or cannot be serialized.
     pub fn explain(&self) -> Result<String> {
         let scope = Scope::of(&self.source, &self.grammar)?;
         explain::explain(&scope, &self.grammar, &self.problem_in(&scope)?)
     }
 }
 
-/// Validate the text of a deck.
+/// Parse and validate the text of a deck.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`Deck::new`] and [`Deck::problem`].
 pub fn parse(source: &Source) -> Result<Problem> {
     Deck::new(source.clone())?.problem()
 }
@@ -150,7 +152,7 @@ pub fn parse(source: &Source) -> Result<Problem> {
 /// Return the text of a deck with every default written out.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`Deck::new`] and [`Deck::explain`].
 pub fn explain(source: &Source) -> Result<String> {
     Deck::new(source.clone())?.explain()
 }

@@ -11,7 +11,8 @@ const LONGEST: usize = 64;
 /// Check the title and the names of all tables.
 ///
 /// # Errors
-/// On the first name that cannot be printed on one line or written to a CSV table.
+/// On a title with control characters. On the first name that is empty, has more than 64 characters, or
+/// contains quotes, backslashes or control characters.
 pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
     if deck.title.get_ref().contains(char::is_control) {
         let message = "title: must be one line of text, without control characters";

@@ -21,7 +21,7 @@ pub enum Written {
 /// A number with its byte range in the deck.
 pub type Number = Spanned<Written>;
 
-/// A vector of numbers with its byte range in the deck; one entry per dimension.
+/// A list of numbers with its byte range in the deck, such as a vector with one entry per dimension.
 pub type Vector = Spanned<Vec<Number>>;
 
 /// Edges of a lattice cell as written in the deck: one number, or a list with one number per dimension.

@@ -14,7 +14,7 @@ const SET_ASIDE: &str = "until_step_";
 /// Validate the main result; `end` is the end of the run, s.
 ///
 /// # Errors
-/// On an unknown field or set, and on an invalid interval.
+/// On an unknown field or set, a field that is named twice, and an invalid interval or time.
 pub fn output(
     scope: &Scope,
     deck: &Deck,
@@ -27,7 +27,8 @@ pub fn output(
 /// Validate the further results; `end` is the end of the run, s.
 ///
 /// # Errors
-/// As [`output`], and on a name that cannot be part of a file name.
+/// As [`output`]. Also on a name that cannot be part of a file name, or that differs from another name only
+/// in upper and lower case.
 pub fn further_outputs(
     scope: &Scope,
     deck: &Deck,
@@ -163,7 +164,7 @@ fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Re
     Ok(times)
 }
 
-/// Validate the settings of the rebalancing.
+/// Validate the settings of the rebalancing. Return `None` for a deck without `[balance]`.
 ///
 /// # Errors
 /// If `imbalance` is below 1: the slowest rank always takes at least the mean time.

@@ -17,7 +17,8 @@ const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free
 /// Evaluate the parameters, and store their values in the scope.
 ///
 /// # Errors
-/// On a name that no expression can use, an unknown name, or a circular definition.
+/// On a name that no expression can use, an invalid expression or value, an unknown name, or a circular
+/// definition.
 pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<()> {
     for name in written.keys() {
         let text = name.get_ref();

@@ -18,10 +18,10 @@ const SHARE: std::ops::Range<f64> = f64::MIN_POSITIVE..1.0 + f64::EPSILON;
 /// Default increase of m = δ/dx per level (Dipasquale et al. 2014, table 2).
 const RISE: f64 = 1.0;
 
-/// Validate the refinement.
+/// Validate the refinement. Return `None` for a deck without `[refinement]`.
 ///
 /// # Errors
-/// On bodies that cannot be refined, and on invalid levels or ratios m.
+/// On bodies that cannot be refined, and on invalid levels, ratios m, regions or triggers.
 pub fn refinement(
     scope: &Scope,
     deck: &Deck,

@@ -233,7 +233,7 @@ impl<'a> Scope<'a> {
         Ok(values)
     }
 
-    /// Evaluate a vector, and scale it to unit length.
+    /// Evaluate a vector, and scale it to unit length. A zero vector is an error.
     pub fn direction(&self, vector: &Vector, key: &str) -> Result<[f64; 3]> {
         let values = Vector3::from(self.vector(vector, key)?);
         let length = values.dot(&values).sqrt();
@@ -244,8 +244,8 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Return the index of the only given key among mutually exclusive keys. `place` is the byte range of the
-    /// table with these keys.
+    /// Return the index of the only given key among mutually exclusive keys. No key and several keys are
+    /// errors. `place` is the byte range of the table with these keys.
     pub fn exactly_one(
         &self,
         place: Range<usize>,
@@ -278,7 +278,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Parse one expression per component.
+    /// Parse one expression per component. A component with `"free"` is an error.
     pub fn expressions(
         &self,
         vector: &Vector,
@@ -299,7 +299,8 @@ impl<'a> Scope<'a> {
             .collect()
     }
 
-    /// Parse one expression per component of a prescribed motion; `None` for a component with `"free"`.
+    /// Parse one expression per component of a prescribed motion; `None` for a component with `"free"`. It
+    /// is an error if all components are `"free"`.
     pub fn motion(&self, vector: &Vector, key: &str) -> Result<Vec<Option<Expression>>> {
         let motion = self
             .entries(vector, key)?

@@ -16,7 +16,7 @@ use crate::problem;
 /// Validate a shape.
 ///
 /// # Errors
-/// On a shape for another dimension, an empty shape, or an invalid number.
+/// On a shape for another dimension, an empty shape, too few corners or parts, or an invalid number.
 pub fn shape(scope: &Scope, key: &str, shape: &Spanned<grammar::Shape>) -> Result<problem::Shape> {
     resolve(scope, key, shape.get_ref(), shape.span())
 }
@@ -166,7 +166,7 @@ fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<
 /// Validate a pre-crack.
 ///
 /// # Errors
-/// On a crack for another dimension, or a crack without extent.
+/// On a crack for another dimension, a crack without extent, or an invalid number.
 pub fn crack(
     scope: &Scope,
     name: &str,

@@ -21,7 +21,7 @@ const MOST_SAID: usize = 600;
 /// Smallest and largest number of characters of an excerpt of a line.
 const SHOWN_OF_LINE: [usize; 2] = [24, 160];
 
-/// A deck's file name and text.
+/// The path and the text of a deck.
 #[derive(Debug, Clone)]
 pub struct Source {
     /// Path of the file.
@@ -56,8 +56,8 @@ impl Source {
         source
     }
 
-    /// Return the path and text of the file that a span comes from, and the span in this file. The last entry
-    /// is a note for a span that is in no file.
+    /// Return the path and text of the file that a span comes from, and the span in this file. The last
+    /// entry is a note for a span that is in no file, and empty otherwise.
     fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
         let Some(origins) = &self.origins else {
             return (&self.path, &self.text, span, "");
@@ -195,7 +195,7 @@ impl Window {
     }
 }
 
-/// Return a message on one line, with at most `most` characters.
+/// Return a message on one line, cut after `most` characters with an ellipsis.
 fn shortened(message: &str, most: usize) -> String {
     let mut shown = String::new();
     for c in message.chars() {

@@ -74,8 +74,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
 /// Validate the stages of the run, whose time axis is `whole`.
 ///
 /// # Errors
-/// On a missing end, on an end before the previous one or after the end of the run, on unknown names, and on
-/// invalid numbers.
+/// On a missing or invalid end of a stage, unknown names, invalid numbers, and tables of a method that the
+/// stage does not use.
 pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;
@@ -140,7 +140,8 @@ pub fn first_method(deck: &Deck) -> grammar::Method {
     *methods(deck)[0].1.get_ref()
 }
 
-/// Return the end of a stage, s. The end must be after the start of the stage and at most the end of the run.
+/// Return the end of a stage, s. The end must be after the start of the stage and before the end of the
+/// run; the last stage ends with the run.
 fn stage_end(
     scope: &Scope,
     table: &Spanned<grammar::Stage>,

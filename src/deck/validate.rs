@@ -16,7 +16,7 @@ use crate::problem::{self, Problem};
 /// Validate a parsed deck; `scope` has its parameters and tables.
 ///
 /// # Errors
-/// The first mistake, with its location in the deck, the key and the allowed values.
+/// On the first mistake. The message has the location in the deck, the key and the allowed values.
 pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let dimension = dimension(scope, deck)?;
     let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;

@@ -278,7 +278,7 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Whether the code always returns 0 or 1, as a comparison does.
+/// Test whether the code always returns 0 or 1, as a comparison does.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);

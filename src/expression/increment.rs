@@ -2,8 +2,9 @@
 //!
 //! The difference of two computed values u has an error of ε|u|. Dividing a second difference by the square
 //! of a small step amplifies this error. Here most operations compute the change of their result from the
-//! changes of their operands. For example sin b − sin a = 2 cos((a + b)/2) sin((b − a)/2). Their error is
-//! therefore relative to the change. The other operations, such as `tan` and `atan2`, subtract two values.
+//! changes of their operands, so the error is relative to the change. For example, the change of sin from a
+//! to b is 2 cos((a + b)/2) sin((b − a)/2). The other operations, such as `tan` and `atan2`, subtract two
+//! values.
 
 use std::sync::Arc;
 

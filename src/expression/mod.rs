@@ -92,7 +92,7 @@ impl Variable {
         }
     }
 
-    /// Index of the variable among x, y, z, t.
+    /// Return the index of the variable among x, y, z, t.
     fn slot(self) -> usize {
         match self {
             Self::X | Self::R => 0,
@@ -234,13 +234,13 @@ impl Expression {
         }
     }
 
-    /// Tables that the expression reads.
+    /// Return the tables that the expression reads.
     pub fn tables(&self) -> &[Arc<Table>] {
         &self.tables
     }
 
-    /// Whether the code equals that of another expression, and each table starts with all rows of the other's
-    /// table.
+    /// Test whether the code equals that of another expression, and each table starts with all rows of the
+    /// other's table.
     pub fn extends(&self, other: &Self) -> bool {
         let mut tables = self.tables.iter().zip(&other.tables);
         self.code == other.code
@@ -248,7 +248,7 @@ impl Expression {
             && tables.all(|(own, other)| own.extends(other))
     }
 
-    /// Whether a function of this name exists.
+    /// Test whether a function of this name exists.
     pub fn is_function(name: &str) -> bool {
         names::is_function(name)
     }
@@ -275,17 +275,17 @@ impl Expression {
         increment::increment(&self.code, &self.tables, [x, y, z, time], step)
     }
 
-    /// Whether the value is not 0.
+    /// Test whether the value is not 0.
     pub fn is_true(&self, position: [f64; 3], time: f64) -> bool {
         self.evaluate(position, time) != 0.0
     }
 
-    /// Whether the expression always returns 0 or 1, as a comparison does.
+    /// Test whether the expression always returns 0 or 1, as a comparison does.
     pub fn is_condition(&self) -> bool {
         evaluate::is_truth(&self.code)
     }
 
-    /// Whether the value depends on this variable; tables depend on `t`.
+    /// Test whether the value depends on this variable; tables depend on `t`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.code.contains(&Instruction::Variable(variable))
             || variable == Variable::T && !self.tables.is_empty()

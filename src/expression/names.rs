@@ -65,7 +65,7 @@ pub(super) struct Scope<'a> {
     pub(super) tables: &'a [(&'a str, &'a Arc<Table>)],
 }
 
-/// Whether a function of this name exists.
+/// Test whether a function of this name exists.
 pub(super) fn is_function(name: &str) -> bool {
     FUNCTIONS.iter().any(|(known, _)| *known == name)
 }

@@ -78,17 +78,17 @@ impl Parser<'_> {
         token
     }
 
-    /// Text of a token.
+    /// Return the text of a token.
     fn text_of(&self, token: Token) -> &str {
         &self.text[token.start..token.end]
     }
 
-    /// Text in a byte range, trimmed.
+    /// Return the text in a byte range, trimmed.
     fn trimmed(&self, start: usize, end: usize) -> &str {
         self.text[start..end].trim()
     }
 
-    /// Byte index after the last consumed token.
+    /// Return the byte index after the last consumed token.
     fn end_of_last(&self) -> usize {
         self.next
             .checked_sub(1)
@@ -271,7 +271,8 @@ impl Parser<'_> {
         token.error(message)
     }
 
-    /// Return the error for a token after a value inside a parenthesis that does not close it.
+    /// Return the error for a next token that follows a value inside the parenthesis `open`, but does not
+    /// close this parenthesis.
     fn unclosed(&self, open: Token) -> ExpressionError {
         if self.peek().kind == Kind::End {
             return open.error("unbalanced parenthesis: this `(` is never closed");

@@ -12,8 +12,8 @@ impl Table {
     /// Create a table of times (s) and values of the same count.
     ///
     /// # Errors
-    /// If there are fewer than two rows, or the times do not increase. The error holds the row index, from 0,
-    /// and a message.
+    /// If there are fewer than two rows, the counts differ, or the times do not increase. The error holds
+    /// the row index, from 0, and a message.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
         if times.len() < 2 || times.len() != values.len() {
             let message = format!("needs two rows or more, has {}", times.len());
@@ -31,17 +31,17 @@ impl Table {
         Ok(Self { times, values })
     }
 
-    /// First and last time, s.
+    /// Return the first and last time, s.
     pub fn range(&self) -> [f64; 2] {
         [self.times[0], self.times[self.times.len() - 1]]
     }
 
-    /// Times (s) and values of the rows.
+    /// Return the times (s) and values of the rows.
     pub fn rows(&self) -> [&[f64]; 2] {
         [&self.times, &self.values]
     }
 
-    /// Whether the table starts with all rows of another table.
+    /// Test whether the table starts with all rows of another table.
     pub(super) fn extends(&self, other: &Self) -> bool {
         self.times.starts_with(&other.times) && self.values.starts_with(&other.values)
     }
@@ -74,7 +74,7 @@ impl Table {
         self.at(end) - self.at(time)
     }
 
-    /// Index of the first row of the segment that contains a time (s), or of the nearest segment.
+    /// Return the index of the first row of the segment that contains a time (s), or of the nearest segment.
     fn segment(&self, time: f64) -> usize {
         let after = self.times.partition_point(|row| *row <= time);
         after.clamp(1, self.times.len() - 1) - 1

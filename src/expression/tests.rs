@@ -22,7 +22,7 @@ fn value(text: &str) -> f64 {
         .evaluate([2.0, 3.0, 5.0], 7.0)
 }
 
-/// Whether two values have the same bits, or both are NaN.
+/// Test whether two values have the same bits, or both are NaN.
 fn same(left: f64, right: f64) -> bool {
     left.to_bits() == right.to_bits() || (left.is_nan() && right.is_nan())
 }
@@ -495,7 +495,7 @@ impl Tree {
         }
     }
 
-    /// Precedence of the outermost operator; larger binds more tightly.
+    /// Return the precedence of the outermost operator; larger binds more tightly.
     fn precedence(&self) -> u8 {
         match self {
             Self::Infix("||", ..) => 1,
@@ -609,7 +609,7 @@ fn trees() -> impl Strategy<Value = Tree> {
     })
 }
 
-/// Values of the four names: small integers, moderate numbers and arbitrary numbers.
+/// Generate values of the four names: small integers, moderate numbers and arbitrary numbers.
 fn values() -> impl Strategy<Value = [f64; 4]> {
     prop::array::uniform4(prop_oneof![
         (-17..18i8).prop_map(f64::from),
@@ -618,7 +618,7 @@ fn values() -> impl Strategy<Value = [f64; 4]> {
     ])
 }
 
-/// Words and symbols of the language in any order.
+/// Generate words and symbols of the language in any order.
 fn jumbles() -> impl Strategy<Value = String> {
     let words = vec![
         "x", "t", "dx", "foo", "é", "1", "1e", ".", ".5", "e5", "(", "(", ")", ")", ",", "+", "-",
@@ -628,7 +628,7 @@ fn jumbles() -> impl Strategy<Value = String> {
     prop::collection::vec(prop::sample::select(words), 0..60).prop_map(|words| words.concat())
 }
 
-/// Whether the text is evaluated, or rejected with a range inside the text.
+/// Test whether the text is evaluated, or rejected with a range inside the text.
 fn is_handled(text: &str) -> bool {
     let _ = Expression::names(text);
     match parse(text) {

@@ -24,7 +24,7 @@ pub struct Material {
 /// Criterion of a damage model.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Criterion {
-    /// Bonds break at this stretch.
+    /// Bonds break at this stretch: value to write, and number.
     Stretch(Value, f64),
     /// Bonds break at a work that follows from a fracture energy by PeriLab's formula.
     Energy {
@@ -71,10 +71,11 @@ const BY_ENERGY: [&str; 3] = [
 /// The bond-based laws among the laws that an import writes.
 const BOND_BASED: [&str; 1] = ["pmb"];
 
-/// Write the damage law of a body; return its name.
+/// Write the damage law of a body and return its name. Return `None` if the law breaks bonds by energy only
+/// and the elastic constants determine no fracture energy.
 ///
 /// # Errors
-/// If the law needs a fracture energy and the elastic constants do not determine one.
+/// None at present.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,

@@ -64,7 +64,7 @@ impl<'n> Quantity<'n> {
     /// Write the quantity to the new deck.
     ///
     /// # Errors
-    /// If a position is not a number, or a set is unknown.
+    /// If a position is missing or not a number, or a set is unknown.
     pub(super) fn write(
         &self,
         translation: &mut Translation,

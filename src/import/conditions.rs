@@ -75,7 +75,7 @@ impl Conditions {
     /// Write a condition.
     ///
     /// # Errors
-    /// If a key is missing, or the node set is unknown.
+    /// If a key is missing, `Coordinate` is not x, y or z, or the node set is unknown.
     pub fn add(
         &mut self,
         translation: &mut Translation,

@@ -57,7 +57,8 @@ impl Value {
         })
     }
 
-    /// Create a number if TOML reads the text as the same number; otherwise an expression.
+    /// Create a number if the text is a finite number, otherwise an expression. The text is kept if TOML
+    /// reads it as the same number.
     pub fn number_or_expression(text: &str) -> Self {
         match text.parse::<f64>() {
             Ok(_) if is_toml_number(text) => Self::Number(text.to_owned()),
@@ -79,7 +80,7 @@ impl Value {
         Self::List(values.into_iter().collect())
     }
 
-    /// A list of numbers.
+    /// Create a list of numbers.
     pub fn numbers(values: &[f64]) -> Self {
         Self::list(values.iter().map(|value| Self::number(*value)))
     }

@@ -53,7 +53,7 @@ impl Constants {
         Some(*value)
     }
 
-    /// Number of constants.
+    /// Return the number of constants.
     pub fn count(&self) -> usize {
         self.given.len()
     }
@@ -82,9 +82,11 @@ impl Constants {
         }
     }
 
-    /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. If the bulk modulus
-    /// is not that of the solid in 3-D, Young's modulus is `factor` times the bulk modulus. Return false if
+    /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return false if
     /// the constants determine neither modulus.
+    ///
+    /// A bulk modulus of the plane is converted: `factor` is Young's modulus divided by this bulk modulus.
+    /// `factor` is `None` for the bulk modulus of a solid.
     pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {

@@ -93,7 +93,7 @@ impl PointFile {
         Some(file)
     }
 
-    /// Number of coordinates in the header.
+    /// Return the number of coordinates in the header; `None` without a header.
     pub fn dimension(&self) -> Option<usize> {
         let names = self.names.as_ref()?;
         let has = |name: &str| names.iter().any(|known| known.eq_ignore_ascii_case(name));

@@ -77,7 +77,7 @@ pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 pub struct Losses {
     /// Lines of initial values, loads and supports.
     pub conditions: Vec<usize>,
-    /// Lines of damage models that blocks use.
+    /// Lines of damage models that blocks use, or of their criteria.
     pub damages: Vec<usize>,
     /// Lines of unknown values of `Omit Bonds Between Blocks`.
     pub bonds: Vec<usize>,
@@ -220,7 +220,8 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note is left out.
+    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note has the
+    /// outcome `LeftOut`.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);

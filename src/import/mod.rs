@@ -71,7 +71,7 @@ pub struct Import {
 }
 
 impl Import {
-    /// Number of keys with an outcome.
+    /// Return the number of keys with an outcome.
     pub fn count(&self, fate: Fate) -> usize {
         self.entries
             .iter()
@@ -79,7 +79,7 @@ impl Import {
             .count()
     }
 
-    /// Keys that are left out and change the results.
+    /// Return the keys that are left out and change the results.
     pub fn losses(&self) -> Losses {
         Losses::of(&self.entries)
     }
@@ -149,7 +149,7 @@ pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<I
     Ok(finish(translation, &root, code, target))
 }
 
-/// Write the new deck and check whether it is valid.
+/// Compose the text of the new deck and check whether the deck is valid.
 fn finish(translation: Translation, root: &Node, code: Code, target: &Path) -> Import {
     let entries = translation.log.entries(root);
     let name = translation.source.path.file_name().unwrap_or_default();

@@ -160,7 +160,7 @@ struct Frequency {
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
-    /// Interval of each output with fields, or without variables.
+    /// Interval of each output with fields, or with neither fields nor columns of the history.
     intervals: Vec<Frequency>,
     /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,
@@ -185,7 +185,7 @@ impl Outputs {
     /// name of its table.
     ///
     /// # Errors
-    /// If a position is not a number, or a set is unknown.
+    /// If a position is missing or not a number, or a set is unknown.
     pub fn computed(
         &mut self,
         translation: &mut Translation,
@@ -214,7 +214,7 @@ impl Outputs {
     /// Read an output: its variables and interval. Without a frequency, Peridigm writes every step.
     ///
     /// # Errors
-    /// If the frequency is not a number.
+    /// If the frequency is not a whole number above 0.
     pub fn output(&mut self, translation: &Translation, node: &Node) -> Result<()> {
         let log = &translation.log;
         let (mut has_fields, mut has_globals) = (false, false);

@@ -25,7 +25,8 @@ pub enum Region {
 /// Read a region from the arguments after its name; `spacing` is that of the lattice.
 ///
 /// # Errors
-/// If the style is unknown, or an argument is not a number.
+/// If the style is unknown, an argument is missing or not a number, or the region lies outside of its
+/// surface.
 pub fn region(
     variables: &Variables,
     arguments: &[&str],

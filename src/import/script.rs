@@ -22,12 +22,12 @@ pub struct Command {
 }
 
 impl Command {
-    /// Name of the command.
+    /// Return the name of the command.
     pub fn name(&self) -> &str {
         &self.words[0]
     }
 
-    /// Arguments of the command.
+    /// Return the arguments of the command.
     pub fn arguments(&self) -> Vec<&str> {
         self.words[1..].iter().map(String::as_str).collect()
     }
@@ -60,7 +60,8 @@ pub fn is_script(text: &str) -> bool {
 /// Split a script into commands, and replace each `$` by the value of the variable at this command.
 ///
 /// # Errors
-/// If a quote is not closed, or a variable is not defined.
+/// If a quote or bracket is not closed, a variable is not defined, a formula after `$` changes with time, a
+/// time step is not a number, or the script or a line is too long.
 pub fn parse(text: &str) -> Result<Script, Mistake> {
     let mut script = Script::default();
     let mut variables = Variables::default();
@@ -170,7 +171,7 @@ impl Variables {
         Ok(())
     }
 
-    /// Replace `$x`, `${name}` and `$(formula)` outside single quotes.
+    /// Replace `$x`, `${name}` and `$(formula)`, also between quotes.
     fn substitute(&self, text: &str) -> Result<String, String> {
         let mut result = String::new();
         let mut rest = text;

@@ -93,7 +93,8 @@ impl<'n> Sets<'n> {
         Ok(written)
     }
 
-    /// Number of points of a set that is defined by point numbers.
+    /// Return the number of points of a set that lists point numbers, in the deck or in a file. Return
+    /// `None` for other sets.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
         let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
         let text = set_text(set.node)?;

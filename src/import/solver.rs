@@ -45,7 +45,8 @@ pub struct Stage {
     pub method: Method,
     /// Number of the step, to which conditions refer.
     pub step_id: Option<u64>,
-    /// Damping of the solver per step, divided by the time step, 1/s; `None` if the time step is unknown.
+    /// Damping of the solver per step, divided by the time step, 1/s; `None` without damping or if the time
+    /// step is unknown.
     pub damping: Option<f64>,
     /// Whether damage models are active.
     pub breaks: bool,
@@ -74,7 +75,7 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
 /// models on or off.
 ///
 /// # Errors
-/// If the end is missing or a key is not a number.
+/// If no solver is known, the end is missing or not after the start, or a key is not a number.
 pub fn stage(
     translation: &Translation,
     node: &Node,

@@ -203,7 +203,7 @@ impl<'a> Translation<'a> {
         folder.join(file)
     }
 
-    /// Return the path of a file of the source deck, relative to the new deck.
+    /// Return the path of a file of the source deck, relative to the new deck. An absolute path stays.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
         let path = if Path::new(file).is_absolute() {

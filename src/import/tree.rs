@@ -38,7 +38,7 @@ impl Node {
         Some(node)
     }
 
-    /// Names and values of a table; empty for other nodes.
+    /// Return the names and values of a table; empty for other nodes.
     pub fn entries(&self) -> &[(String, Self)] {
         match &self.content {
             Content::Table(entries) => entries,

@@ -7,8 +7,8 @@ use super::tree::{Content, DEEPEST, MOST_NODES, Mistake, Node};
 /// Parse the parameter list of an XML text.
 ///
 /// # Errors
-/// If the text is not XML, an element is not a parameter, a parameter lacks name or value, or a list occurs
-/// twice.
+/// If the text is not XML, an element is not a parameter, a parameter lacks name or value, a list occurs
+/// twice, or the lists are too deep.
 pub fn parse(text: &str) -> Result<Node, Mistake> {
     let options = ParsingOptions {
         nodes_limit: MOST_NODES as u32,

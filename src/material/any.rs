@@ -12,19 +12,19 @@ use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 /// Sizes of the point data and bond data of a law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
-    /// [`Law::CONSTANTS`].
+    /// Count of the constants of a point, [`Law::CONSTANTS`].
     pub constants: usize,
-    /// [`Law::Point`].
+    /// Count of the numbers of a point, [`Law::Point`].
     pub point: usize,
-    /// [`Law::OWN_NUMBERS`].
+    /// Count of the numbers that only the point itself reads, [`Law::OWN_NUMBERS`].
     pub own: usize,
-    /// [`Law::PASSES`].
+    /// Count of the passes, [`Law::PASSES`].
     pub passes: usize,
-    /// [`Law::ReferenceSum`].
+    /// Count of the sums over the initial family, [`Law::ReferenceSum`].
     pub reference_sum: usize,
-    /// [`Law::Sum`].
+    /// Count of the sums of a pass, [`Law::Sum`].
     pub sum: usize,
-    /// [`Law::BondHistory`].
+    /// Count of the numbers in the history of one end of a bond, [`Law::BondHistory`].
     pub bond_history: usize,
     /// [`ForceState::CENTRAL`] of [`Law::Force`].
     pub central: bool,
@@ -44,7 +44,7 @@ impl Counts {
         }
     }
 
-    /// Return the larger of each size; `central` only if both are.
+    /// Return the larger of each size; `central` is true only if it is true in both.
     const fn or_more(self, other: Self) -> Self {
         const fn more(a: usize, b: usize) -> usize {
             if a > b { a } else { b }
@@ -103,7 +103,7 @@ impl AnyLaw {
         with_law!(self, law => law.described())
     }
 
-    /// Whether the law is [linear](Law::LINEAR).
+    /// Test whether the law is [linear](Law::LINEAR).
     pub fn is_linear<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::LINEAR
@@ -111,7 +111,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Whether the law defines [`Law::bond_stress_across`].
+    /// Test whether the law defines [`Law::bond_stress_across`].
     pub fn has_bond_stress_across<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::HAS_BOND_STRESS_ACROSS
@@ -119,7 +119,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Whether the law defines [`Law::lost_stiffness`].
+    /// Test whether the law defines [`Law::lost_stiffness`].
     pub fn softens<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
             L::SOFTENS
@@ -127,8 +127,8 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Entries of T⊗Y of eight bonds (see [`ForceState::dyad`]) times two factors; entries beyond `D`
-    /// dimensions are 0.
+    /// Return the given entries of T⊗Y of eight bonds (see [`ForceState::dyad`]), multiplied by the two
+    /// `factors`. Entries beyond `D` dimensions are 0.
     #[inline(never)]
     pub fn stress_contribution<const D: usize>(
         &self,
@@ -157,7 +157,7 @@ impl AnyLaw {
         })
     }
 
-    /// [`Law::counts`] in `D` dimensions.
+    /// Return [`Law::counts`] in `D` dimensions.
     pub fn counts<const D: usize>(&self) -> Counts {
         with_law!(self, law => Law::<D>::counts(law))
     }

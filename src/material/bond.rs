@@ -87,7 +87,7 @@ impl Weights {
         }
     }
 
-    /// Weight at point i.
+    /// Return the weight at point i.
     #[inline(always)]
     pub fn own(self) -> Lanes {
         match self {
@@ -96,7 +96,7 @@ impl Weights {
         }
     }
 
-    /// Weight at neighbour j.
+    /// Return the weight at neighbour j.
     #[inline(always)]
     pub fn far(self) -> Lanes {
         match self {
@@ -119,7 +119,7 @@ impl Weights {
 /// The elastic part of the relative displacement of eight bonds at a temperature.
 #[derive(Debug, Clone, Copy)]
 pub struct Elastic<const D: usize> {
-    /// η of Y/(1 + a), m.
+    /// Elastic relative displacement Y/(1 + a) − ξ, m.
     pub eta: [Lanes; D],
     /// ∂(Y/(1 + a))/∂Y = 1/(1 + a).
     pub slope: Lanes,
@@ -261,7 +261,8 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 }
 
 impl<const D: usize> Bond<D> {
-    /// Compute the stretches. Loops call this only for the groups of bonds that need stretches.
+    /// Compute the stretches; with `linear`, [`deform`] has set them already. Loops call this only for the
+    /// groups of bonds that need stretches.
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);

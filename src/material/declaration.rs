@@ -16,14 +16,15 @@ pub struct Declaration {
     pub name: &'static str,
     /// Description of the forces, one line.
     pub force: &'static str,
-    /// Keys of the law in addition to density, elastic constants and damping.
+    /// Keys of the law in addition to the keys common to all laws.
     pub keys: &'static [Key],
     /// Whether Poisson's ratio is free, so that the deck gives two elastic constants. Otherwise the ratio is
     /// that of [bond-based laws](Dimension::bond_based_poisson_ratio).
     pub any_poisson_ratio: bool,
     /// Reason for the lack of a 1-D form, and the alternative; `None` if the law has a 1-D form.
     pub no_line: Option<&'static str>,
-    /// Whether forces act along ξ and are linear in the displacements, so that they ignore rotation.
+    /// Whether forces act along ξ and are linear in the displacements, so that the law holds for small
+    /// rotations only.
     pub linear: bool,
     /// Return the invariants of the law with these values of its keys.
     pub invariants: fn(&Values) -> Invariants,
@@ -54,8 +55,9 @@ pub struct Declaration {
 }
 
 impl Declaration {
-    /// A law with default properties. It has no keys, exists in every dimension and has the Poisson ratio of
-    /// bond-based laws. Its forces act along Y and derive from an energy. Its bonds never break.
+    /// Create a declaration with default properties. The law has no keys, exists in every dimension and has
+    /// the Poisson ratio of bond-based laws. Its forces act along Y and derive from an energy. Its bonds
+    /// never break.
     pub const fn new(name: &'static str, force: &'static str, build: fn(&Given) -> Built) -> Self {
         Self {
             name,
@@ -78,12 +80,12 @@ impl Declaration {
         }
     }
 
-    /// Whether the law breaks bonds without a damage law.
+    /// Test whether the law breaks bonds without a damage law.
     pub fn breaks_by_itself(&self) -> bool {
         self.own_critical_stretch.is_some()
     }
 
-    /// Whether the law exists in this dimension, with the defaults of its keys.
+    /// Test whether the law exists in this dimension, with the defaults of its keys.
     pub fn is_for(&self, dimension: Dimension) -> bool {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }
@@ -192,7 +194,7 @@ pub struct Word {
 }
 
 impl Word {
-    /// A word that every dimension supports.
+    /// Return a word that every dimension supports.
     pub const fn new(word: &'static str) -> Self {
         let no_line = None;
         Self { word, no_line }
@@ -233,7 +235,7 @@ impl From<&str> for Value {
 pub struct Values(Vec<(&'static str, Option<Value>)>);
 
 impl Values {
-    /// The defaults of these keys.
+    /// Return the defaults of these keys.
     pub fn defaults(keys: &[Key]) -> Self {
         let default = |key: &Key| match &key.kind {
             Kind::Number { default, .. } => default.map(Value::Number),
@@ -243,7 +245,7 @@ impl Values {
         Self(keys.iter().map(|key| (key.name, default(key))).collect())
     }
 
-    /// Set the value of a key, which must be one of the law's keys.
+    /// Set the value of a key. A key that the law does not have is ignored.
     pub fn set(&mut self, key: &str, value: Value) {
         if let Some((_, old)) = self.0.iter_mut().find(|(name, _)| *name == key) {
             *old = Some(value);
@@ -311,12 +313,13 @@ pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
 pub struct Built {
     /// The law that the loops over bonds call.
     pub law: AnyLaw,
-    /// Influence function: factor on a bond of a length (m) in all sums of a point; `None` for 1.
+    /// Influence function of the bond's length (m): factor on the bond in all sums of a point. `None` if
+    /// this factor is 1 for all bonds.
     pub influence: Option<Box<dyn Fn(f64) -> f64 + Sync>>,
 }
 
 impl Built {
-    /// A law without influence function.
+    /// Return a law without influence function.
     pub fn plain(law: impl Into<AnyLaw>) -> Self {
         Self {
             law: law.into(),
@@ -324,7 +327,7 @@ impl Built {
         }
     }
 
-    /// A law with an influence function of the bond's length (m).
+    /// Return a law with an influence function of the bond's length (m).
     pub fn with_influence(
         law: impl Into<AnyLaw>,
         influence: impl Fn(f64) -> f64 + Sync + 'static,

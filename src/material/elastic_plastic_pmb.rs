@@ -53,8 +53,8 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Critical stretch s0 at which breaking a bond dissipates the energy of an elastic bond with the critical
-/// stretch s_e.
+/// Return the critical stretch s0 of a fracture energy (J/m²). At s0, breaking a bond dissipates the same
+/// energy as breaking an elastic bond at its critical stretch s_e.
 ///
 /// Breaking dissipates c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
 /// s0 = s_e²/(2 s_y) + s_y/2 if s_e > s_y; otherwise s0 = s_e.

@@ -18,10 +18,11 @@ pub trait ForceState<const D: usize>: Copy {
     /// Add the force state of the other end, −T_j⟨−ξ⟩.
     fn plus(self, other: Self) -> Self;
 
-    /// Add to `sums` the force density (N/m³) of the bonds whose bit is set.
+    /// Add to `sums` the force density (N/m³) of the bonds whose bit is set: the force state times
+    /// `volume`, Ṽ_j (m³).
     fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]);
 
-    /// Component of the symmetric part of T⊗Y, J/m⁶.
+    /// Return the component ab of the symmetric part of T⊗Y, J/m⁶.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
     /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. Both
@@ -69,7 +70,7 @@ impl<const D: usize> ForceState<D> for Along {
         self.0 * bond.deformed[a] * bond.deformed[b]
     }
 
-    /// ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
+    /// Return ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x); for linear laws ½ t ξ·η.
     #[inline(always)]
     fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 0]) -> Lanes {
         let share = if linear {

@@ -172,11 +172,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether the law overrides [`Self::lost_stiffness`].
     const SOFTENS: bool = false;
 
-    /// Whether the stress of a point, including [`Self::stress_across`], is the mean of the stresses of its
-    /// bonds.
+    /// Whether the stress of a point is the mean of the stresses of its bonds, so that
+    /// [`Self::bond_stress_across`] replaces [`Self::stress_across`].
     const HAS_BOND_STRESS_ACROSS: bool = false;
 
-    /// Contribution of an undeformed bond to the sums over the initial family.
+    /// Return the contribution of an undeformed bond to the sums over the initial family.
     #[inline(always)]
     fn reference_contribution(&self, _bond: &Bond<D>) -> Self::ReferenceSum {
         Self::ReferenceSum::splat(0.0)
@@ -185,8 +185,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Compute the constants of a point from the sums over its initial family.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
-    /// Contribution of an intact bond to the sums of pass `S`. The contribution may read the numbers that
-    /// earlier passes computed.
+    /// Return the contribution of an intact bond to the sums of pass `S`. The contribution may read the
+    /// numbers that earlier passes computed.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -215,13 +215,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Counts::of::<Self, D>()
     }
 
-    /// Whether points store a [`PlasticState`].
+    /// Test whether points store a [`PlasticState`].
     fn has_plasticity(&self) -> bool {
         false
     }
 
-    /// Whether a pass reads the bond history after the step. Otherwise the pass reads the history before the
-    /// step.
+    /// Test whether a pass reads the bond history after the step. Otherwise the pass reads the history before
+    /// the step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
@@ -238,13 +238,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         *before
     }
 
-    /// Force state T of one end, N/m⁶. A force along the bond is returned as T/|Y|, or T/|ξ| for linear laws,
-    /// N/m⁷.
+    /// Return the force state T of one end, N/m⁶. A force along the bond is returned as T/|Y|, or T/|ξ| for
+    /// linear laws, N/m⁷.
     fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
-    /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. The results
-    /// of both ends are equal to the last bit, except for the sign. Laws may override this function to save
-    /// operations.
+    /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
+    /// ends. The results of both ends are equal to the last bit, except for the sign. Laws may override
+    /// this function to save operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -263,8 +263,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         }
     }
 
-    /// [Work](ForceState::work) of the force state of one end, J/m⁶, with the [`Self::rotation`] of its
-    /// family.
+    /// Return the [work](ForceState::work) of the force state of one end, J/m⁶, with the [`Self::rotation`]
+    /// of its family.
     #[inline(always)]
     fn end_work<S: Simd>(
         &self,
@@ -278,8 +278,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         force.work(simd, bond, Self::LINEAR, rotation)
     }
 
-    /// Rotation of a family from the sums of the first pass, for laws whose forces do not act along the
-    /// bonds.
+    /// Return the rotation of a family from the sums of the first pass. The default is the identity, for
+    /// laws whose forces act along the bonds.
     fn rotation(&self, _sums: &[f64]) -> Rotation {
         rotation::IDENTITY
     }
@@ -296,26 +296,27 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Contribution of a bond to the strain energy density of one end, J/m⁶.
+    /// Return the contribution of a bond to the strain energy density of one end, J/m⁶.
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Lanes;
 
-    /// Part of a point's strain energy density (J/m³) that is not a sum over bonds.
+    /// Return the part of a point's strain energy density (J/m³) that is not a sum over bonds.
     fn point_energy(&self, _numbers: &[f64]) -> f64 {
         0.0
     }
 
-    /// Weighted volume m (m⁵) of a point from its numbers, for laws that store it.
+    /// Return the weighted volume m (m⁵) of a point from its numbers; `None` if the law does not store m,
+    /// or the point has no bonds.
     fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
-    /// Dilatation θ of a point from its numbers. `None` for the default θ = (d/m) Σ ω|ξ|εṼ.
+    /// Return the dilatation θ of a point from its numbers. `None` for the default θ = (d/m) Σ ω|ξ|εṼ.
     fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
-    /// Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the plane.
-    /// `None` for ν (τ_xx + τ_yy), which holds for laws that are linear in the strain.
+    /// Return the Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the
+    /// plane. `None` for ν (τ_xx + τ_yy), which holds for laws that are linear in the strain.
     fn stress_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -324,14 +325,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Contribution of a bond to [`Self::stress_across`] if [`Self::HAS_BOND_STRESS_ACROSS`], Pa/m³.
+    /// Return the contribution of a bond to the stress across the plane, Pa/m³; for laws with
+    /// [`Self::HAS_BOND_STRESS_ACROSS`].
     #[inline(always)]
     fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// Stretch F_zz across the plane in plane stress, at a displacement gradient of the plane. If `None`,
-    /// F_zz follows from Hooke's law with logarithmic strains.
+    /// Return the stretch F_zz across the plane in plane stress, at a displacement gradient of the plane.
+    /// If `None`, F_zz follows from Hooke's law with logarithmic strains.
     fn stretch_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -340,50 +342,52 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Whether points need enough bonds in all directions, compared with their family before pre-cracks.
+    /// Test whether points need enough bonds in all directions, compared with their family before pre-cracks.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Whether a point carries no force, because its intact bonds are too few for the law, or because the law
-    /// has no stress at its deformation.
+    /// Test whether a point carries no force, because its intact bonds are too few for the law, or because
+    /// the law has no stress at its deformation.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
 
-    /// Energy that a bond, intact or broken, has dissipated at one end, without the energy of breaking, J/m⁶.
+    /// Return the energy that a bond, intact or broken, has dissipated at one end, without the energy of
+    /// breaking, J/m⁶.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// Fraction of its stiffness that an intact bond has lost at one end, from 0 to 1. The damage of the
-    /// point counts this fraction of the bond as broken.
+    /// Return the fraction of its stiffness that an intact bond has lost at one end, from 0 to 1. The
+    /// damage of the point counts this fraction of the bond as broken.
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// A spring constant k (N/m⁷) per bond that bounds the energy of one end: W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For
-    /// bond-based laws k = |∂T/∂η|.
+    /// Return a spring constant k (N/m⁷) per bond that bounds the energy of one end: W ≤ ½ Σ k (|Y| − |ξ|)²
+    /// Ṽ. For bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
 
-    /// Whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k |η|²
-    /// Ṽ.
+    /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k
+    /// |η|² Ṽ.
     fn resists_across(&self) -> bool {
         false
     }
 
-    /// Energy per bond of a point, divided by the energy per bond of an interior point at the same strain.
-    /// Computed from the sums of [`Self::reference_contribution`].
+    /// Return the energy per bond of a point, divided by the energy per bond of an interior point at the
+    /// same strain. `_sums` are the sums of [`Self::reference_contribution`].
     ///
-    /// The factor exceeds 1 in truncated families if the law keeps the energy of a point; otherwise it is 1.
+    /// Laws that give truncated families the energy density of untruncated families return more than 1 for
+    /// them. All other laws return 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }
 
-    /// Factor on the critical stretch of a bond, from the numbers of points i and j and the law of point j.
-    /// Both ends compute the same factor.
+    /// Return the factor on the critical stretch of a bond, from the numbers of points i and j and the law
+    /// of point j. Both ends compute the same factor.
     #[inline(always)]
     fn toughness_scale(&self, _bond: &Bond<D>, _points: [&Self::Point; 2], _other: &Self) -> Lanes {
         Lanes::splat(1.0)

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::lanes::Lanes;
 
-/// Exponents of x, y and z in the monomials of a degree, in the order of the sums.
+/// Return the exponents of x, y and z in the monomials of a degree, in the order of the sums.
 pub fn exponents(degree: usize) -> impl Iterator<Item = [usize; 3]> {
     (0..=degree).flat_map(move |z| (0..=degree - z).map(move |y| [degree - z - y, y, z]))
 }

@@ -76,8 +76,8 @@ fn as_printed(given: &Given) -> bool {
     given.values.word(FORM.name) == "diehl2016"
 }
 
-/// Micromodulus of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/Σ V, divided by the horizon
-/// because the influence function is δ/|ξ|.
+/// Return the micromodulus of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/Σ V, divided by
+/// the horizon because the influence function is δ/|ξ|.
 fn printed_micromodulus(given: &Given) -> f64 {
     let volume = match given.dimension {
         Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),
@@ -86,8 +86,8 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// Critical stretch, of the printed law by eq. 16–17 in the plane, and in space from the sum over the bonds
-/// that cross a plane; otherwise that of `pmb`.
+/// Return the critical stretch of a fracture energy (J/m²). For the printed law it follows in the plane
+/// from eq. 16–17, and in space from the energy of all bonds across a plane. Otherwise it is that of `pmb`.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     if !as_printed(given) {
         return bond_based_critical_stretch(given, energy);
@@ -103,7 +103,8 @@ fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 impl Normalised {
-    /// Normalise to the classical energy density of the solid with the Poisson ratio of bond-based laws.
+    /// Create the law that is normalised to the classical energy density of the solid with the Poisson
+    /// ratio of bond-based laws.
     pub(super) fn classical(given: &Given) -> Self {
         Self {
             energy: Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus),

@@ -71,27 +71,27 @@ impl Ordinary {
         [share * self.volumetric * dilatation, dilatation]
     }
 
-    /// Energy density of the dilatation, ½ κθ², J/m³.
+    /// Return the energy density of the dilatation, ½ κθ², J/m³.
     pub(super) fn dilatation_energy(&self, dilatation: f64) -> f64 {
         0.5 * self.volumetric * dilatation.powi(2)
     }
 
-    /// Number of dimensions d.
+    /// Return the number of dimensions d.
     pub fn dimension(&self) -> f64 {
         self.dimension
     }
 
-    /// Constant κ = k′ − A/d², Pa.
+    /// Return the constant κ = k′ − A/d², Pa.
     pub fn volumetric(&self) -> f64 {
         self.volumetric
     }
 
-    /// Constant A of the law, Pa.
+    /// Return the constant A of the law, Pa.
     pub fn extensional(&self) -> f64 {
         self.extensional
     }
 
-    /// m of an untruncated family, m⁵.
+    /// Return m of an untruncated family, m⁵.
     pub(super) fn whole(&self) -> f64 {
         self.whole
     }
@@ -101,8 +101,8 @@ impl Ordinary {
         (extension_factor > 0.0).then(|| self.extensional / extension_factor)
     }
 
-    /// Energy of a bond divided by its energy in an untruncated family, from the weighted volume m of its
-    /// point.
+    /// Return the energy of a bond divided by its energy in an untruncated family, from the weighted volume m
+    /// of its point.
     pub(super) fn truncation_factor_of(&self, sum: f64) -> f64 {
         if sum > 0.0 { self.whole / sum } else { 1.0 }
     }

@@ -102,7 +102,7 @@ impl OrdinaryViscoelastic {
 }
 
 impl<const D: usize> Law<D> for OrdinaryViscoelastic {
-    /// A/m, the force per |ξ| that all bonds of the point share (both N/m⁷), and θ/d.
+    /// A/m and d κ θ/m + λ (A/m²) Σ ω|ξ| e_b Ṽ (both N/m⁷), and θ/d.
     type Point = [Lanes; 3];
     /// e_b/|ξ|, ε_d/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];

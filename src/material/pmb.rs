@@ -55,8 +55,8 @@ impl Pmb {
         Self::new(given.dimension, given.elastic.youngs_modulus, given.horizon)
     }
 
-    /// Classical energy density W₁ at unit isotropic stretch (J/m³), with the Poisson ratio of bond-based
-    /// laws.
+    /// Return the classical energy density W₁ at unit isotropic stretch (J/m³), with the Poisson ratio of
+    /// bond-based laws.
     ///
     /// It is 9K/2 = 3E in 3-D, E/(1−ν) in plane stress and E/((1+ν)(1−2ν)) in plane strain. In 1-D it is E/2
     /// in uniaxial stress and (λ + 2G)/2 in uniaxial strain.
@@ -156,7 +156,7 @@ impl<const D: usize> Law<D> for Pmb {
 mod tests {
     use super::*;
 
-    /// ½ ∫ w dV over an untruncated family at isotropic strain ε: c ε² times ∫ |ξ| dV / 4.
+    /// Return ½ ∫ w dV over an untruncated family at isotropic strain ε: c ε² times ∫ |ξ| dV / 4.
     fn energy_density(dimension: Dimension, horizon: f64, strain: f64) -> f64 {
         let c = Pmb::new(dimension, 1.0, horizon).micromodulus;
         let moment = match dimension {

@@ -39,7 +39,7 @@ macro_rules! register {
                 }
             }
 
-            /// The laws of points i and j.
+            /// Return the laws of points i and j.
             pub fn laws(&self) -> [AnyLaw; 2] {
                 match *self {
                     $(Self::$law([i, j]) => [i.into(), j.into()],)+

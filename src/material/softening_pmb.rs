@@ -71,8 +71,8 @@ const RESIDUAL: f64 = 0.01;
 /// Number of decay stretches from s0 to sc, ln(1/r).
 const DECAYS: f64 = 4.605_170_185_988_092;
 
-/// β and γ of a straight line; then β and γ of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t, 0 at 3.6
-/// G_F/f_t.
+/// β and γ of a straight line. [`CONCRETE`] has β and γ of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t,
+/// 0 at 3.6 G_F/f_t.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
 const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 
@@ -173,7 +173,8 @@ fn number(values: &Values, key: &Key) -> Option<f64> {
     values.get(key.name).map(|_| values.number(key.name))
 }
 
-/// Check that strength and end are each given exactly once, and that only `trilinear` has kink keys.
+/// Return the error if the strength or the end of the curve is not given exactly once, or if a curve other
+/// than `trilinear` has kink keys.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     for [first, second] in [
         [&TENSILE_STRENGTH, &STRENGTH_STRETCH],
@@ -292,8 +293,8 @@ fn rounded(number: f64) -> String {
     digits.parse().map_or(digits, format_number)
 }
 
-/// Return the error of a horizon at which bonds would break before they soften. With a long horizon, bonds at
-/// their strength store more than the fracture energy.
+/// Return the error message if bonds would break before they soften. With a long horizon, bonds at their
+/// strength store more than the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -334,8 +335,9 @@ fn build(given: &Given) -> Built {
 /// Number of directions between the axis and the plane normal to the axis, in the quadrature of the stress.
 const DIRECTIONS: usize = 64;
 
-/// Search for the largest stress: factor of the strain from one sample to the next; fraction of the largest
-/// stress at which the search ends; maximum number of samples.
+/// Search for the largest stress. [`STRAIN_GROWTH`] is the factor of the strain from one sample to the
+/// next. The search ends below the fraction [`PAST_LARGEST`] of the largest stress, or after
+/// [`MOST_STRAINS`] samples.
 const STRAIN_GROWTH: f64 = 1.02;
 const PAST_LARGEST: f64 = 0.95;
 const MOST_STRAINS: usize = 400;
@@ -525,7 +527,7 @@ impl<const D: usize> Law<D> for SofteningPmb {
         squares * bond.length * (0.25 * self.elastic.micromodulus)
     }
 
-    /// Work of loading to κ, minus the work that unloading returns.
+    /// Return the work of loading to κ, minus the work that unloading returns.
     #[inline(always)]
     fn dissipated(&self, length: Lanes, [largest]: &[Lanes; 1]) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {

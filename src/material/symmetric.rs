@@ -9,8 +9,8 @@ use crate::lanes::Lanes;
 /// entry is unused; on a line the only one is unused.
 pub type Symmetric<const D: usize> = ([Lanes; D], [Lanes; D]);
 
-/// Indices of the mixed entries of a symmetric tensor in storage order: yz, xz, xy in space and xy in the
-/// plane.
+/// Return the indices of the mixed entries of a symmetric tensor in storage order: yz, xz, xy in space and xy
+/// in the plane.
 #[inline(always)]
 pub fn mixed<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     const SPACE: [(usize, usize); 3] = [(1, 2), (0, 2), (0, 1)];

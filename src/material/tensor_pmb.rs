@@ -180,7 +180,7 @@ impl<const D: usize> Law<D> for TensorPmb {
             * (0.5 * self.micromodulus)
     }
 
-    /// Spring constant with the largest absolute row sum of H, an upper bound on the eigenvalues.
+    /// Return the spring constant with the largest absolute row sum of H, an upper bound on the eigenvalues.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;
@@ -215,8 +215,8 @@ impl<const D: usize> Law<D> for TensorPmb {
 mod tests {
     use super::*;
 
-    /// H of a point with neighbours at these offsets, all of the same volume, with a micromodulus that suits
-    /// a disc.
+    /// Return H of a point with neighbours at these offsets, all of the same volume, with a micromodulus that
+    /// suits a disc.
     fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
         let mut sums = [0.0; MONOMIALS];
         for [x, y] in offsets {

@@ -1,9 +1,9 @@
 //! Types of elements: corners, dimension and the order of their nodes.
 //!
 //! All types have the node order of VTK here. A node of a second-order element is described by the corners
-//! between which it lies. These are two for an edge, three or four for a face, and all for the element's
-//! centre. The order of another format is a list of such descriptions, which can be compared with the manual
-//! of that format.
+//! between which it lies. A node on an edge lies between two corners, a node on a face between three or
+//! four, and a node at the element's centre between all corners. The order of another format is a list of
+//! such descriptions, which can be compared with the manual of that format.
 
 /// The shape of an element, without its polynomial order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -229,7 +229,7 @@ impl Mesh {
 
     /// Find the group of a key among the groups that `is_wanted` accepts.
     ///
-    /// A key is a name, a number, or both with the kind in front, such as `side set 1`.
+    /// A key is a name or a number. The kind of the group may come before it, such as in `side set 1`.
     ///
     /// # Errors
     /// If the key refers to groups of different kinds; the message lists these groups.
@@ -396,5 +396,6 @@ const FARTHEST: f64 = 1e30;
 /// Result with an error message that does not name the file.
 type Fault<T> = std::result::Result<T, String>;
 
-/// Upper limit of zlib's compression ratio: the content of a file is at most the file's size times this.
+/// Upper limit of zlib's compression ratio: the content of a file is at most this ratio times the file's
+/// size.
 const LARGEST_RATIO: usize = 1100;

@@ -52,9 +52,10 @@ pub struct Header {
     pub further: Vec<FurtherResult>,
     /// Number of rows in the history.
     pub rows: u64,
-    /// Reference values of the history: energy at the start (J), and number of intact bonds before the start.
+    /// Reference values of the history: energy at the start (J), and number of bonds that were intact
+    /// before any bond could break.
     pub start: (f64, u64),
-    /// The deck with all defaults.
+    /// Description of the physics: the deck with all defaults, or a listing of a problem without a deck.
     pub deck: String,
 }
 
@@ -117,7 +118,8 @@ impl Checkpoints {
         NAMES.into_iter().map(move |name| folder.join(name))
     }
 
-    /// Remove existing checkpoints, which would belong to another run. For rank 0.
+    /// Remove existing checkpoints and a leftover temporary file, which would belong to another run. For
+    /// rank 0.
     ///
     /// # Errors
     /// If a file cannot be removed.
@@ -220,7 +222,7 @@ fn newest_first(folder: &Path) -> Result<Vec<u8>> {
 /// Read the header of a checkpoint. Collective.
 ///
 /// # Errors
-/// If another version of Fissure wrote the file.
+/// If the file cannot be read, or another version of Fissure wrote it.
 pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let mut file = CollectiveFile::open(path, comm)?;
     let words = file.integers_attribute("/", "numbers")?;
@@ -269,7 +271,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     })
 }
 
-/// Read the state of this rank's block of ids. Collective.
+/// Read the state of this rank's range of ids. Collective.
 ///
 /// # Errors
 /// If the file cannot be read.

@@ -227,7 +227,7 @@ impl<'a> CollectiveFile<'a> {
     /// Append `additional` rows to an extensible dataset; all ranks pass the same number.
     ///
     /// # Errors
-    /// If the dataset is not extensible or the disk is full.
+    /// If the dataset is not extensible, or a write fails, for example because the disk is full.
     pub fn extend(&mut self, dataset: &mut Dataset, additional: u64) -> Result<()> {
         self.resize(dataset, dataset.rows + additional)
     }
@@ -236,7 +236,7 @@ impl<'a> CollectiveFile<'a> {
     /// arbitrary.
     ///
     /// # Errors
-    /// If the dataset is not extensible or the disk is full.
+    /// If the dataset is not extensible, or a write fails, for example because the disk is full.
     pub fn resize(&mut self, dataset: &mut Dataset, rows: u64) -> Result<()> {
         let shape = dataset.shape(rows).iter().map(|&n| n as usize).collect();
         self.collectively(&format!("cannot resize {}", dataset.path), |_| {
@@ -298,7 +298,8 @@ impl<'a> CollectiveFile<'a> {
     /// be empty.
     ///
     /// # Errors
-    /// If the values are not whole rows within the dataset, or the disk is full.
+    /// If the values are not whole rows within the dataset, or a write fails, for example because the disk is
+    /// full.
     pub fn write_rows<T: hdf5::H5Type>(
         &mut self,
         dataset: &Dataset,
@@ -328,7 +329,7 @@ impl<'a> CollectiveFile<'a> {
     /// could destroy the file.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn flush(&mut self) -> Result<()> {
         if self.size > self.synced {
             return self.sync();
@@ -339,7 +340,7 @@ impl<'a> CollectiveFile<'a> {
     /// [Flush](Self::flush) and fsync, so the file survives a loss of power.
     ///
     /// # Errors
-    /// If the disk is full or cannot be written.
+    /// If a write or the fsync fails, for example because the disk is full.
     pub fn sync(&mut self) -> Result<()> {
         // With MPI, HDF5's flush calls MPI_File_sync, which includes the fsync.
         self.flush_all()?;
@@ -367,7 +368,7 @@ impl<'a> CollectiveFile<'a> {
     /// Fsync and close the file.
     ///
     /// # Errors
-    /// If the disk is full or an earlier operation failed.
+    /// If this or an earlier operation fails, for example because the disk is full.
     pub fn close(mut self) -> Result<()> {
         self.sync()?;
         self.collectively("cannot close the file", |file| {

@@ -15,7 +15,7 @@ pub(super) const POINT_DATA: &str = "/VTKHDF/PointData";
 pub struct FieldDescription {
     /// Name of the field.
     pub name: &'static str,
-    /// Unit, such as `m/s`; empty if dimensionless.
+    /// Unit, such as `m/s`; `1` or empty if dimensionless.
     pub unit: &'static str,
     /// Components per point:
     ///

@@ -125,7 +125,8 @@ impl History {
     /// Append rows to the table and the CSV file; all ranks pass the same rows. Collective.
     ///
     /// # Errors
-    /// If the length of a row differs from the number of columns, or the disk is full.
+    /// If the length of a row differs from the number of columns, or a write fails, for example because the
+    /// disk is full.
     pub fn append(&mut self, file: &mut CollectiveFile<'_>, rows: &[Vec<f64>]) -> Result<()> {
         agree(file.communicator(), self.append_csv(rows))?;
         let first = self.table.rows();

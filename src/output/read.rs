@@ -32,13 +32,13 @@ pub enum Number {
 pub struct StoredField {
     /// Name of the field.
     pub name: String,
-    /// Unit of the field; empty if dimensionless.
+    /// Unit of the field; `1` or empty if dimensionless.
     pub unit: String,
     /// Components per point: 1, 3, 6 or 9.
     pub components: usize,
     /// Number type of the stored values.
     pub number: Number,
-    /// The field changes with time.
+    /// The field has values for each step: it changes with time, or each step has its own points.
     pub dynamic: bool,
 }
 

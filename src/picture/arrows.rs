@@ -19,12 +19,12 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Length of the vectors that have the longest arrow; the arrows of longer vectors are cut. `None` to
+    /// Length of the vectors that have the longest arrow, in the picture; longer arrows are cut. `None` to
     /// choose it from the drawn points.
     pub longest: Option<f64>,
 }
 
-/// Length of the longest arrow, in text sizes. Arrows are at least this far apart.
+/// Length of the longest arrow, in text sizes. The middles of arrows are at least this far apart.
 const LONGEST_ARROW: f64 = 2.4;
 
 /// Edge of the cells of the picture with one arrow each, in text sizes.
@@ -38,7 +38,7 @@ const HEAD: [f64; 2] = [0.5, 0.2];
 
 const WHITE: Colour = [255; 3];
 
-/// Draw arrows in the middle of which are the points, and the legend.
+/// Draw arrows whose middles are at the points, and the legend.
 ///
 /// The length of an arrow is proportional to the projection of the vector, up to the length `longest` of a
 /// vector. Only some points have arrows, so that arrows do not overlap.
@@ -220,7 +220,8 @@ mod tests {
                     assert!(x.hypot(y) > 23.9, "{spacing}");
                 }
             }
-            // At least a quarter of the cells have an arrow, and all of far points.
+            // At least a quarter of the cells have an arrow. If the points are farther apart than a cell,
+            // all points have one.
             let cells = (99.0 * spacing / 30.0).powi(2).min(10_000.0);
             assert!(kept.len() as f64 > cells / 4.0, "{spacing}: {}", kept.len());
             assert_eq!(kept.len() == 10_000, spacing > 30.0);

@@ -35,6 +35,9 @@ impl Image {
     }
 
     /// Write the picture as an eight-bit RGB PNG file.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
         let mut encoder =
             png::Encoder::new(BufWriter::new(File::create(path)?), self.width, self.height);

@@ -11,8 +11,8 @@ use super::points::Colouring;
 use super::projection::Projection;
 use super::scene::Mark;
 
-/// Largest distance of a cell from its point, in edges of a cube or square with the volume of the point.
-/// Cells of a lattice end 0.5 to 0.71 edges away from their points.
+/// Largest distance of a pixel of a cell from its point, in edges of a cube or square with the volume of
+/// the point. Cells of a lattice end 0.5 to 0.71 edges away from their points.
 const REACH: f64 = 0.6;
 
 /// Largest distance from a point, in edges, of a pixel that has points within this distance on all sides.

@@ -73,7 +73,7 @@ impl ColourMap {
     }
 }
 
-/// Test whether a field is a damage, which is at least 0.
+/// Test whether the name of a field contains "damage". A damage is at least 0.
 pub fn is_damage(field: &str) -> bool {
     field.to_lowercase().contains("damage")
 }

@@ -65,7 +65,8 @@ pub fn segments(samples: &[Sample], levels: &[f64]) -> Vec<[[f64; 2]; 2]> {
         }
         for level in levels {
             let mut crossings = sides.iter().filter_map(|side| crossing(side, *level));
-            // A side is crossed if one of its ends is below the level, so none or two sides are.
+            // A side is crossed if exactly one of its ends is below the level, so none or two sides are
+            // crossed.
             if let (Some(from), Some(to)) = (crossings.next(), crossings.next()) {
                 found.push([from, to]);
             }

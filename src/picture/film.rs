@@ -15,7 +15,7 @@ impl Film {
     /// Begin a film of `frames` frames like `first`, each shown for 1/`rate` s.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// If the file cannot be written, or `frames` is 0.
     pub fn create(path: &Path, first: &Image, frames: u32, rate: u16) -> std::io::Result<Self> {
         let file = BufWriter::new(File::create(path)?);
         let mut encoder = png::Encoder::new(file, first.width, first.height);
@@ -30,7 +30,7 @@ impl Film {
     /// Append a frame.
     ///
     /// # Errors
-    /// If the file cannot be written, or the frame has another size than the first one.
+    /// If the file cannot be written, or the frame has another number of pixels than the first one.
     pub fn append(&mut self, frame: &Image) -> std::io::Result<()> {
         Ok(self.writer.write_image_data(&frame.rgb)?)
     }

@@ -16,7 +16,7 @@ pub struct Layout {
     pub columns: [f64; 2],
     /// Top and bottom edge of the frame.
     pub rows: [f64; 2],
-    /// Left, right, top and bottom edge of the colour bar.
+    /// Position of the colour bar.
     pub bar: Bar,
     /// Pixels per metre.
     pub scale: f64,
@@ -51,7 +51,7 @@ const RIGHT: f64 = 3.0;
 const LEGEND: f64 = 1.5;
 /// Margin in text sizes without labels.
 const EMPTY: f64 = 2.2;
-/// Least height of the frame in text sizes.
+/// Least height of the frame in text sizes. The least width is twice this.
 const LEAST_HEIGHT: f64 = 3.4;
 /// Least height of a frame with a vertical bar beside it, in text sizes.
 const UPRIGHT_HEIGHT: f64 = 11.0;

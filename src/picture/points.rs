@@ -24,7 +24,8 @@ impl Colouring {
         self.map.colour(self.fraction(value))
     }
 
-    /// Return the position of a value between the ends, from 0 to 1; NaN without such a position.
+    /// Return the position of a value on the scale: 0 at the low end, 1 at the high end, and numbers
+    /// outside of 0 to 1 beyond the ends. Return NaN if the value has no position.
     pub fn fraction(&self, value: f64) -> f64 {
         let (low, high) = self.range;
         if !self.is_logarithmic {
@@ -36,7 +37,7 @@ impl Colouring {
         }
     }
 
-    /// Return the value at a position between the ends, from 0 to 1.
+    /// Return the value at a position on the scale, from 0 to 1.
     pub fn value(&self, fraction: f64) -> f64 {
         let (low, high) = self.range;
         if self.is_logarithmic {

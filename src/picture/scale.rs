@@ -39,7 +39,8 @@ impl Scale {
     }
 
     /// Create a logarithmic scale from `low` to `high`, both above 0, with about `most` ticks or fewer. The
-    /// ticks are at powers of ten; within less than two decades, also at 2 and 5 times these.
+    /// ticks are at powers of ten; with fewer than three powers of ten, also at 2 and 5 times these. With
+    /// fewer than two such ticks, the ticks are at round numbers.
     pub fn logarithmic(low: f64, high: f64, unit: &str, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, high);
         let factor = 10_f64.powi(-exponent);

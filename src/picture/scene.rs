@@ -69,7 +69,7 @@ pub struct Scene<'a> {
     /// True for each scattered point, which is drawn as a Voronoi cell in flat views. Other points are drawn
     /// as squares. Empty if no point is scattered.
     pub scattered: &'a [bool],
-    /// Value of each point, which gives the colour; NaN is grey.
+    /// Value of each point, which gives the colour; NaN is grey, or pale blue in the grey map.
     pub values: &'a [f64],
     /// Name of the values, for the colour bar. A name that contains "damage" is a damage: by default, it has
     /// the colour map of damage and a range from 0.
@@ -90,7 +90,7 @@ pub struct Scene<'a> {
     pub width: u32,
     /// Lines over the points of a flat view (m), each with the index of its colour.
     pub lines: &'a [(usize, Vec<[f64; 3]>)],
-    /// Values of lines over the points of a flat view on which the values are equal.
+    /// Values of the lines of equal value over the points of a flat view.
     pub contours: &'a [f64],
     /// Vector field that is drawn as arrows.
     pub vectors: Option<Vectors<'a>>,

@@ -45,7 +45,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Edges of a cell (m); `None` if the points do not lie in lattice cells.
+    /// Return the edges of a cell (m); `None` if the points do not lie in lattice cells.
     pub fn spacing(&self) -> Option<[f64; 3]> {
         match self.body.points {
             PointSource::Lattice { spacing, .. } => Some(spacing.map(|edge| edge * self.scale())),
@@ -53,31 +53,31 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Spacing relative to that of level 0: 2^−level.
+    /// Return the spacing relative to that of level 0: 2^−level.
     fn scale(&self) -> f64 {
         0.5_f64.powi(self.level as i32)
     }
 }
 
 impl Problem {
-    /// Number of blocks.
+    /// Return the number of blocks.
     pub fn block_count(&self) -> usize {
         let levels = self.refinement.as_ref().map(|refinement| refinement.levels);
         let parts = levels.map_or(1, |finest| KINDS * (finest as usize + 1));
         parts * self.bodies.len()
     }
 
-    /// Number of the block with this body, level and kind.
+    /// Return the number of the block with this body, level and kind.
     pub fn block_number(&self, body: usize, level: u32, kind: Kind) -> usize {
         body + self.bodies.len() * (KINDS * level as usize + kind as usize)
     }
 
-    /// Index of the body that a block belongs to.
+    /// Return the index of the body that a block belongs to.
     pub fn body_of(&self, block: usize) -> usize {
         block % self.bodies.len()
     }
 
-    /// The block with this number.
+    /// Return the block with this number.
     pub fn block(&self, number: usize) -> Block<'_> {
         let body = &self.bodies[self.body_of(number)];
         let part = number / self.bodies.len();
@@ -91,7 +91,7 @@ impl Problem {
         }
     }
 
-    /// All blocks in the order of their numbers.
+    /// Return all blocks in the order of their numbers.
     pub fn blocks(&self) -> impl Iterator<Item = Block<'_>> + Clone {
         (0..self.block_count()).map(|number| self.block(number))
     }

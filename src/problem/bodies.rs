@@ -34,22 +34,22 @@ pub struct Body {
 }
 
 impl Body {
-    /// Whether bonds of the body can break, by a damage law or by the law of its material.
+    /// Test whether bonds of the body can break, by a damage law or by the law of its material.
     pub fn can_break(&self) -> bool {
         self.damage.is_some() || self.material.law.declaration.breaks_by_itself()
     }
 
-    /// Whether the points are the centres or Gauss points of the cells of a lattice.
+    /// Test whether the points are the centres or Gauss points of the cells of a lattice.
     pub fn is_on_lattice(&self, jitter: Option<Jitter>) -> bool {
         jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })
     }
 
-    /// Whether the cells have several points.
+    /// Test whether the cells have several points.
     pub fn has_gauss_points(&self) -> bool {
         self.quadrature() == Quadrature::Gauss
     }
 
-    /// Positions of the points in a cell. Points from a file or a mesh count as centres.
+    /// Return the positions of the points in a cell. Points from a file or a mesh count as centres.
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
             PointSource::Lattice { quadrature, .. } => quadrature,
@@ -96,7 +96,7 @@ pub enum Quadrature {
 }
 
 impl Quadrature {
-    /// Number of points in a cell of this dimension.
+    /// Return the number of points in a cell of this dimension.
     pub fn points(self, dimension: usize) -> u32 {
         match self {
             Self::Midpoint => 1,
@@ -161,7 +161,7 @@ pub enum InterfaceDamage {
 }
 
 impl InterfaceDamage {
-    /// The separate damage law; `None` for other variants.
+    /// Return the separate damage law; `None` for other variants.
     pub fn own(&self) -> Option<&Damage> {
         match self {
             Self::Own(damage) => Some(damage),
@@ -171,7 +171,7 @@ impl InterfaceDamage {
 }
 
 impl Interface {
-    /// The entry of [`Self::pairs`] for two bodies, in any order; `None` if there is none.
+    /// Return the entry of [`Self::pairs`] for two bodies, in any order; `None` if there is none.
     pub fn pair(&self, here: &Body, there: &Body) -> Option<&InterfacePair> {
         self.pairs.iter().find(|pair| {
             let [a, b] = &pair.bodies;
@@ -179,8 +179,8 @@ impl Interface {
         })
     }
 
-    /// The rule of the bonds between two bodies, which does not depend on their order. Within a body, each
-    /// end uses its own constants.
+    /// Return the rule of the bonds between two bodies, which does not depend on their order. Within a body,
+    /// each end uses its own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
@@ -189,8 +189,8 @@ impl Interface {
         own.map_or(self.rule, |pair| pair.rule)
     }
 
-    /// Breaking of the bonds between two bodies, which does not depend on their order. Within a body, the
-    /// damage law of the body decides.
+    /// Return how the bonds between two bodies break, which does not depend on their order. Within a body,
+    /// the damage law of the body decides.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
@@ -198,12 +198,12 @@ impl Interface {
 }
 
 impl InterfacePair {
-    /// The separate damage law of the pair; `None` if the pair has none.
+    /// Return the separate damage law of the pair; `None` if the pair has none.
     pub fn own_damage(&self) -> Option<&Damage> {
         self.damage.own()
     }
 
-    /// Whether the body is one of the pair.
+    /// Test whether the body is one of the pair.
     pub fn has(&self, body: &Body) -> bool {
         self.bodies.contains(&body.name)
     }
@@ -252,7 +252,7 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The mean stress of the two points of the bond.
+    /// The mean of the stress measures of the bond's two points.
     Stress(StressRule),
 }
 
@@ -272,7 +272,7 @@ pub enum Toughness {
 /// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// Points in the cells of a lattice, if the centre of the cell lies within a shape.
+    /// Points in those cells of a lattice whose centre lies within a shape.
     Lattice {
         /// The region that the cells fill.
         shape: Shape,
@@ -287,7 +287,7 @@ pub enum PointSource {
     File {
         /// Path, relative to the working directory or absolute.
         path: PathBuf,
-        /// Block number of the rows that are used; `None` for all rows.
+        /// Block number of the rows that are used; `None` for all rows that belong to no other body.
         block: Option<u32>,
         /// Meaning of the columns; `None` if the deck does not name them.
         columns: Option<Columns>,
@@ -482,7 +482,7 @@ pub enum Crack {
 }
 
 impl Crack {
-    /// Whether the crack is a slot with a width.
+    /// Test whether the crack is a slot with a width.
     pub fn has_width(&self) -> bool {
         let (Self::Segment { width, .. }
         | Self::Rectangle { width, .. }
@@ -492,7 +492,7 @@ impl Crack {
 }
 
 impl DamageRule {
-    /// Whether the damage is calibrated with the separation energy ratio, and this ratio has not been
+    /// Test whether the damage is calibrated with the separation energy ratio, and this ratio has not been
     /// computed yet.
     pub fn is_unmeasured(self) -> bool {
         matches!(

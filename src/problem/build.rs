@@ -161,7 +161,7 @@ impl Problem {
 }
 
 impl Action {
-    /// The deck's key for this condition. A traction or pressure is stored as a body force.
+    /// Return the deck's key for this condition. A traction or pressure is stored as a body force.
     fn quantity(&self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",
@@ -174,7 +174,7 @@ impl Action {
 }
 
 impl Problem {
-    /// Whether any bonds can break.
+    /// Test whether any bonds can break.
     pub fn has_damage(&self) -> bool {
         self.bodies.iter().any(Body::can_break)
             || (self.interface.pairs.iter()).any(|pair| pair.own_damage().is_some())
@@ -195,7 +195,7 @@ impl Material {
 }
 
 impl Damage {
-    /// Create a damage law by critical stretch or work, without scatter and no-failure sets.
+    /// Create a damage law with α = 0, without scatter, dependence on direction and no-failure sets.
     pub fn new(rule: DamageRule, toughness: Toughness) -> Self {
         Self {
             rule,

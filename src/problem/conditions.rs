@@ -24,7 +24,7 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// Whether the initial values include displacements.
+    /// Test whether the initial values include displacements.
     pub fn displaces(&self) -> bool {
         let by_file = |file: &InitialFile| file.columns.has_displacement();
         self.displacement.is_some() || self.file.as_ref().is_some_and(by_file)
@@ -55,8 +55,8 @@ pub struct Condition {
     pub quantity: &'static str,
     /// Span of this key in the deck.
     pub place: Range<usize>,
-    /// Thickness (m) of the layer that carries a traction or pressure, if the deck does not give it. It is
-    /// then the spacing.
+    /// Default thickness (m) of the layer that carries a traction or pressure: the spacing. `None` if the
+    /// deck gives the thickness, and for other quantities.
     pub default_depth: Option<f64>,
     /// The prescribed quantity and its values.
     pub action: Action,
@@ -78,12 +78,12 @@ pub enum Action {
 }
 
 impl Action {
-    /// Whether the condition adds forces.
+    /// Test whether the condition adds forces.
     pub fn is_load(&self) -> bool {
         matches!(self, Self::BodyForce(..) | Self::Force(_))
     }
 
-    /// Whether the condition prescribes displacement or velocity.
+    /// Test whether the condition prescribes displacement or velocity.
     pub fn is_support(&self) -> bool {
         matches!(self, Self::Displacement(_) | Self::Velocity(_))
     }

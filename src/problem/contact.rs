@@ -50,7 +50,7 @@ pub enum ContactModel {
 }
 
 impl Contact {
-    /// The contact rule for points of two bodies, independent of their order; `None` for no contact.
+    /// Return the contact rule for points of two bodies, independent of their order; `None` for no contact.
     pub fn between(&self, here: &Body, there: &Body) -> Option<ContactRule> {
         let names = [&here.name, &there.name];
         let own = self.pairs.iter().find(|pair| pair.is_of(names));
@@ -59,7 +59,7 @@ impl Contact {
 }
 
 impl ContactPair {
-    /// Whether the pair consists of bodies with these names, in any order.
+    /// Test whether the pair consists of bodies with these names, in any order.
     pub fn is_of(&self, [first, second]: [&String; 2]) -> bool {
         let [a, b] = &self.bodies;
         [a, b] == [first, second] || [a, b] == [second, first]

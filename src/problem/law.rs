@@ -58,8 +58,8 @@ impl Law {
         Ok(self)
     }
 
-    /// Check that all required keys are given and that the law supports this dimension. Return the first
-    /// fault.
+    /// Return the first fault of the law: a missing key, an invalid combination of values, or a dimension
+    /// that the law does not support. `None` if there is no fault.
     pub fn fault(&self, dimension: Dimension) -> Option<LawFault> {
         for key in self.declaration.keys {
             let required = matches!(key.kind, Kind::Number { .. });
@@ -89,7 +89,7 @@ impl Law {
         })
     }
 
-    /// Reason why bodies of this law cannot have this damage; `None` if they can.
+    /// Return the reason why bodies of this law cannot have this damage; `None` if they can.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
@@ -138,7 +138,8 @@ impl Law {
         ))
     }
 
-    /// Name of the key whose value is an expression of the bond's length; `None` if no key has such a value.
+    /// Return the name of the key whose value is an expression of the bond's length; `None` if no key has
+    /// such a value.
     pub fn key_of_length(&self) -> Option<&'static str> {
         let mut names = self.declaration.keys.iter().map(|key| key.name);
         names.find(|name| self.values.of_length(name).is_some())
@@ -179,7 +180,7 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     }
 }
 
-/// Description of the values that a key allows, for error messages.
+/// Return the description of the values that a key allows, for error messages.
 pub fn wanted(key: &Key) -> String {
     match &key.kind {
         Kind::Number { .. } | Kind::Optional { .. } | Kind::OfLength => {
@@ -196,7 +197,7 @@ fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     format!("unknown name `{name}`{}", suggestion(name, known))
 }
 
-/// Names of laws in backticks, such as `a`, `b` and `c`. `and` is the last conjunction.
+/// Format names of laws in backticks, such as `a`, `b` and `c`. `and` is the last conjunction.
 pub fn names(laws: impl IntoIterator<Item = &'static Declaration>, and: &str) -> String {
     listed(laws.into_iter().map(|law| format!("`{}`", law.name)), and)
 }

@@ -101,8 +101,9 @@ pub struct Places {
     pub horizon: Range<usize>,
     /// Span of the end time.
     pub end: Range<usize>,
-    /// The time step; the span of the end time if the step is automatic.
+    /// Span of the time step; the span of the end time if the step is automatic.
     pub step: Range<usize>,
-    /// The first setting of `[time.adaptive]`; the span of the end time without an adaptive step.
+    /// Span of the first table `adaptive` of the run or of its stages; the span of the end time if there is
+    /// no such table.
     pub adaptive: Range<usize>,
 }

@@ -57,7 +57,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Section of this output in the deck, for messages.
+    /// Return the section of this output in the deck, for messages.
     pub fn section(&self) -> String {
         match &self.name {
             None => "[output]".to_owned(),
@@ -65,7 +65,7 @@ impl Output {
         }
     }
 
-    /// Whether the result contains the number of bonds that have broken since its last output.
+    /// Test whether the result contains the number of bonds that have broken since its last output.
     pub fn counts_newly_broken(&self) -> bool {
         self.fields.contains(&Field::NewlyBrokenBonds)
     }
@@ -86,7 +86,7 @@ pub struct History {
     pub angular_momentum: bool,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
-    /// Sums and extremes of fields over sets.
+    /// Sums, means and extremes of fields over sets.
     pub statistics: Vec<FieldStatistics>,
     /// Probes: positions; the history contains values of the point nearest to each.
     pub probes: Vec<Probe>,
@@ -298,7 +298,7 @@ impl Field {
         Self::Rank,
     ];
 
-    /// Name of the field in decks and results.
+    /// Return the name of the field in decks and results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Displacement => "displacement",
@@ -326,7 +326,7 @@ impl Field {
         }
     }
 
-    /// SI unit of the field.
+    /// Return the SI unit of the field.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement => "m",
@@ -351,8 +351,8 @@ impl Field {
         }
     }
 
-    /// Number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for other
-    /// tensors. Vectors and tensors are padded in 1-D and 2-D.
+    /// Return the number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for
+    /// other tensors. Vectors and tensors are padded in 1-D and 2-D.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement
@@ -390,18 +390,18 @@ pub(crate) const DEFAULT_CHECKPOINT: f64 = 600.0;
 pub(crate) const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
 impl Problem {
-    /// The main output, then the further outputs.
+    /// Return the main output, then the further outputs.
     pub fn outputs(&self) -> impl Iterator<Item = &Output> {
         [&self.output].into_iter().chain(&self.further_outputs)
     }
 
-    /// The further outputs that contain the number of bonds that have broken since their last output.
+    /// Return the further outputs that contain the number of bonds that have broken since their last output.
     pub fn further_counts(&self) -> impl Iterator<Item = &Output> {
         let further = self.further_outputs.iter();
         further.filter(|output| output.counts_newly_broken())
     }
 
-    /// Interval of rows of the history.
+    /// Return the interval of rows of the history.
     pub fn row_interval(&self) -> Interval {
         let seconds = self.time.end / ROWS;
         let default = if self.is_quasi_static() {

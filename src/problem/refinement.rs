@@ -70,13 +70,13 @@ pub struct RefinedRegion {
 }
 
 impl Problem {
-    /// Criteria of refinement during the run; `None` without them.
+    /// Return the criteria of refinement during the run; `None` without them.
     pub fn refinement_trigger(&self) -> Option<&Trigger> {
         let refinement = self.refinement.as_ref();
         refinement.and_then(|refinement| refinement.trigger.as_ref())
     }
 
-    /// Whether grids are coarsened again during the run.
+    /// Test whether grids are coarsened again during the run.
     pub fn may_coarsen(&self) -> bool {
         let trigger = self.refinement_trigger();
         trigger.is_some_and(|trigger| trigger.coarsen_after.is_some())

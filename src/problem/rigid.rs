@@ -70,7 +70,7 @@ pub enum RigidMotion {
 }
 
 impl Problem {
-    /// Whether the problem has contact between points or with rigid bodies.
+    /// Test whether the problem has contact between points or with rigid bodies.
     pub fn has_contact(&self) -> bool {
         self.contact.is_some() || !self.rigid.is_empty()
     }

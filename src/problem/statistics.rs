@@ -38,7 +38,7 @@ pub enum Statistic {
 }
 
 impl Statistic {
-    /// Name in decks and columns.
+    /// Return the name in decks and columns.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sum => "sum",
@@ -49,7 +49,7 @@ impl Statistic {
         }
     }
 
-    /// SI unit, for values of a field.
+    /// Return the SI unit, for values of a field.
     pub fn unit(self, field: Field) -> &'static str {
         match self {
             Self::Sum | Self::Mean | Self::Minimum | Self::Maximum => field.unit(),

@@ -14,7 +14,7 @@ pub struct ThermalExpansion {
 }
 
 impl ThermalExpansion {
-    /// Free stretch per kelvin in the plane or along the bar, 1/K, for Poisson's ratio ν.
+    /// Return the free stretch per kelvin in the plane or along the bar, 1/K, for Poisson's ratio ν.
     ///
     /// If the strain perpendicular to the plane or bar is 0, the stress in this direction adds to the
     /// stretch. The stretch is then (1 + ν) α in plane strain, and (1 + ν)/(1 − ν) α under uniaxial strain.
@@ -33,13 +33,14 @@ impl ThermalExpansion {
 }
 
 impl Problem {
-    /// Whether any condition prescribes temperatures.
+    /// Test whether any condition prescribes temperatures.
     pub fn has_temperature(&self) -> bool {
         let mut actions = self.conditions.iter().map(|condition| &condition.action);
         actions.any(|action| matches!(action, Action::Temperature(_)))
     }
 
-    /// Whether prescribed temperatures change during a run. The energy balance does not contain their work.
+    /// Test whether prescribed temperatures change during a run. The energy balance does not contain their
+    /// work.
     pub fn temperature_changes(&self) -> bool {
         let stages = self.all_stages();
         let acts_always = |index: usize| stages.iter().all(|stage| stage.acting[index]);

@@ -84,7 +84,7 @@ pub struct Static {
 }
 
 impl Method {
-    /// Name in decks.
+    /// Return the name in decks.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Explicit => "explicit",
@@ -93,7 +93,7 @@ impl Method {
         }
     }
 
-    /// Advice for error messages if the method finds no equilibrium: what to change in the deck.
+    /// Return advice for error messages if the method finds no equilibrium: what to change in the deck.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {
@@ -103,7 +103,7 @@ impl Method {
         }
     }
 
-    /// Number of load steps; `None` for the explicit method.
+    /// Return the number of load steps; `None` for the explicit method.
     pub fn load_steps(&self) -> Option<u64> {
         match self {
             Self::Explicit => None,
@@ -134,7 +134,7 @@ pub enum StepRule {
 }
 
 impl Problem {
-    /// The stages of the run; there is at least one.
+    /// Return the stages of the run; there is at least one.
     pub fn all_stages(&self) -> Vec<Stage> {
         if self.stages.is_empty() {
             return vec![Stage {
@@ -149,50 +149,50 @@ impl Problem {
         stages
     }
 
-    /// Whether any stage of the run computes equilibria.
+    /// Test whether any stage of the run computes equilibria.
     pub fn is_quasi_static(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.is_quasi_static())
     }
 
-    /// Whether any stage of the run is a relaxation.
+    /// Test whether any stage of the run is a relaxation.
     pub fn has_relaxation(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| matches!(stage.time.method, Method::Relaxation(_)))
     }
 
-    /// Whether any stage of the run uses Newton's method.
+    /// Test whether any stage of the run uses Newton's method.
     pub fn has_newton(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| matches!(stage.time.method, Method::Static(_)))
     }
 
-    /// Whether any stage has a step that adapts to the number of broken bonds.
+    /// Test whether any stage has a step that adapts to the number of broken bonds.
     pub fn adapts(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.adaptive.is_some())
     }
 
-    /// Whether any stage scales the density in the equation of motion.
+    /// Test whether any stage scales the density in the equation of motion.
     pub fn scales_density(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.density_scale != 1.0)
     }
 
-    /// Whether two consecutive stages integrate the equation of motion with different density scales.
+    /// Test whether two consecutive stages integrate the equation of motion with different density scales.
     pub fn changes_density_scale(&self) -> bool {
         self.stages.windows(2).any(changes_density_scale)
     }
 }
 
 impl Time {
-    /// Whether the method computes equilibria.
+    /// Test whether the method computes equilibria.
     pub fn is_quasi_static(&self) -> bool {
         self.method.load_steps().is_some()
     }
 }
 
-/// Whether two consecutive stages integrate the equation of motion with different density scales.
+/// Test whether two consecutive stages integrate the equation of motion with different density scales.
 pub(crate) fn changes_density_scale(pair: &[Stage]) -> bool {
     let [before, after] = [&pair[0].time, &pair[1].time];
     let moves = !before.is_quasi_static() && !after.is_quasi_static();

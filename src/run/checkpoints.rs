@@ -56,7 +56,7 @@ impl CheckpointWriter {
     /// Fsync the result and write a checkpoint; return the time spent. Collective.
     ///
     /// # Errors
-    /// If the disk is full; existing checkpoints are kept.
+    /// If a write fails, for example because the disk is full. The existing checkpoints are kept.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -89,7 +89,7 @@ impl CheckpointWriter {
     }
 }
 
-/// Hash of the ids, positions, volumes and blocks of all points. Collective.
+/// Return a hash of the ids, positions, volumes and blocks of all points. Collective.
 pub fn fingerprint<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
     let model = &simulation.model;
     let own = (0..model.owned()).fold(0_u64, |sum, point| {

@@ -15,7 +15,7 @@ type Table = (String, String);
 /// Write `crack_NAME.csv` for each crack, and replace the file of an earlier output. Collective.
 ///
 /// # Errors
-/// If the disk is full.
+/// If a file cannot be written, for example because the disk is full.
 pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[Table]) -> Result<()> {
     let write_all = || {
         for (name, table) in cracks {

@@ -4,7 +4,7 @@ use crate::comm;
 use crate::problem::{Body, StepRule};
 use crate::solver::Simulation;
 
-/// Names and values of the automatic choices; the same on all ranks. Collective.
+/// Return the names and values of the automatic choices, which are the same on all ranks. Collective.
 pub fn decisions<const D: usize>(
     simulation: &mut Simulation<'_, D>,
 ) -> Vec<(&'static str, String)> {
@@ -79,7 +79,7 @@ fn sent<const D: usize>(simulation: &mut Simulation<'_, D>) -> String {
     format!("{}; numbers per ghost in each step", parts.join(", then "))
 }
 
-/// The quadrature of all bodies, or of each body if they differ.
+/// Return the quadrature of all bodies, or of each body if the bodies differ.
 fn quadrature(bodies: &[Body]) -> String {
     let name = |body: &Body| format!("{:?}", body.quadrature()).to_lowercase();
     if bodies

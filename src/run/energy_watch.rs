@@ -33,7 +33,8 @@ const ROUNDOFF_STRAIN: f64 = 1e-9;
 pub struct EnergyWatch {
     /// Upper bound of the round-off of the energy, J.
     floor: f64,
-    /// Maximum energy input so far, J: initial energy, and work of loads and supports.
+    /// Maximum energy input so far, J: initial energy, work of loads and supports, and
+    /// [`HistoryRow::step_energy`].
     input: f64,
     /// Whether a warning about an energy gain has been printed.
     warned: bool,
@@ -68,8 +69,8 @@ impl EnergyWatch {
         }
     }
 
-    /// Check a row of the history. Return a warning at the first row with an energy gain. The result is the
-    /// same on all ranks.
+    /// Check a row of the history. Return a warning at the first row with a gain above [`WARNING_GAIN`].
+    /// The result is the same on all ranks.
     ///
     /// # Errors
     /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last one, above

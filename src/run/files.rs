@@ -25,7 +25,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// The files of a run in a folder.
+    /// Return the files of a run in a folder.
     pub fn new(problem: &Problem, folder: PathBuf) -> Self {
         let further = problem.further_outputs.iter();
         Self {
@@ -38,7 +38,7 @@ impl Files {
         }
     }
 
-    /// The results, the main one first.
+    /// Return the results, the main one first.
     pub fn results(&self) -> impl Iterator<Item = &Path> {
         let all = [&self.result].into_iter().chain(&self.further);
         all.map(PathBuf::as_path)
@@ -71,7 +71,8 @@ impl Files {
     /// Create the folder and lock it until the returned file is dropped. Called on rank 0.
     ///
     /// # Errors
-    /// If the folder cannot be created, its path is not UTF-8, or another run has locked it.
+    /// If the folder or its lock file cannot be created, the path is not UTF-8, or another run has locked
+    /// the folder.
     pub fn lock(&self) -> Result<fs::File> {
         if self.folder.to_str().is_none() {
             return Err(Error::input(format!(
@@ -103,8 +104,8 @@ impl Files {
         }
     }
 
-    /// Rename existing files of a result, so that new ones can be created. Return the new paths. Called on
-    /// rank 0.
+    /// Rename existing files of a result, so that new files can be created. The new names contain `number`,
+    /// the step of the restart. Return the new paths. Called on rank 0.
     ///
     /// # Errors
     /// If a file cannot be renamed.
@@ -134,7 +135,7 @@ impl Files {
     }
 }
 
-/// Path of the result of an output; of the main result if `name` is `None`.
+/// Return the path of the result of an output; of the main result if `name` is `None`.
 fn result_of(folder: &Path, name: Option<&str>) -> PathBuf {
     match name {
         None => folder.join("result.vtkhdf"),

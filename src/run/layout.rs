@@ -65,7 +65,7 @@ impl<'a> ResultLayout<'a> {
         }
     }
 
-    /// The static fields, see [`FIXED`].
+    /// Return the static fields, see [`FIXED`].
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,
@@ -84,7 +84,7 @@ impl<'a> ResultLayout<'a> {
         fixed
     }
 
-    /// The description of the result. `fixed` are the fields of [`Self::fixed`].
+    /// Return the description of the result. `fixed` are the fields of [`Self::fixed`].
     pub fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
         Contents {
             piece: self.piece,

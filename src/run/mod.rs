@@ -109,7 +109,7 @@ pub fn start_mpi() -> Result<World> {
 /// - a signal stopped the run before the first step;
 /// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
-/// - the disk is full;
+/// - a file cannot be read or written;
 /// - the motion of a point or rigid body is not finite;
 /// - a load step has no equilibrium;
 /// - the energy grows without limit;
@@ -564,7 +564,7 @@ impl<'a> Job<'a> {
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Attributes of the result that describe its origin: deck, version and settings of the run.
+    /// Return the attributes of the result that describe its origin: deck, version and settings of the run.
     fn metadata<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -11,7 +11,7 @@ use crate::survey::Survey;
 
 /// Callbacks from a run. Each is called on all ranks at the same step; the defaults do nothing.
 pub trait Observer {
-    /// A message of the run.
+    /// Called for each message of the run.
     fn message(&mut self, _message: &Message) {}
 
     /// Called before the first step, with the state of step 0 or of the checkpoint.
@@ -41,7 +41,7 @@ pub enum Message {
     SetUp {
         /// The time step, s.
         step: f64,
-        /// Stable step × `safety`, s.
+        /// Stable step of the first stage, with the scaled density of this stage, s.
         stable_step: f64,
         /// Figures and warnings.
         survey: Survey,
@@ -119,48 +119,48 @@ pub enum Message {
 /// # }
 /// ```
 pub trait RunState {
-    /// Number of the step reached.
+    /// Return the number of the step reached.
     fn number(&self) -> u64;
 
-    /// Number of the last step.
+    /// Return the number of the last step.
     fn last(&self) -> u64;
 
-    /// Time reached, s.
+    /// Return the time reached, s.
     fn time(&self) -> f64;
 
-    /// Length of a step, s.
+    /// Return the length of a step, s.
     fn step(&self) -> f64;
 
-    /// Dimension of the problem, which is the number of components of vectors.
+    /// Return the dimension of the problem, which is the number of components of vectors.
     fn dimension(&self) -> usize;
 
-    /// Global ids of the points. The ids of level-0 points are smaller than the number of level-0 points over
-    /// all ranks.
+    /// Return the global ids of the points. The ids of level-0 points are smaller than the number of level-0
+    /// points over all ranks.
     fn ids(&self) -> &[u64];
 
-    /// A component of the reference positions, m.
+    /// Return a component of the reference positions, m.
     fn reference(&self, component: usize) -> &[f64];
 
-    /// A component of the displacements at the reached time, m.
+    /// Return a component of the displacements at the reached time, m.
     fn displacement(&self, component: usize) -> &[f64];
 
-    /// A component of the velocities, m/s. The first request in a step needs one loop over the points.
+    /// Return a component of the velocities, m/s. The first request in a step needs one loop over the points.
     fn velocity(&mut self, component: usize) -> &[f64];
 
-    /// Values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit of
-    /// [`Field::unit`]. They are ordered by point, with [`Field::components`] values per point. A request
+    /// Return the values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit
+    /// of [`Field::unit`]. They are ordered by point, with [`Field::components`] values per point. A request
     /// needs one to three passes over the bonds. Collective: all ranks must request the same field.
     fn field(&mut self, field: Field) -> Vec<f64>;
 
-    /// Energies of all points, J. A request needs one pass over the bonds. Collective.
+    /// Return the energies of all points, J. A request needs one pass over the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
     /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. After a request
     /// in [`Observer::row`], the run stops at this step; otherwise, it stops up to ten steps later.
     fn stop(&mut self);
 
-    /// The factor of a load in the next step; 1 unless an observer has set it. `None` if no load has this
-    /// name.
+    /// Return the factor of a load in the next step; 1 unless an observer has set it. `None` if no load has
+    /// this name.
     fn load_factor(&self, name: &str) -> Option<f64>;
 
     /// Multiply a load by a factor. A load is a condition with `force`, `body_force`, `traction` or
@@ -264,23 +264,24 @@ pub struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// The values in the order of the columns.
+    /// Return the values in the order of the columns.
     pub fn values(&self) -> &[f64] {
         &self.row.values
     }
 
-    /// The value of the column with this name, such as `kinetic_energy`; `None` if there is no such column.
+    /// Return the value of the column with this name, such as `kinetic_energy`; `None` if there is no such
+    /// column.
     pub fn value(&self, column: &str) -> Option<f64> {
         let found = self.columns.iter().position(|(name, _)| name == column);
         found.map(|position| self.row.values[position])
     }
 
-    /// The energies of the whole body, J.
+    /// Return the energies of the whole body, J.
     pub fn energies(&self) -> Energies {
         self.row.energies
     }
 
-    /// Number of bonds broken since the start.
+    /// Return the number of bonds broken since the start.
     pub fn broken_bonds(&self) -> u64 {
         self.row.broken
     }

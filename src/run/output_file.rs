@@ -107,7 +107,7 @@ impl<'a> OutputFile<'a> {
         Ok(())
     }
 
-    /// Whether the output contains a field that needs the energies of the bonds.
+    /// Test whether the output contains a field that needs the energies of the bonds.
     pub fn has_energies(&self) -> bool {
         self.output.fields.contains(&Field::StrainEnergyDensity)
     }
@@ -115,7 +115,7 @@ impl<'a> OutputFile<'a> {
     /// Append an output. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -158,7 +158,7 @@ impl<'a> OutputFile<'a> {
     /// Close the file. With `will_resume`, unused space in the file is not freed. Collective.
     ///
     /// # Errors
-    /// If the disk is full, or an earlier write failed.
+    /// If this write or an earlier write fails, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let comm = self.file.communicator();
         self.file.close(will_resume)?;

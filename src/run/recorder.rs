@@ -95,12 +95,12 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// The main result.
+    /// Return the main result.
     pub fn main(&self) -> &ResultFile<'a> {
         &self.files[0].file
     }
 
-    /// Name and number of outputs of each further result, for a checkpoint.
+    /// Return the name and number of outputs of each further result, for a checkpoint.
     pub fn further<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<FurtherResult> {
         let problem = simulation.problem;
         let outputs = problem.further_outputs.iter().zip(&self.files[1..]);
@@ -111,8 +111,8 @@ impl<'a> Recorder<'a> {
         outputs.map(result).collect()
     }
 
-    /// Causes of non-collective writes to any result, as bits defined by HDF5; 0 if all writes were
-    /// collective.
+    /// Return the causes of non-collective writes to any result, as bits defined by HDF5; 0 if all writes
+    /// were collective.
     pub fn no_collective_cause(&self) -> u32 {
         let causes = self
             .files
@@ -142,7 +142,7 @@ impl<'a> Recorder<'a> {
     /// Write the due outputs and history row, and pass the row to `observer`. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn record<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -166,7 +166,7 @@ impl<'a> Recorder<'a> {
     /// Write outputs to all files, and a history row. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write_all<const D: usize>(&mut self, simulation: &mut Simulation<'_, D>) -> Result<()> {
         self.write(simulation, |_| true, true)
     }
@@ -174,7 +174,7 @@ impl<'a> Recorder<'a> {
     /// Write an output to each new file, and a history row if the main file is new. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write_first<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -186,7 +186,7 @@ impl<'a> Recorder<'a> {
     /// Write outputs to the files for which `is_chosen` is true, and with `row` a history row. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     fn write<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -232,7 +232,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The row of the history at the current step; `None` if no row was due.
+    /// Return the row of the history at the current step; `None` if no row was due.
     pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
         let is_now = |row: &&HistoryRow| row.number == clock.number();
         self.last_row.as_ref().filter(is_now)
@@ -241,7 +241,7 @@ impl<'a> Recorder<'a> {
     /// Write the state of a failed run to the files that have no output at this step. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn write_failure<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -254,7 +254,7 @@ impl<'a> Recorder<'a> {
     /// Close all result files. With `will_resume`, unused space in the files is not freed. Collective.
     ///
     /// # Errors
-    /// If the disk is full, or an earlier write failed.
+    /// If this write or an earlier write fails, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let mut files = self.files.into_iter();
         files.try_for_each(|file| file.close(will_resume))
@@ -263,7 +263,7 @@ impl<'a> Recorder<'a> {
     /// Write buffered rows and fsync the results. Collective.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn sync(&mut self) -> Result<()> {
         self.write_rows()?;
         let mut files = self.files.iter_mut();
@@ -347,10 +347,10 @@ pub enum Continuation {
     New(Option<String>),
 }
 
-/// Reason why the result file of an output cannot be continued; `None` if it can. The file may be missing or
-/// damaged, or have other points, fields or columns. `outputs` is the number of outputs that the checkpoint
-/// counts. For the main result, `history` has the observer, the number of rows, and the changes of the column
-/// definitions. Collective.
+/// Return the reason why the result file of an output cannot be continued; `None` if it can. The file may be
+/// missing or damaged, or have other points, fields or columns. `outputs` is the number of outputs that the
+/// checkpoint counts. For the main result, `history` has the observer, the number of rows, and the changes of
+/// the column definitions. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

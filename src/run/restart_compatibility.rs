@@ -56,7 +56,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")
 }
 
-/// Differences in the definitions of the history's columns, in one line; `None` if they are equal.
+/// Return the differences in the definitions of the history's columns, in one line; `None` if they are equal.
 ///
 /// # Errors
 /// If a deck cannot be parsed.
@@ -76,7 +76,7 @@ fn source(name: &str, text: &str) -> Source {
     Source::new(name, text)
 }
 
-/// Differences in the physics, one per line; empty if there are none.
+/// Return the differences in the physics, one per line; empty if there are none.
 ///
 /// # Errors
 /// If a deck cannot be parsed.
@@ -93,8 +93,8 @@ pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
     deck::differences(&source("the checkpoint", old), &source("the deck", new))
 }
 
-/// The first line that differs in two listings, or a note that one listing has more lines; empty if they are
-/// equal.
+/// Return the first line that differs in two listings, or a note that one listing has more lines; empty if
+/// they are equal.
 fn listed_differences(old: &str, new: &str) -> Vec<String> {
     let short = |line: &str| line.trim().chars().take(MAX_LINE).collect::<String>();
     let mut lines = old.lines().zip(new.lines());

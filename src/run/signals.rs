@@ -15,8 +15,8 @@ const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// Receiver of the signals of this process.
 ///
-/// - SIGTERM, SIGINT, SIGUSR1: stop within a few steps. Another of these signals more than a second later
-///   exits at once.
+/// - SIGTERM, SIGINT, SIGUSR1: write a checkpoint and stop, within about ten steps. Another of these
+///   signals more than 1 s later ends the process at once.
 /// - SIGUSR2: write a checkpoint.
 #[derive(Clone)]
 pub struct Signals {
@@ -28,7 +28,7 @@ impl Signals {
     /// Start a thread that receives the signals.
     ///
     /// # Errors
-    /// If the system does not allow it.
+    /// If the system does not allow the signal handlers or the thread.
     pub fn listen() -> Result<Self> {
         let signals = Self {
             stop: Arc::default(),
@@ -60,12 +60,12 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Whether a stop was requested.
+    /// Test whether a stop was requested.
     pub(super) fn stop(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Whether a checkpoint was requested since the last call.
+    /// Test whether a checkpoint was requested since the last call.
     pub(super) fn take_request(&self) -> bool {
         self.request.swap(false, Ordering::Relaxed)
     }

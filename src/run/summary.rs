@@ -18,7 +18,8 @@ pub struct Summary {
     pub evaluations: u64,
     /// Time step of the last stage, s.
     pub step: f64,
-    /// Stable step × `safety` in the last stage, s; `None` if the last stage computes equilibria.
+    /// Stable step of the last stage, with the scaled density of this stage, s. `None` if the last stage
+    /// computes equilibria.
     pub stable_step: Option<f64>,
     /// Number of ranks.
     pub ranks: usize,

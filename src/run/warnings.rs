@@ -52,7 +52,7 @@ impl<'a> Job<'a> {
     }
 
     /// Warn of a fixed step that refinement has made unstable. `before` is the stable step before the
-    /// refinement (s). Returns the present stable step, s.
+    /// refinement (s). Return the present stable step, s.
     pub(super) fn warn_of_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
@@ -120,7 +120,8 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn if a restarted run continues with another step than a new run to the same end would use.
+    /// Warn if a restarted run with one stage continues with another step than a new run to the same end
+    /// would use.
     pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -98,7 +98,7 @@ pub enum Reason {
     Signal,
     /// The wall-clock limit is near.
     WallTime,
-    /// The observer of a rank has requested it.
+    /// The observer of a rank has requested the stop.
     Observer,
 }
 
@@ -146,7 +146,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration. Returns whether a decision is due. `step` is the clock if the iteration has
+    /// Count an iteration. Return whether a decision is due. `step` is the clock if the iteration has
     /// completed a step.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;
@@ -219,7 +219,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Time left in the Slurm job of this process; `None` outside a job.
+/// Return the time left in the Slurm job of this process; `None` outside a job.
 fn slurm_time_left() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;

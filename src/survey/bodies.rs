@@ -83,8 +83,8 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
     Some(lattice.shape_volume())
 }
 
-/// Distance (m) of each owned point to its nearest bonded neighbour; empty if no body has points from a file
-/// or mesh.
+/// Return the distance (m) of each owned point to its nearest bonded neighbour; empty if no body has points
+/// from a file or mesh.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
     if !problem.bodies.iter().any(is_from_file) {
@@ -103,8 +103,8 @@ fn is_from_file(body: &Body) -> bool {
     !matches!(body.points, PointSource::Lattice { .. })
 }
 
-/// Smallest, median and largest number of neighbours per point of each body that does not lie on a lattice.
-/// Collective.
+/// Return the smallest, median and largest number of neighbours per point of each body that does not lie on a
+/// lattice. Collective.
 fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64; 3]>> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let bodies = problem.bodies.iter().enumerate();
@@ -147,7 +147,8 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     found
 }
 
-/// Warning for a body whose points have a volume that differs from its shape or spacing.
+/// Return a warning if the volume of a body's points does not fit the volume of its shape, or the spacing
+/// of its points.
 fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {

@@ -21,7 +21,8 @@ const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 /// Bytes of a bond in a lattice: one bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
-/// Memory of a rank without points, bytes: without a launcher, and with one (which needs MPI buffers).
+/// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which
+/// need MPI buffers.
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
@@ -143,12 +144,13 @@ impl Cost {
         cost(problem, counts, clock)
     }
 
-    /// Size of all results at the end, bytes.
+    /// Return the size of all results at the end, bytes.
     pub fn all_results(&self) -> f64 {
         self.results.iter().map(|result| result.bytes).sum()
     }
 
-    /// Peak memory of one of `ranks` ranks, bytes. `ghosts` is the number of ghosts per owned point.
+    /// Return the peak memory of one of `ranks` ranks, bytes. `ghosts` is the number of ghosts per owned
+    /// point.
     pub fn memory_of_a_rank(&self, ranks: u32, ghosts: f64) -> f64 {
         let several = usize::from(ranks > 1);
         let points = self.set_up.max(self.time_loop[several]) / f64::from(ranks);
@@ -156,7 +158,7 @@ impl Cost {
     }
 }
 
-/// Bytes of history per bond of a body; each bond stores the history for both ends.
+/// Return the bytes of history per bond of a body; each bond stores the history for both ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {
@@ -183,8 +185,8 @@ fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measure
     Measured { peak, resident }
 }
 
-/// Number of ghosts per owned point of a rank, for a box with these edges (m). Cuts between ranks are
-/// perpendicular to the longest edges.
+/// Return the number of ghosts per owned point of a rank, for a box with these edges (m). Cuts between ranks
+/// are perpendicular to the longest edges.
 pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     let mut parts = vec![1_u32; edges.len()];
     let (mut remaining, mut factor) = (ranks, 2);
@@ -205,7 +207,7 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Number of values per point in a checkpoint.
+/// Return the number of values per point in a checkpoint.
 fn saved_width(problem: &Problem) -> usize {
     fn width<const D: usize>(problem: &Problem) -> usize {
         let mut blocks = problem.blocks();

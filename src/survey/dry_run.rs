@@ -33,7 +33,7 @@ pub struct DryRun {
     pub ghosts: f64,
     /// Memory and disk space.
     pub cost: Cost,
-    /// Stable step × `safety`, s.
+    /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
     /// For each stage: first step (s) and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,
@@ -86,7 +86,7 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
     })
 }
 
-/// The edges of the bounding box of all points, m.
+/// Return the edges of the bounding box of all points, m.
 fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
     simulation.model.reference.each_ref().map(|coordinates| {
         let low = coordinates.iter().copied().fold(f64::INFINITY, f64::min);

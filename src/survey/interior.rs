@@ -105,8 +105,8 @@ fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
     })
 }
 
-/// Strain energy density (J/m³) and number of intact bonds of a point under the uniform displacement
-/// gradient `gradient` × [`STRAIN`].
+/// Return the strain energy density (J/m³) and number of intact bonds of a point under the uniform
+/// displacement gradient `gradient` × [`STRAIN`].
 fn energy_and_bonds<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     point: usize,
@@ -124,8 +124,8 @@ fn energy_and_bonds<const D: usize>(
     (stored.energy[point], stored.neighbours[point] as u32)
 }
 
-/// Modulus of isotropic expansion, Pa: 2 W/θ², where W is the classical energy density, and θ the sum of the
-/// strains in the directions of the problem.
+/// Return the modulus of isotropic expansion, Pa: 2 W/θ², where W is the classical energy density, and θ the
+/// sum of the strains in the directions of the problem.
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
     let (bulk, shear) = (elastic.bulk_modulus(), elastic.shear_modulus());
     match dimension {

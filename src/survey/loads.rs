@@ -54,7 +54,7 @@ fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
     warnings.push(Warning::new(message).at(&condition.place));
 }
 
-/// The components of the motion that a condition prescribes; `None` for loads and temperatures.
+/// Return the components of the motion that a condition prescribes; `None` for loads and temperatures.
 fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     match &condition.action {
         Action::Displacement(values) | Action::Velocity(values) => Some(values),
@@ -203,7 +203,7 @@ fn layer<const D: usize>(
     }
 }
 
-/// The cell edges of a body, m; `default` for points from a file or mesh.
+/// Return the cell edges of a body, m; `default` for points from a file or mesh.
 fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     match &problem.bodies[body].points {
         PointSource::Lattice { spacing, .. } => *spacing,
@@ -211,9 +211,9 @@ fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     }
 }
 
-/// Thickness of a layer, m: the mean length of rows of adjacent cells, in the direction with the shortest
-/// rows. If the layer has points of several bodies, it is the thickness that differs most from `depth` (m).
-/// `None` if there are no cells.
+/// Return the thickness of a layer, m: the mean length of rows of adjacent cells, in the direction with the
+/// shortest rows. If the layer has points of several bodies, it is the thickness that differs most from
+/// `depth` (m). `None` if there are no cells.
 fn thickness<const D: usize>(
     problem: &Problem,
     cells: &HashSet<[i64; 4]>,

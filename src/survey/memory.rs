@@ -23,7 +23,8 @@ pub fn resident() -> Resident {
     }
 }
 
-/// Reset the peak and return the current resident memory, bytes; `None` on systems other than Linux.
+/// Reset the peak and return the current resident memory, bytes. `None` if the peak cannot be reset, as on
+/// systems other than Linux.
 pub fn reset_peak() -> Option<f64> {
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     Some(resident().now)

@@ -110,7 +110,7 @@ impl Survey {
     }
 }
 
-/// Number of bonds of each pair of different bodies, over all ranks.
+/// Return the number of bonds of each pair of different bodies, over all ranks.
 fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
     let count = simulation.problem.bodies.len();
     let mut bonds = vec![0; count * count];
@@ -126,7 +126,8 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
         .collect()
 }
 
-/// Warn of pairs of bodies that are bonded by default and also have contact.
+/// Warn of pairs of bodies that have contact, and are bonded although the deck has no `[interface.pair]`
+/// for them.
 fn touching_joints(problem: &Problem, joints: &[([usize; 2], u64)], warnings: &mut Vec<Warning>) {
     let Some(contact) = &problem.contact else {
         return;
@@ -219,7 +220,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// The `safety` factors of the explicit stages with an automatic step.
+/// Return the `safety` factors of the explicit stages with an automatic step.
 fn safeties(problem: &Problem) -> Vec<f64> {
     let moving = problem
         .all_stages()
@@ -232,8 +233,8 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     moving.filter_map(safety).collect()
 }
 
-/// Stiffness of a family with bonds stretched by s, divided by the stiffness that the stable step assumes. A
-/// stretched bond resists rotation with s/(1 + s) of its stiffness.
+/// Return the stiffness of a family with bonds stretched by s, divided by the stiffness that the stable step
+/// assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
@@ -272,7 +273,7 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Number of points of each set, with warnings of sets by position that have very few points.
+/// Return the number of points of each set, with warnings of sets by position that have very few points.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

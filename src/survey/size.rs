@@ -27,12 +27,12 @@ pub struct Size {
 }
 
 impl Size {
-    /// Number of all points.
+    /// Return the number of all points.
     pub fn all_points(&self) -> f64 {
         self.points.iter().sum()
     }
 
-    /// Number of bonds, counted at both ends.
+    /// Return the number of bonds, counted at both ends.
     pub fn directed_bonds(&self) -> f64 {
         self.bonds.iter().sum()
     }
@@ -85,7 +85,8 @@ pub fn size(problem: &Problem) -> Result<Size> {
     Ok(size)
 }
 
-/// Mean number of neighbours that a point of a body has on the lattices of all bodies, from sampled points.
+/// Return the mean number of neighbours that a point of a body has on the lattices of all bodies, from
+/// sampled points.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
@@ -119,7 +120,7 @@ struct Rows {
     output_points: Vec<f64>,
 }
 
-/// Figures of the bodies whose points come from files or meshes, by body.
+/// Return the figures of the bodies whose points come from files or meshes, by body.
 fn from_files(problem: &Problem) -> Vec<Rows> {
     let none = Rows {
         output_points: vec![0.0; 1 + problem.further_outputs.len()],
@@ -156,7 +157,7 @@ fn from_files(problem: &Problem) -> Vec<Rows> {
     rows
 }
 
-/// Volume of a complete family of a body, m³.
+/// Return the volume of a complete family of a body, m³.
 fn family_volume(problem: &Problem, body: usize) -> f64 {
     let horizon = problem.bodies[body].horizon;
     match problem.dimension {
@@ -178,8 +179,8 @@ fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f
     })
 }
 
-/// Number of points in the result of an output, from sampled points of each body. `number` is the index of
-/// the output, and `set` is its set.
+/// Return the number of points in the result of an output, from sampled points of each body. `number` is the
+/// index of the output, and `set` is its set.
 fn output_points(
     problem: &Problem,
     (number, set): (usize, Option<usize>),

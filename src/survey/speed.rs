@@ -20,7 +20,7 @@ pub struct Speed {
     pub ghosts: u64,
     /// Number of bonds of owned points, counted at each owned end.
     pub directed_bonds: u64,
-    /// Number of bonds in lattice families.
+    /// Number of these bonds in lattice families.
     pub lattice_bonds: u64,
     /// Memory of the bonds, bytes.
     pub bond_bytes: u64,

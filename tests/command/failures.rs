@@ -187,7 +187,8 @@ fn a_killed_run_leaves_its_complete_steps() {
 #[test]
 fn ranks_end_soon_after_one_of_them_or_mpirun_is_killed() {
     const RANKS: usize = 7;
-    /// Open MPI sends SIGTERM, waits a second, and sends SIGKILL. The limit allows for a busy machine.
+    /// Longest time until the other ranks have ended. Open MPI sends SIGTERM, waits a second, and sends
+    /// SIGKILL; the limit allows for a busy machine.
     const SOON: Duration = Duration::from_secs(30);
 
     let kills: usize = std::env::var("FISSURE_KILLS").map_or(2, |text| text.parse().unwrap());

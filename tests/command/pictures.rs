@@ -360,7 +360,7 @@ fn contours_and_vectors_are_drawn_over_plane_pictures() {
         "displacement",
     ];
     block.draw(&slice);
-    // A film with all of them; outputs of equal size.
+    // A film with all of these options has frames of equal size.
     let film = folder.join("film.png");
     let options = [
         "--field",
@@ -422,7 +422,7 @@ fn curves_of_histories() {
         "-o",
         runs.to_str().unwrap(),
     ];
-    // A folder, and the path of a result, which also contains the history.
+    // The first argument is a folder, the second the path of a result. Both contain a history.
     let second = two.join("result.vtkhdf");
     expect(
         &command("plot", &[&one, &second], &options),

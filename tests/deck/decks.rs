@@ -27,7 +27,7 @@ pub fn decks(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// Return all valid decks.
+/// Return the decks of `tests/decks/good` and `inputs`, and the example deck.
 fn right_decks() -> Vec<Source> {
     let paths = [decks("tests/decks/good"), decks("inputs")].concat();
     let mut sources: Vec<Source> = paths
@@ -137,7 +137,7 @@ enum Token {
     Text(String),
 }
 
-/// Numbers at the limits of their types, and opening delimiters.
+/// Numbers at the limits of their types, other unusual values, delimiters and expressions.
 const ODD: &[&str] = &[
     "0",
     "-1",

@@ -10,8 +10,8 @@ use fissure::problem::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 
-/// Two bodies on one grid, with a hole, a crack, a no-failure set and supports. `LAW` and `GRID` are
-/// placeholders.
+/// Two bodies on one grid, with a hole, a crack, a no-failure set and supports. `LAW`, `RATIO`, `GRID` and
+/// `ALPHA` are placeholders.
 const SOLID: &str = "
 dimension = '3d'
 [grid]

@@ -36,7 +36,7 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
 /// Return the indices of the outputs to draw.
 ///
 /// # Errors
-/// If there is no output, or the time is outside of the result.
+/// If there is no output, the text is not `last`, `all` or a number, or the time is outside of the result.
 pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
         return Err(Error::input("the result holds no output yet"));
@@ -66,8 +66,8 @@ pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     }
 }
 
-/// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else a field
-/// that changes with time.
+/// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else the
+/// first field that changes with time, else the first field.
 ///
 /// # Errors
 /// If the result has no such field.

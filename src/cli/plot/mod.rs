@@ -75,7 +75,8 @@ pub struct PlotArguments {
 /// Draw pictures of a field, or curves.
 ///
 /// # Errors
-/// If a file is not a result, or the field, component or column is missing.
+/// If a file is not a result, an argument is wrong, the field, component or column is missing, or a picture
+/// cannot be written.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let is_table = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "csv");
     let curves = !arguments.y.is_empty() || arguments.results.iter().any(is_table);

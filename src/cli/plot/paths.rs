@@ -14,7 +14,8 @@ pub type Line = Vec<[f64; 2]>;
 /// Consecutive rows with the same value of `branch` form a line. Without this column, all rows form one line.
 ///
 /// # Errors
-/// If the file cannot be read, a column is missing, or a row has an invalid number.
+/// If the file cannot be read, a column is missing, or a row has an invalid number or another number of
+/// values than the first row.
 pub fn read(path: &Path) -> Result<Vec<Line>> {
     let text = std::fs::read_to_string(path).map_err(|error| file_error(path, "read", &error))?;
     let wrong = |line: usize, message: String| {

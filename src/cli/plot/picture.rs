@@ -92,7 +92,8 @@ pub struct PictureArguments {
 /// Draw the last output, the output nearest to a time, or all outputs.
 ///
 /// # Errors
-/// If the file is not a result, or the field or component is missing.
+/// If the file is not a result, an argument is wrong, the field or component is missing, or a picture
+/// cannot be written.
 pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> Result<()> {
     let file = result_file(result);
     let result = ResultReader::open(&file)?;

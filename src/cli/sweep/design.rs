@@ -173,7 +173,8 @@ impl Design {
         axes.iter().map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// Return the names of the runs' folders: the values if these give distinct names, else numbers.
+    /// Return the names of the runs' folders: the values if these give distinct names of at most
+    /// [`LONGEST_NAME`] characters, else numbers.
     pub fn folders(&self) -> Vec<String> {
         let safe = |c: char| c.is_ascii_alphanumeric() || "._+-=,".contains(c);
         let name = |row: &Vec<usize>| -> String {

@@ -76,7 +76,8 @@ impl Run {
     /// sweep.
     ///
     /// # Errors
-    /// If the folder holds anything else.
+    /// If the folder holds another run of a sweep (without `overwrite`), or a result that is not of a
+    /// sweep.
     pub fn check(&self, overwrite: bool) -> Result<()> {
         let path = self.folder.join(DECK);
         match std::fs::read_to_string(&path) {
@@ -148,12 +149,13 @@ impl<'a> Program<'a> {
     }
 
     /// Execute the runs with the indices `due`, several at a time. Call `ended` with index, state and time
-    /// (s) of each ended run. Return true if a signal stopped the runs.
+    /// (s) of each run that is complete or failed. Return true if a signal or a limit stopped a run.
     ///
     /// A first SIGINT or SIGTERM makes all runs write checkpoints and stop; a second one kills the runs.
     ///
     /// # Errors
-    /// If a run cannot be started or `ended` fails. The other runs are then stopped.
+    /// If a run cannot be started, its marker file cannot be created, or `ended` fails. The other runs are
+    /// then stopped.
     pub fn run_all(
         &self,
         runs: &[Run],

@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         self.values[row].as_ref()?[column]
     }
 
-    /// Return the columns: folder, values of the axes, state, and values with errors and rates.
+    /// Return the columns: values of the axes, state, and picked values with errors and rates.
     fn cells(&self) -> Vec<Cells> {
         let rows = 0..self.design.rows.len();
         let alike = |text: String| [text.clone(), text];

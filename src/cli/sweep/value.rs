@@ -112,7 +112,7 @@ impl Column {
         found.map_or("", |(name, _)| name)
     }
 
-    /// Pick a number; `Max` and `Min` ignore numbers that are not finite.
+    /// Pick a number; `None` if it is not finite. `Max` and `Min` ignore numbers that are not finite.
     fn of(&self, numbers: &[f64]) -> Option<f64> {
         let finite = numbers.iter().copied().filter(|number| number.is_finite());
         let picked = match self.pick {

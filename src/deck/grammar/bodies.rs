@@ -47,7 +47,8 @@ pub struct Points {
     /// Path of the mesh, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Text>,
-    /// Block number of the rows, or group of the elements, that the body uses; all if not given.
+    /// Block number of the rows, or group of the elements, that the body uses. If not given, all rows or
+    /// elements that belong to no other body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
     /// Names of the columns of a file without a header: coordinates, `volume`, `block`, and any other names.
@@ -154,9 +155,9 @@ pub enum Crack {
     Rectangle {
         /// A corner.
         corner: Vector,
-        /// The edge from the corner to a neighbouring one.
+        /// The vector in m from `corner` to an adjacent corner.
         edge_a: Vector,
-        /// The edge from the corner to the other neighbouring one.
+        /// The vector in m from `corner` to the other adjacent corner.
         edge_b: Vector,
         /// Width of a slot in m, half on each side of the surface; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -19,7 +19,8 @@ pub struct Initial {
     /// Velocity in m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
-    /// Text file with a row of values for each point, in place of `displacement` and `velocity`.
+    /// Path of a text file with a row of values for each point, in place of `displacement` and
+    /// `velocity`; relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
 }

@@ -59,7 +59,8 @@ pub struct ContactPair {
     /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
-    /// As in `[contact]`; the value of `[contact]` if not given.
+    /// Coefficient of static friction. If not given, `friction` of this pair, or the value of `[contact]` if
+    /// the pair has no `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
     /// As in `[contact]`; the value of `[contact]` if not given.
@@ -73,7 +74,7 @@ pub struct ContactPair {
 pub enum ContactName {
     /// No contact.
     None,
-    /// A layer of material.
+    /// Penalty contact with the stiffness of a layer of material.
     Penalty,
     /// Short-range forces.
     ShortRange,

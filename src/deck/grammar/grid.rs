@@ -16,13 +16,15 @@ pub struct Grid {
     pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded.
     pub horizon: Number,
-    /// Position in m of a corner of a lattice cell. The default in each direction follows from the first body
-    /// that is a whole number of cells long between flat faces: 0 if cells from 0 fill it exactly, otherwise
-    /// its lower face. Without such a body, the default is 0.
+    /// Position in m of a corner of a lattice cell. The default is chosen separately for each
+    /// spacing. In each direction it follows from the first body with this spacing that is a whole
+    /// number of cells long between flat faces: 0 if cells from 0 fill this body exactly, otherwise
+    /// the lower face of the body. Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
-    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"` or `"none"`. The default
-    /// is `"exact"` if all points are centres of square or cubic cells, otherwise `"none"`.
+    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"`,
+    /// `"linear-inside"` or `"none"`. The default is `"exact"` if all points are centres of square
+    /// or cubic cells, otherwise `"none"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_correction: Option<Spanned<VolumeCorrection>>,
     /// Positions of the points in a lattice cell: `"midpoint"` or `"gauss"`.
@@ -85,14 +87,14 @@ pub enum Quadrature {
     Gauss,
 }
 
-/// The bonds between blocks.
+/// Bonds between bodies.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interface {
-    /// Constants of the bonds between blocks. `"own"`: each end exerts its half of the force with its own
+    /// Constants of the bonds between bodies. `"own"`: each end exerts its half of the force with its own
     /// modulus and horizon. `"average"` and `"minimum"`: both ends use the mean or the smaller modulus and
-    /// horizon. `"none"`: blocks are not bonded, whatever their distance. The default is `"own"`, or `"none"`
-    /// with `[contact]`.
+    /// horizon. `"none"`: bodies are not bonded, whatever their distance. The default is `"own"`, or
+    /// `"none"` with `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
     /// Pairs of bodies with their own rule or damage law, by a freely chosen name.
@@ -109,18 +111,18 @@ pub struct Pair {
     /// As in `[interface]`; the rule of `[interface]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
-    /// these bonds never break. If neither this nor `strength` is given, the bonds break at the smaller
-    /// threshold of the two bodies.
+    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With
+    /// `"none"` these bonds never break. If neither `damage` nor `strength` is given, the bonds
+    /// break at the smaller threshold of the two bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
-    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch
-    /// follows from it.
+    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical
+    /// stretch of the bonds follows from this stress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strength: Option<Number>,
 }
 
-/// Constants of the bonds between blocks.
+/// Constants of the bonds between bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {

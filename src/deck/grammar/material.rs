@@ -20,7 +20,7 @@ use crate::material::{Declaration, Kind, declarations};
 pub struct Material {
     /// Name of the law.
     pub law: Text,
-    /// Density and damping, one or two elastic constants, and the keys that the law
+    /// The keys of the table with their values: [`common_keys`], and the keys that the law
     /// [declares](crate::material::Declaration::keys).
     pub table: Spanned<LawTable>,
 }
@@ -28,19 +28,20 @@ pub struct Material {
 /// The keys and values of a law. A value is a number, an expression or a word.
 pub type LawTable = IndexMap<Text, Number>;
 
-/// Density ρ in kg/m³.
+/// Key of the density ρ in kg/m³.
 pub const DENSITY: &str = "density";
 
-/// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
+/// Key of the viscous damping r in 1/s, a force density −r ρ u̇; 0 if not given.
 pub const DAMPING: &str = "damping";
 
-/// Coefficient of thermal expansion α in 1/K; none if not given.
+/// Key of the coefficient of thermal expansion α in 1/K; 0 if not given.
 pub const THERMAL_EXPANSION: &str = "thermal_expansion";
 
-/// Temperature without thermal strain, in the unit of prescribed temperatures; 0 if not given.
+/// Key of the temperature without thermal strain, in the unit of prescribed temperatures; 0 if not
+/// given.
 pub const REFERENCE_TEMPERATURE: &str = "reference_temperature";
 
-/// The elastic constants: moduli in Pa, and Poisson's ratio.
+/// Keys of the elastic constants: moduli in Pa, and Poisson's ratio.
 pub const ELASTIC_CONSTANTS: [(&str, Constant); 5] = [
     ("youngs_modulus", Constant::Young),
     ("bulk_modulus", Constant::Bulk),
@@ -164,7 +165,7 @@ pub enum Damage {
     CriticalStretch(Spanned<CriticalStretch>),
     /// A bond breaks permanently when the work done on it reaches a critical value.
     Energy(Spanned<BondEnergy>),
-    /// A bond breaks permanently when the mean stress of its points reaches a strength.
+    /// A bond breaks permanently when the mean of the stress measures of its two points reaches a strength.
     Stress(Spanned<Stress>),
 }
 
@@ -224,10 +225,11 @@ pub struct BondEnergy {
     /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
-    /// How the critical work follows from the toughness. "energy": breaking all bonds across an area
-    /// dissipates the fracture energy. "opening": separating a block of the body costs the fracture energy;
-    /// this is computed before the run. "willberg2022": eq. 16 and 18 of Willberg et al. (2022). "perilab":
-    /// as PeriLab computes it; 2-D and 3-D. "peridigm2021": as Peridigm computed it in 2021; 2-D.
+    /// How the critical work follows from the toughness. "energy": breaking all bonds across an
+    /// area dissipates the fracture energy. "opening": separating a block of the body costs the
+    /// fracture energy; the energy of this separation is computed before the run. "willberg2022":
+    /// eq. 16 and 18 of Willberg et al. (2022). "perilab": as PeriLab computes it; 2-D and 3-D.
+    /// "peridigm2021": as Peridigm computed it in 2021; 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
     /// Whether only bonds that are longer than initially can break. Otherwise compressed bonds break too, as

@@ -1,8 +1,8 @@
 //! Grammar of the deck: the keys and values of each section of the TOML file.
 //!
-//! Every number may be a string with an expression of the `[parameters]`. All values are in SI units. Unknown
-//! keys are errors. A choice is a table with the name of the variant (`[material.glass.pmb]`), so that error
-//! messages keep the source location.
+//! A number may be a string with an expression of the `[parameters]`, except counts, levels, ids
+//! and seeds. All values are in SI units. Unknown keys are errors. A choice is a table with the
+//! name of the variant (`[material.glass.pmb]`), so that error messages keep the source location.
 
 mod bodies;
 mod conditions;
@@ -69,7 +69,7 @@ pub struct Deck {
     pub table: Tables<Table>,
     /// Spacing and horizon.
     pub grid: Spanned<Grid>,
-    /// The bonds between blocks.
+    /// Bonds between bodies.
     #[serde(default)]
     pub interface: Interface,
     /// Contact between points that no bond joins; none if not given.
@@ -86,18 +86,18 @@ pub struct Deck {
     /// Damage laws by name.
     #[serde(default)]
     pub damage: Tables<Damage>,
-    /// Bodies by name; each body has its own material and damage.
+    /// Bodies by name; each body names its material and its damage law.
     pub body: Tables<Body>,
     /// Sets of points by name. `all` and the names of the bodies are names of sets too.
     #[serde(default)]
     pub set: Tables<Set>,
-    /// Pre-cracks by name: bonds that cross one start broken.
+    /// Pre-cracks by name; bonds that cross a pre-crack start broken.
     #[serde(default)]
     pub crack: Tables<Crack>,
     /// Initial displacements and velocities by name.
     #[serde(default)]
     pub initial: Tables<Initial>,
-    /// Loads and supports by name.
+    /// Loads, supports and temperatures by name.
     #[serde(default)]
     pub condition: Tables<Condition>,
     /// End time and step.
@@ -119,7 +119,7 @@ pub struct Deck {
     pub balance: Option<Spanned<Balance>>,
 }
 
-/// The setting of the problem.
+/// Dimension of the problem; in the plane, also its stress state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum DimensionName {
     /// A bar.

@@ -231,8 +231,8 @@ pub struct SupportForce {
     pub direction: Vector,
 }
 
-/// A crack path: the centre lines of the damaged region that is connected to a start position, one line for
-/// each branch. In 3-D the area and the front of this region.
+/// A crack path: the centre lines of the damaged region that is connected to a start position, one
+/// line for each branch. In 3-D, the area and the front of this region are computed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
@@ -258,7 +258,7 @@ pub struct Probe {
     pub fields: Vec<Text>,
 }
 
-/// Sums and extremes of a field over a set or body; one history column for each.
+/// Sums, means and extremes of a field over a set or body; one history column for each.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldStatistics {
@@ -281,9 +281,9 @@ pub struct FieldStatistics {
 pub enum Statistic {
     /// The sum over the points.
     Sum,
-    /// The sum of value times volume.
+    /// The sum over the points of value times volume.
     Integral,
-    /// The integral over the volume of the set.
+    /// The integral divided by the volume of the set.
     Mean,
     /// The smallest value.
     Minimum,

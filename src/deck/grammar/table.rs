@@ -19,7 +19,8 @@ pub struct Table {
     /// time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<Text>,
-    /// Name of the column of times in s; if not given, `t` or `time`, otherwise the first column.
+    /// Name of the column of times in s. If not given, the column `t` or `time`, or the first
+    /// column if the file has neither.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Text>,
     /// Strictly increasing times in s, instead of a file.

@@ -75,7 +75,8 @@ pub(super) struct Run {
     history: Option<u64>,
 }
 
-/// Return the set of the new deck for a group; `None` if it has no counterpart.
+/// Return the set of the new deck for a group, and write the set if it is new. Return `None` if the group
+/// has no counterpart.
 pub(super) fn set(
     translation: &mut Translation,
     model: &Model,

@@ -69,7 +69,7 @@ pub(super) fn contact(
         model(translation, models, interaction, &mut section)?;
         translation.add(section);
     }
-    // General contact acts between different blocks only.
+    // In Peridigm, general contact acts between different blocks only.
     if general.is_none() && self_contact.is_none() {
         return Ok(());
     }

@@ -16,7 +16,7 @@ pub(super) enum Points {
     File(Value, Option<PointFile>),
     /// A mesh.
     Mesh(Value),
-    /// A box that is filled with the given spacing.
+    /// A box that is filled with the spacing of `[grid]`.
     Box(Value),
 }
 
@@ -123,9 +123,9 @@ fn quick_grid(translation: &mut Translation, node: &Node) -> Result<Points> {
 pub(super) struct Influence {
     /// Node of the key.
     pub(super) node: Node,
-    /// Name of the influence function; `None` if there is no counterpart.
+    /// Name of Fissure's influence function; `None` if there is no counterpart.
     pub(super) known: Option<&'static str>,
-    /// Value of the new key `influence`; `None` for the default.
+    /// Value of the new key `influence`; `None` for the default or without a counterpart.
     pub(super) written: Option<&'static str>,
     /// How the new function differs from Peridigm's; empty if both are equal.
     pub(super) difference: &'static str,

@@ -8,7 +8,7 @@ use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
 /// Material models: a part of the name, the law, and how the law differs from the model. The first match is
-/// used.
+/// used. A model with an empty law has no counterpart.
 const MATERIALS: [(&str, &str, &str); 9] = [
     (
         "unified bond-based",
@@ -25,7 +25,8 @@ const MATERIALS: [(&str, &str, &str); 9] = [
     ("correspondence vumat", "", ""),
 ];
 
-/// Constants of an orthotropic solid.
+/// Constants of an orthotropic solid: name, key in the new deck, and whether plane problems use the
+/// constant.
 const ORTHOTROPIC: [(&str, &str, bool); 9] = [
     ("Young's Modulus X", "youngs_modulus_x", true),
     ("Young's Modulus Y", "youngs_modulus_y", true),
@@ -202,7 +203,8 @@ pub(super) fn write_material(
     Ok(())
 }
 
-/// Write the entries of Hooke's matrix or the constants of an orthotropic solid, if given.
+/// Write the entries of Hooke's matrix or the constants of an orthotropic solid, if given. Return whether
+/// anything was written.
 fn anisotropic(
     translation: &Translation,
     table: &Node,

@@ -107,13 +107,13 @@ impl Places {
         Self::GRADIENT + D * D
     }
 
-    /// First index of the diagonal and mixed entries of K⁻¹.
+    /// Return the first index of the diagonal and mixed entries of K⁻¹.
     const fn inverse<const D: usize>() -> usize {
         Self::direct::<D>() + D * D
     }
 
-    /// Index of the flag for a point without force: K is nearly singular, the intact part is too stiff, or a
-    /// bond has no stress.
+    /// Return the index of the flag for a point without force: K is nearly singular, the intact part is too
+    /// stiff, or a bond has no stress.
     const fn singular<const D: usize>() -> usize {
         Self::inverse::<D>() + 2 * D
     }
@@ -176,8 +176,8 @@ impl<const D: usize> Law<D> for BondAssociated {
         }
     }
 
-    /// Trace of the shape tensor of an untruncated family, divided by that of this family; 1 if K is nearly
-    /// singular.
+    /// Return the trace of the shape tensor of an untruncated family, divided by that of this family; 1 if K
+    /// is nearly singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {

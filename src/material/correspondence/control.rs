@@ -65,7 +65,8 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
-/// Return the error of `wan2019` with anisotropic constants for which C : I is not positive definite.
+/// Return the error of `wan2019` with anisotropic constants for which C : I is not positive definite;
+/// `None` otherwise.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let least = hooke::least_under_dilation(values, dimension)?;
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
@@ -133,7 +134,7 @@ impl Control {
         }
     }
 
-    /// Properties for display.
+    /// Return the properties for display.
     pub fn described(&self) -> Vec<(&'static str, Property)> {
         let (words, number) = match *self {
             Self::None => ("none", None),
@@ -161,7 +162,7 @@ mod tests {
 
     const YOUNG: f64 = 3.0;
 
-    /// The control of a law with these values of its keys.
+    /// Return the control of a law with these values of its keys.
     fn control(
         dimension: Dimension,
         poisson_ratio: f64,
@@ -192,7 +193,7 @@ mod tests {
         Dimension::PlaneStrain { thickness: 0.5 },
     ];
 
-    /// λ (in plane stress that of the sheet) and G, Pa.
+    /// Return λ (in plane stress that of the sheet) and G, Pa.
     fn constants(dimension: Dimension, ratio: f64) -> [f64; 2] {
         let shear = YOUNG / (2.0 * (1.0 + ratio));
         let across = match dimension {

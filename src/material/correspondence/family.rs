@@ -87,12 +87,12 @@ impl<const D: usize> ShapeTensor<D> {
         }
     }
 
-    /// Trace Σ ω |ξ|² Ṽ, m⁵.
+    /// Return the trace Σ ω |ξ|² Ṽ, m⁵.
     pub fn trace(&self) -> f64 {
         self.0.trace()
     }
 
-    /// Smallest eigenvalue, m⁵.
+    /// Return the smallest eigenvalue, m⁵.
     pub fn smallest(&self) -> f64 {
         extremes(&self.0)[0]
     }
@@ -121,7 +121,7 @@ pub fn extremes<const D: usize>(m: &SMatrix<f64, D, D>) -> [f64; 2] {
     [all.min(), all.max()]
 }
 
-/// Whether a symmetric matrix of at most three rows is positive definite, by Sylvester's criterion.
+/// Test whether a symmetric matrix of at most three rows is positive definite, by Sylvester's criterion.
 fn is_positive_definite<const D: usize>(m: &SMatrix<f64, D, D>) -> bool {
     let of_two = D < 2 || m[(0, 0)] * m[(1, 1)] > m[(0, 1)] * m[(1, 0)];
     m[(0, 0)] > 0.0 && of_two && determinant(m) > 0.0

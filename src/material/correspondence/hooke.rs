@@ -2,8 +2,8 @@
 //! the body.
 //!
 //! Voigt's order is xx, yy, zz, yz, xz, xy with engineering shear strains. A plane problem uses the
-//! components xx, yy and xy.
-//! In plane stress the matrix is that of a thin sheet, in plane strain part of that of the solid.
+//! components xx, yy and xy. In plane stress the matrix is that of a thin sheet. In plane strain its
+//! components are those of the solid.
 
 use nalgebra::{DMatrix, Matrix6, Rotation3, Vector3};
 
@@ -153,12 +153,12 @@ fn fault_at(key: &'static str, message: impl Into<String>) -> Option<LawFault> {
     })
 }
 
-/// Return the first given key of an anisotropic solid.
+/// Return the first given key of an anisotropic solid; `None` if all constants are isotropic.
 pub fn own_constants(values: &Values) -> Option<&'static str> {
     given_of(values, full_entries().chain(ORTHOTROPIC))
 }
 
-/// Return the error in the constants for this dimension.
+/// Return the error in the constants for this dimension; `None` if there is no error.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let full = given_of(values, full_entries());
     let orthotropic = given_of(values, ORTHOTROPIC);
@@ -224,7 +224,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// Return the error of a matrix that is not finite or not positive definite.
+/// Return the error of a matrix that is not finite or not positive definite, at the key `first`.
 fn indefinite(
     matrix: &Matrix6<f64>,
     dimension: Dimension,
@@ -263,7 +263,7 @@ fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     (all.eigenvalues[softest], parts.join(", "))
 }
 
-/// Indices of the components of Hooke's matrix that a dimension uses.
+/// Return the indices of the components of Hooke's matrix that a dimension uses.
 fn used(dimension: Dimension) -> Vec<usize> {
     match dimension {
         Dimension::Space => (0..6).collect(),
@@ -283,7 +283,7 @@ pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64
     })
 }
 
-/// Return Hooke's matrix in the material's axes; `None` for isotropic constants.
+/// Return Hooke's matrix in the material's axes, Pa; `None` for isotropic constants.
 fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let number = |key: &str| values.get(key).map_or(0.0, |_| values.number(key));
     if given_of(values, full_entries()).is_some() {
@@ -313,7 +313,7 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
 }
 
 /// Return the elastic constants of the isotropic solid whose moduli are the averages over all directions
-/// (Voigt). `None` if the law is isotropic.
+/// (Voigt). `None` for isotropic constants.
 pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
     let c = unturned(values, dimension)?;
     if matches!(dimension, Dimension::Space) {
@@ -433,7 +433,7 @@ impl Hooke {
     }
 }
 
-/// Indices in Voigt's order of the components in `D` dimensions.
+/// Return the indices in Voigt's order of the components in `D` dimensions.
 fn components<const D: usize>() -> impl Iterator<Item = usize> {
     const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
     let used: &[usize] = match D {
@@ -444,7 +444,7 @@ fn components<const D: usize>() -> impl Iterator<Item = usize> {
     used.iter().copied()
 }
 
-/// Index of a component in Voigt's order.
+/// Return the index of a component in Voigt's order.
 fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }

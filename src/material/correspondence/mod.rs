@@ -244,7 +244,7 @@ impl Correspondence {
         })
     }
 
-    /// Whether points have a control that decreases with plastic flow.
+    /// Test whether points have a control that decreases with plastic flow.
     fn control_yields(&self) -> bool {
         self.plastic.is_some() && self.control != Control::None
     }
@@ -306,7 +306,7 @@ impl<const D: usize> Law<D> for Correspondence {
         }
     }
 
-    /// Trace of K⁻¹ divided by that of an untruncated family; 1 if K is nearly singular.
+    /// Return the trace of K⁻¹ divided by that of an untruncated family; 1 if K is nearly singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         shape

@@ -1,5 +1,5 @@
-//! J2 plasticity with isotropic hardening, in the strain of each point's family. This file holds small
-//! strains; [`logarithmic`] holds large strains.
+//! J2 plasticity with isotropic hardening, in the strain of each point's family. This file implements small
+//! strains; [`logarithmic`] implements large strains.
 //!
 //! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic strain, E = E_e + E_p. The
 //! stress is S = C : E_e, P = F S.
@@ -79,7 +79,7 @@ const SURFACE: f64 = 1e-12;
 /// of b_e is larger, because it scales with the square of the stretches.
 const LOGARITHMIC_SURFACE: f64 = 1e-9;
 
-/// Return the error in the values of the keys.
+/// Return the error in the values of the keys; `None` if there is no error.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let fault = |key: &Key, message: &str| {
         Some(LawFault {
@@ -139,7 +139,7 @@ impl Plastic {
         })
     }
 
-    /// Properties for display.
+    /// Return the properties for display.
     pub fn described(&self) -> [(&'static str, Property); 3] {
         let strain = if self.is_logarithmic {
             "logarithmic"
@@ -348,7 +348,7 @@ mod tests {
         Plastic::of(&given(dimension, &values)).unwrap()
     }
 
-    /// Displacement gradients of a random walk, with some large steps.
+    /// Generate displacement gradients of a random walk, with some large steps.
     fn walk<const D: usize>() -> impl Iterator<Item = SMatrix<f64, D, D>> {
         let mut number = 0.0_f64;
         let mut place = SMatrix::<f64, D, D>::zeros();

@@ -60,7 +60,7 @@ impl Stress {
         }
     }
 
-    /// Name for display.
+    /// Return the name for display.
     pub fn name(&self) -> &'static str {
         match self {
             Self::StVenantKirchhoff(_) => "St. Venant–Kirchhoff",
@@ -199,7 +199,7 @@ pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tenso
     })
 }
 
-/// Return the stretch along an axis with this Green strain.
+/// Return the stretch √(1 + 2E) along an axis with the Green strain E; `None` if 1 + 2E is not positive.
 pub fn stretch_of(strain: f64) -> Option<f64> {
     let square = 1.0 + 2.0 * strain;
     (square > 0.0).then(|| square.sqrt())

@@ -207,13 +207,13 @@ pub(super) fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) ->
     0.5 * (trace + (trace * trace - 4.0 * determinant).max(0.0).sqrt())
 }
 
-/// Weighted volume Σ |ξ|² Ṽ (m⁵) from the sums of |ξ|² Ṽ times the monomials of n.
+/// Return the weighted volume Σ |ξ|² Ṽ (m⁵) from the sums of |ξ|² Ṽ times the monomials of n.
 pub(super) fn weighted_volume<const D: usize>(sums: &[f64]) -> f64 {
     let one = one_in_directions::<D>();
     product(sums, &one, &one)
 }
 
-/// The sum Σ σ|ξ|² Ṽ for σ = N·S N, from the sums of |ξ|² Ṽ times the monomials of N.
+/// Return the sum Σ σ|ξ|² Ṽ for σ = N·S N, from the sums of |ξ|² Ṽ times the monomials of N.
 pub(super) fn sum_of_squares<const D: usize>(sums: &[f64], tensor: &SMatrix<f64, D, D>) -> f64 {
     let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
     let polynomial: Vec<_> = pairs

@@ -63,13 +63,13 @@ impl Pals {
         }
     }
 
-    /// k′, Pa.
+    /// Return k′, Pa.
     fn bulk_modulus(&self) -> f64 {
         let d = self.ordinary.dimension();
         self.ordinary.volumetric() + self.ordinary.extensional() / (d * d)
     }
 
-    /// σ of an untruncated family, N/m⁷.
+    /// Return σ of an untruncated family, N/m⁷.
     fn whole(&self) -> f64 {
         self.ordinary.extensional() / self.ordinary.whole()
     }
@@ -184,7 +184,7 @@ impl<const D: usize> Law<D> for Pals {
         changing[2] = dilatation;
     }
 
-    /// t/|Y|, with |ξ|/|Y| = 1 − P and e/|Y| = P.
+    /// Return t/|Y|, with |ξ|/|Y| = 1 − P and e/|Y| = P.
     #[inline(always)]
     fn force(
         &self,
@@ -250,7 +250,8 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
-    /// Neighbours of unit volume on a cubic lattice, within a distance of 3, that fulfil a condition.
+    /// Return the neighbours of unit volume on a cubic lattice, within a distance of 3, that fulfil a
+    /// condition.
     fn family(kept: impl Fn([i32; 3]) -> bool) -> Vec<Vector3<f64>> {
         let all =
             (-3..=3).flat_map(|x| (-3..=3).flat_map(move |y| (-3..=3).map(move |z| [x, y, z])));

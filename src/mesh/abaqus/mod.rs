@@ -26,7 +26,7 @@ const MOST_INCLUDED: usize = 1000;
 /// Read a mesh and the files that it includes.
 ///
 /// # Errors
-/// If the lines of the files do not follow the format.
+/// If the lines of the files do not follow the format, or an included file cannot be read.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
     let mut reader = Reader::default();
     reader.mesh.ignores_case = true;
@@ -130,7 +130,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Read an included file in place of its *INCLUDE line.
+    /// Read an included file at the position of its `*INCLUDE` line, or of the keyword line with its
+    /// `INPUT` parameter.
     fn include(&mut self, from: &Path, input: &str, depth: usize) -> Result<()> {
         self.included += 1;
         if depth == DEEPEST || self.included > MOST_INCLUDED {

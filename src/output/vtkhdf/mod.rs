@@ -224,7 +224,8 @@ impl<'a> ResultFile<'a> {
     /// [`create`](Self::create).
     ///
     /// # Errors
-    /// If the points of the result never change, a field has the wrong length, or the disk is full.
+    /// If the points of the result never change, or a field has the wrong length. If a write fails, for
+    /// example because the disk is full.
     pub fn set_points(&mut self, contents: &Contents) -> Result<()> {
         let Contents {
             piece,
@@ -270,7 +271,7 @@ impl<'a> ResultFile<'a> {
     /// `values(k)` returns the values of moving field k. The step is flushed when this returns.
     ///
     /// # Errors
-    /// If a field has the wrong length or the disk is full.
+    /// If a field has the wrong length, or a write fails, for example because the disk is full.
     pub fn write_step(
         &mut self,
         time: f64,
@@ -328,7 +329,7 @@ impl<'a> ResultFile<'a> {
     /// Flush and fsync all data and history rows, so they survive a loss of power.
     ///
     /// # Errors
-    /// If the disk is full.
+    /// If a write fails, for example because the disk is full.
     pub fn sync(&mut self) -> Result<()> {
         self.file.sync()
     }
@@ -389,7 +390,8 @@ impl<'a> ResultFile<'a> {
     /// next step also flushes the rows to the result file.
     ///
     /// # Errors
-    /// If there is no history, a row has the wrong length, or the disk is full.
+    /// If there is no history, or a row has the wrong length. If a write fails, for example because the disk
+    /// is full.
     pub fn append_history(&mut self, rows: &[Vec<f64>]) -> Result<()> {
         match &mut self.history {
             Some(history) => history.append(&mut self.file, rows),
@@ -406,7 +408,7 @@ impl<'a> ResultFile<'a> {
     /// Close the file. Free unused space, unless the run `will_resume`.
     ///
     /// # Errors
-    /// If the disk is full or an earlier operation failed.
+    /// If this or an earlier operation fails, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let (comm, path) = (self.file.communicator(), self.file.path().to_path_buf());
         let tables = self.tables.iter().map(|table| (&table.dataset, self.steps));

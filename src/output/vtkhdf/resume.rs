@@ -36,7 +36,8 @@ impl<'a> ResultFile<'a> {
     /// file is not writable, the retained part is copied to a new file, which then replaces the old file.
     ///
     /// # Errors
-    /// If the old file cannot be read, has fewer steps, or other points or fields; if the disk is full.
+    /// If the old file cannot be read, or has fewer steps, or other points or fields. If a write fails, for
+    /// example because the disk is full.
     pub fn resume(
         path: &Path,
         comm: &'a dyn Communicator,
