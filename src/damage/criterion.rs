@@ -39,9 +39,9 @@ pub enum Criterion {
     StressThresholds(StressRule),
 }
 
-/// Factors w_c/w of the critical work by direction, at points i and j. `None` if both bodies have the same
-/// fracture energy in all directions. The factors multiply work thresholds; their square roots multiply
-/// stretch thresholds.
+/// Factors w_c/w of the critical work by direction, at points i and j; see [`ToughnessByDirection`]. `None`
+/// if both bodies have the same fracture energy in all directions. The factors multiply work thresholds;
+/// their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k

@@ -267,7 +267,7 @@ impl BondLattice {
         }
     }
 
-    /// Index of the lane group of a point; `None` if the point has no bonds.
+    /// Index of the lane group whose [`Self::points_of`] contain a point; `None` if there is none.
     fn vector_of(&self, point: usize) -> Option<usize> {
         let k = self.vectors_below(point + 1).checked_sub(1)?;
         (point < self.points_of(k).end).then_some(k)

@@ -71,7 +71,8 @@ impl Order {
         }
     }
 
-    /// Find another point of a block at the same position as the point with local index `index`.
+    /// Find another point of a block at the same position as the point with local index `index`. Without
+    /// another point, return the point itself.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
         let sorted = self.first[block] as usize..self.first[block + 1] as usize;
         let points = self.local[sorted].iter().map(|k| *k as usize);
@@ -91,7 +92,7 @@ struct Chunk {
     rows: Vec<(u32, u32, u32)>,
     neighbours: Neighbours,
     intact: Vec<u8>,
-    /// Sorted indices of one point's neighbours.
+    /// Buffer for the neighbours of one point, as indices in [`Order`].
     sorted: Vec<u32>,
 }
 

@@ -8,7 +8,7 @@ pub enum IsaSet {
     Each,
     /// AVX2 only; AVX-512 would be little faster.
     Avx2,
-    /// No vector instructions and no fused multiply-adds.
+    /// One version for any processor of the target, without fused multiply-adds.
     One,
 }
 

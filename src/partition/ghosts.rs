@@ -22,8 +22,8 @@ const HALO_WIDTH: usize = 3;
 
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
-/// `owned` are this rank's points after migration, `owner` is the rank of each cell, and `cutoff` (m) is
-/// the longest bond.
+/// `owned` are this rank's points after migration, `owner` is the rank of each cell, `total` is the number of
+/// points of all ranks, and `cutoff` (m) is the length of the longest bond.
 pub fn domain(
     comm: &dyn Communicator,
     cells: &Cells,

@@ -48,10 +48,11 @@ impl Polygon {
         polygon
     }
 
-    /// Build the index along the axis with the smaller total length of edges.
+    /// Build the index along the axis with the smaller ratio of total edge length to extent.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
-        // For each axis, the total length of all edges divided by the extent of the polygon.
+        // For each axis, the total length of the edges along it, divided by the extent of the polygon along
+        // it.
         let turns = [0, 1].map(|k| {
             let all: f64 = (0..count)
                 .map(|edge| {

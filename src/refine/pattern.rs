@@ -57,8 +57,8 @@ impl Pattern {
         self.dimension
     }
 
-    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node was
-    /// not refined before.
+    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node is
+    /// possible and was not refined before.
     pub fn refine(
         &mut self,
         body: &impl Fn(GridIndex) -> bool,
@@ -240,7 +240,8 @@ impl Pattern {
         self.suppressed.iter().copied()
     }
 
-    /// The nodes of one canonical level that exist now but not in `earlier`, as indices of this level.
+    /// The nodes of one canonical level (1 or more) that exist now but not in `earlier`, as indices of this
+    /// level, unordered.
     pub fn created_since(
         &self,
         earlier: &Self,

@@ -117,7 +117,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
 }
 
 /// Detect the grid of a body's points. The result is `None` unless all points lie on the grid and have the
-/// volume of a cell. Collective.
+/// same volume, that of a cell. If the points form a single layer, their volume is not compared with a cell.
+/// Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,

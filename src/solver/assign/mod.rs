@@ -117,7 +117,7 @@ fn build(
     (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
-/// Volume fractions of the cells of `neighbours` inside the families of points with this horizon.
+/// Volume correction factors of the cells of `neighbours` in the families of points with this horizon (m).
 fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
     // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
@@ -352,7 +352,8 @@ fn criterion(
     }
 }
 
-/// Set laws, criterion and weights of the bonds between two blocks.
+/// Create the interaction of each pair of blocks: its bonds, with their weights, laws and criterion. `blocks`
+/// are the laws of all blocks.
 ///
 /// # Errors
 /// If there is not enough memory for the weights.
@@ -411,7 +412,7 @@ struct End {
     pair_damage: Option<DamageLaw>,
     /// Horizon, m.
     horizon: f64,
-    /// Volume fractions of the other block's cells inside the families of this end.
+    /// Volume correction factors of the other block's cells in the families of this end.
     share: CellShare,
 }
 

@@ -298,7 +298,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Zero the sums of a pass over a range of points.
+    /// Reset the sums of a pass over a range of points: smallest stretches to ∞ and point sums to 0. Forces
+    /// are not reset.
     pub(super) fn clear(&mut self, pass: Pass, points: Range<usize>) {
         match pass {
             Pass::SmallestStretch => self.limits.thresholds[points].fill(f64::INFINITY),
@@ -380,7 +381,8 @@ impl<const D: usize> Forces<D> {
                     .with_min_len(CHUNK)
                     .zip(points)
                     .for_each(|(value, point)| {
-                        // The smallest stretch of a point without intact bonds is infinite.
+                        // A point without intact bonds has the minimum ∞. Its threshold is that for a
+                        // smallest stretch of 0.
                         let smallest = if value.is_infinite() {
                             0.0
                         } else {

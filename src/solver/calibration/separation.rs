@@ -171,8 +171,8 @@ fn is_separated<const D: usize>(
     crossing == 0
 }
 
-/// Energy (J/m²) that the points of the middle column have dissipated, per area of the plane. `height` is
-/// that of the column, m.
+/// Energy (J/m²) that the points of the middle column have dissipated, per area of the plane. The overshoot
+/// energy is subtracted. `height` is the height of the column, m.
 fn spent<const D: usize>(simulation: &mut Simulation<'_, D>, middle: &[bool], height: f64) -> f64 {
     let dissipated = simulation.forces.stored(&simulation.model).dissipated;
     let (model, fields) = (&simulation.model, &simulation.fields);

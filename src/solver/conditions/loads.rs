@@ -6,7 +6,7 @@ use crate::solver::motion::walk::Part;
 use super::Work;
 use super::values::{At, Values};
 
-/// A body force density.
+/// A load, as a force density on points.
 pub struct Load<const D: usize> {
     values: [Values; D],
     factors: [f64; D],

@@ -204,7 +204,8 @@ impl Supported {
         })
     }
 
-    /// Compute the reactions that keep the points at rest. Returns whether they are finite.
+    /// Set the velocities of the points to 0, and compute the reactions that keep the points at rest. Returns
+    /// whether the reactions are finite.
     pub fn project_residual<const D: usize>(
         &self,
         supports: &[Support],

@@ -134,7 +134,7 @@ impl<const D: usize> Contact<D> {
     /// Collective.
     ///
     /// # Errors
-    /// If a point lies in a rigid body; the error is the same on all ranks.
+    /// If a point starts in a rigid body or on its surface; the error is the same on all ranks.
     pub fn new(
         problem: &Problem,
         comm: &dyn Communicator,
@@ -228,7 +228,8 @@ impl<const D: usize> Contact<D> {
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
     /// friction and damping from the present velocities, record their work, and apply the second half kick of
-    /// rigid bodies. Otherwise, friction and damping do not change. Collective.
+    /// rigid bodies. Otherwise, friction and damping do not change. If a position is not finite, nothing is
+    /// added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,

@@ -99,7 +99,8 @@ impl StepControl {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Make one explicit step with the size that the rule requests. Collective.
+    /// Make one explicit step with the size that the rule requests. Contact and the end of the stage can
+    /// require a shorter step. Collective.
     fn make_adaptive_step(&mut self, rule: &Adaptive) {
         let mut kept = std::mem::take(&mut self.kept);
         self.keep(&mut kept);

@@ -608,7 +608,7 @@ impl<const D: usize> Fields<D> {
         potential[point] = energy;
     }
 
-    /// Set the contact fields of an owned point without contact to 0.
+    /// Set contact force, contact energy and contact density of an owned point without contact to 0.
     pub fn clear_contact(&mut self, point: usize) {
         let columns = self.contact_force.iter_mut().flatten();
         let scalars = self

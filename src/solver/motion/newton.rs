@@ -387,7 +387,8 @@ impl<const D: usize> Vectors<D> {
     }
 
     /// Move the points along x until |x·f| is at most 0.9 of its first value, and compute the residual at the
-    /// new positions. Returns ‖f‖, N. Collective.
+    /// new positions. The search also ends if the residual is within the tolerance, if x·f is not positive at
+    /// first, or after `MAX_LINE_SEARCH_STEPS` step lengths. Returns ‖f‖, N. Collective.
     fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
         let at_base = dot(simulation, &self.force, &self.correction);
         let mut length = 1.0;
@@ -434,7 +435,8 @@ impl<const D: usize> Vectors<D> {
         reduce(simulation.comm, &mut { power })[0]
     }
 
-    /// Recompute the preconditioner if bonds have broken since its last computation. Collective.
+    /// Compute the preconditioner at the first call, and if bonds have broken since its last computation.
+    /// Collective.
     fn refresh(&mut self, simulation: &mut Simulation<'_, D>) {
         if !std::mem::take(&mut self.is_stale) {
             return;
