@@ -45,7 +45,8 @@ impl BalanceWatch {
         }
     }
 
-    /// If a check is due and the loads of the ranks differ too much, rebalance. Collective.
+    /// If a check is due and the loads of the ranks differ too much, rebalance and return the result;
+    /// otherwise return `None`. Collective.
     ///
     /// # Errors
     /// If METIS fails; the error is the same on all ranks.

@@ -484,7 +484,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Record the first point whose motion is not finite, at the time of a clock.
+    /// Record the first point whose motion is not finite, at the time of a clock, unless a point has been
+    /// recorded before.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
             self.bad = self.first_bad(clock);
@@ -516,12 +517,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
             })
     }
 
-    /// Check on all ranks that all values are finite and that the load step has not failed.
+    /// Check on all ranks that all values are finite and that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// The message names the first point with a value that is not finite: that of the earliest step, then the
-    /// smallest id. If no equilibrium has been found, it names a loaded piece that no support holds, if there
-    /// is one.
+    /// If a value is not finite, the message names a condition that is not finite. Without such a condition,
+    /// it names the first point with such a value: that of the earliest step, then the smallest id. If the
+    /// motion of a rigid body is not finite, the message names this body. If no equilibrium has been found,
+    /// it names a loaded piece that no support holds, if there is one.
     pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -597,8 +599,8 @@ fn starts_deformed(problem: &Problem) -> bool {
             || problem.conditions.iter().any(placed))
 }
 
-/// Break the bonds that cross a pre-crack, and count them by crack. On both ranks, the test starts from the
-/// end with the lower id, so the results agree.
+/// Break the bonds that cross a pre-crack, and count them by crack. The test starts from the end with the
+/// lower id. Both ends of a bond, also on different ranks, therefore get the same result.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

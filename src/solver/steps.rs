@@ -70,7 +70,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
     countable(problem, length, (step, steps))
 }
 
-/// Create the error for a body whose points have no bonds. `missing` is the quantity that cannot be computed.
+/// Create the error for a problem without any bond. `missing` is the quantity that cannot be computed.
 fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     let from_mesh = |body: &Body| matches!(body.points, PointSource::Mesh { .. });
     let scale = if problem.bodies.iter().any(from_mesh) {

@@ -209,7 +209,8 @@ fn place_of<const D: usize>(
     place
 }
 
-/// Select the owned points in the boxes where bodies may touch, packed for each rank.
+/// Select the owned points in the boxes where bodies may touch, packed for each rank. If bonds joined the
+/// bodies, select only points with broken bonds.
 fn candidates<const D: usize>(
     simulation: &Simulation<'_, D>,
     meetings: &[Meeting],

@@ -153,7 +153,7 @@ fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f64; 
 }
 
 /// Check that the box contains points, and that the bodies reach at least one horizon beyond it in the
-/// directions of the axes along which the crack grows.
+/// directions of the axes along which the crack grows. Collective.
 fn is_in_the_bodies<const D: usize>(
     simulation: &Simulation<'_, D>,
     rule: &JIntegral,

@@ -95,11 +95,11 @@ impl Tip {
 ///
 /// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
 /// latest row in which the crack was at least one horizon shorter. If there is no such row, it begins at the
-/// latest row with the initial length.
+/// latest row in which the crack was not longer than at first.
 ///
 /// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
 /// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
-/// speed falls as one horizon divided by the length of the interval.
+/// speed falls as one horizon divided by the duration of the interval.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.

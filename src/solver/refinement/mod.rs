@@ -80,7 +80,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Check that the bonds of new points can get a state.
     ///
     /// # Errors
-    /// If bonds have a history; the error is the same on all ranks.
+    /// If refinement can add points during the run, and bonds have a history; the error is the same on all
+    /// ranks.
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
         let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
                        have not; refine `[refinement.region]` from the start";
@@ -323,8 +324,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.forces.cut(|point| concerned[point], cut);
     }
 
-    /// Set the state of the owned points from rows. The last number of a row is the previous block, which is
-    /// not part of the state.
+    /// Set the state of the owned points from rows. Fields of [`Birth::Shared`] are multiplied by the volume,
+    /// because rows contain their densities. The last number of a row is the previous block, which is not
+    /// part of the state.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
         let volume = &self.model.volume;
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);

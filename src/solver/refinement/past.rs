@@ -183,6 +183,7 @@ impl Past {
     }
 
     /// Index of the first number in the row of a new point. The row is the mean of the rows of its parents.
+    /// It is 0 for fields of [`Birth::FoundAnew`], and [`NOWHERE`] for the block.
     fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
         if let Some(row) = born.at.get(&(body, place)) {
             return *row;
