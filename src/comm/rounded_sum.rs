@@ -19,8 +19,8 @@ pub struct Unit {
 
 impl Unit {
     /// Return a unit for which the sum of `terms` terms does not overflow. No term may exceed `magnitude`.
-    /// The unit is chosen as small as powers of 2 allow, but not below 2⁻¹⁰⁰⁰. `None` if the magnitude is 0
-    /// or not finite.
+    /// The unit is a power of 2 close to the smallest possible one, and at least 2⁻¹⁰⁰⁰. `None` if the
+    /// magnitude is 0 or not finite.
     pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
         if magnitude == 0.0 || !magnitude.is_finite() {
             return None;

@@ -19,8 +19,8 @@ pub enum Calibration {
     /// energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None`
     /// until then.
     Opening(Option<f64>),
-    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). Their
-    /// w is the work on η, so it holds for small rotations only.
+    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). This
+    /// w is the work on η, so the criterion holds for small rotations only.
     Willberg2022,
     /// PeriLab's formula: a bond breaks at ¼ |(T_i − T_j)·η| = 3G0/(πδ³h) in the plane and 4G0/(πδ⁴) in
     /// space.

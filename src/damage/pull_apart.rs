@@ -50,8 +50,8 @@ pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
             }
         }
         crossing.sort_unstable_by(|a, b| b[0].total_cmp(&a[0]));
-        // The bonds are sorted from the last to break to the first. When a bond breaks, those before it in
-        // this order are still intact.
+        // The bonds are sorted from the last to break to the first. When a bond breaks, the bonds before it
+        // in this order are still intact.
         let mut intact = 0.0;
         for [opening, growth, moment] in crossing {
             let dilatation = factor * opening * (intact + 0.5 * growth);

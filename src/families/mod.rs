@@ -90,8 +90,8 @@ impl BlockBonds {
     }
 
     /// The range of owned points whose bonds are computed together with the bonds of a point. In a lattice,
-    /// these are the points of its lane group, up to the last point with bonds. In a list, it is the point
-    /// only.
+    /// these are the points of its lane group, up to the last point with bonds. In a list, the range contains
+    /// this point only.
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,

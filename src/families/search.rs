@@ -21,8 +21,8 @@ const HORIZON_TOLERANCE: f64 = 1e-9;
 /// Number of points that one task searches.
 const CHUNK: usize = 512;
 
-/// Number of chunks that are searched before their rows are appended to the lists. It limits the memory of
-/// buffers.
+/// Number of chunks that are searched before their rows are appended to the lists. This number limits the
+/// memory of buffers.
 const WAVE: usize = 32;
 
 /// The longest bond (m) for a horizon (m).

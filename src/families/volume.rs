@@ -33,8 +33,8 @@ const MOST_MULTIPLES: usize = 1 << 17;
 /// Bit pattern of a table entry that has not been computed.
 const UNKNOWN: u64 = u64::MAX;
 
-/// The longest bond (m) with a positive factor, if the factor is 0 from `length` (m) on. Bonds whose factor
-/// would be round-off are excluded by a tolerance.
+/// Length limit (m) of bonds with a positive factor, for a factor that falls to 0 at `length` (m). The limit
+/// is slightly below `length`, so bonds whose factor would be only round-off are excluded.
 fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }

@@ -42,8 +42,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Run a rarely needed task out of line, so it uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
-    /// Return `a`. With AVX2 and AVX-512, the compiler does not see that the value is the same. Otherwise,
-    /// the compiler may split operations by lane.
+    /// Return `a`. With AVX2 and AVX-512, the result is opaque to the compiler, which then does not split the
+    /// operations before and after this call by lane.
     #[inline(always)]
     fn whole(self, a: Lanes) -> Lanes {
         a

@@ -163,10 +163,10 @@ pub struct Heading {
     pub line: u64,
 }
 
-/// Read the heading of a file, if it has one.
+/// Read the heading of a file; `None` if it has no heading.
 ///
 /// # Errors
-/// If the file cannot be read.
+/// If the file cannot be read or is not a regular file.
 pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
     // Opening a pipe would block until its other end is opened, so only regular files are read.
     if !std::fs::metadata(path)?.is_file() {

@@ -384,8 +384,8 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
 /// The ids of the points of a group. The points are those of
 ///
 /// - the elements of the group;
-/// - elements that have all corners of one of its faces, edges or points;
-/// - elements that have one of its nodes.
+/// - elements that have all corners of a face, edge or point element of the group;
+/// - elements that have a node of the group.
 ///
 /// `marks` has one entry per node; all entries are false before and after the call.
 fn members(

@@ -130,7 +130,8 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     Ok((points, total))
 }
 
-/// Displace points randomly from the centres of their cells. `spacing` contains the edges of the cells, m.
+/// Displace points randomly from the centres of their cells, by at most `jitter.share` edges in each
+/// direction. `spacing` contains the edges of the cells, m.
 fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     for point in points {
         for (k, edge) in spacing.iter().enumerate() {

@@ -51,8 +51,8 @@ impl Polygon {
     /// Build the index along the axis with the smaller ratio of total edge length to extent.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
-        // For each axis, the total length of the edges along it, divided by the extent of the polygon along
-        // it.
+        // For each axis, the total length of the edges in the direction of this axis, divided by the extent
+        // of the polygon in this direction.
         let turns = [0, 1].map(|k| {
             let all: f64 = (0..count)
                 .map(|edge| {

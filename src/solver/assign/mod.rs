@@ -69,8 +69,8 @@ enum Breaks {
     Stress(StressMeasure),
 }
 
-/// Quantity that breaks the bonds of a body with this damage. In bond-based laws, the work follows from the
-/// stretch, so their bonds break at the equivalent critical stretch.
+/// Quantity that breaks the bonds of a body with this damage. In a bond-based law, the work of a bond follows
+/// from its stretch, so the bond breaks at the equivalent critical stretch.
 fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     match damage.rule {
@@ -173,8 +173,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Data that failure criteria read of the points of this body, for its bonds to bodies with which it has a
-/// separate damage law.
+/// Data of the points of this body that failure criteria read. Only the bonds to bodies with which this body
+/// has a separate damage law count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();

@@ -8,7 +8,7 @@ const CHUNK: usize = 1024;
 /// The points that may touch each owned point: one row per owned point, in ascending order of ids.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    /// Index of the first pair of each owned point.
+    /// Index of the first pair of each owned point, followed by the number of pairs.
     starts: Vec<usize>,
     /// Index of the other point of each pair: owned points first, then ghosts.
     others: Vec<u32>,

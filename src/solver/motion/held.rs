@@ -41,8 +41,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Collective.
     ///
     /// # Errors
-    /// If a piece is loaded along an axis in which no support holds it. Of several such pieces, the message names
-    /// the one with the smallest point id.
+    /// If a piece is loaded along an axis in which no support holds it. Of several such pieces, the message
+    /// names the one with the smallest point id.
     pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
         for stage in 0..self.stages.len() {
             let found = self.at_load_steps(stage, |simulation, pieces, time| {
@@ -119,8 +119,8 @@ impl<const D: usize> Simulation<'_, D> {
         self.apply_loads(time, true);
     }
 
-    /// Return an error if a piece is loaded along an axis in which no support holds it. Of several such pieces,
-    /// the message names the one with the smallest point id. Collective.
+    /// Return an error if a piece is loaded along an axis in which no support holds it. Of several such
+    /// pieces, the message names the one with the smallest point id. Collective.
     pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
         let pieces = self.find_pieces(self.unloaded_points());
         self.unheld_load(&pieces).map_or(Ok(()), |unheld| {

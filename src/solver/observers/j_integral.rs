@@ -6,8 +6,8 @@
 //!
 //! J = −(1/h) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
 //!
-//! In an equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010) over
-//! the boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
+//! In an equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010)
+//! over the boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
 
 use crate::comm;
 use crate::comm::sum::{ExactSum, reduce};
