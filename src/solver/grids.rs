@@ -31,8 +31,8 @@ struct Cells {
 /// Find the grids of a deck; `longest` is the length of the longest bond, m. Collective.
 ///
 /// # Errors
-/// If the deck requests lattices and the points of a body do not lie on a grid; the error is the same on all
-/// ranks.
+/// If the deck requests lattices and the points of a body do not lie on a regular grid or have different
+/// volumes; the error is the same on all ranks.
 pub fn grids(
     problem: &Problem,
     comm: &dyn Communicator,

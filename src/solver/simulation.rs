@@ -160,8 +160,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Distribute the points of grids and create their bonds. Initial values are not set, and forces are not
-    /// evaluated. `cost` is the computing cost of this rank's points; `None` if it is not known. `between` is
-    /// the same as for [`Self::set_up`].
+    /// evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if it is not known.
+    /// `between` is the same as for [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,

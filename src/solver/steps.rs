@@ -135,7 +135,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
 /// at most (r Δt)²/4 of the damped kinetic energy.
 const DAMPED: f64 = 0.5;
 
-/// Largest allowed r Δt; with a larger one, viscous damping reverses the velocity in each step.
+/// Largest allowed r Δt; with a larger value, viscous damping reverses the velocity in each step.
 const SIGN_CHANGES: f64 = 2.0;
 
 /// The largest rate r of viscous damping of the bodies, 1/s.

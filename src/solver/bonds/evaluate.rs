@@ -65,10 +65,10 @@ impl ForceTimes {
 
 /// Fields that a force evaluation reads and writes.
 pub struct Acting<'a, const D: usize> {
-    /// Displacements of the local points, m; the evaluation updates those of ghosts.
+    /// Displacements of the local points, m; the evaluation updates the displacements of ghosts.
     pub displacement: &'a mut [Vec<f64>; D],
-    /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates
-    /// those of ghosts.
+    /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates the
+    /// stretches of ghosts.
     pub thermal_stretch: Option<&'a mut [f64]>,
     /// Internal force density of the owned points, N/m³. It must be 0 on entry, because bond forces are
     /// added to it.
@@ -274,7 +274,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Copy received displacements and thermal stretches of ghosts to the arrays that bonds read.
-    /// `BondInputs` has already written those of owned points.
+    /// `BondInputs` has already written the values of owned points.
     fn update_moved_ghosts(
         &mut self,
         model: &Model<D>,

@@ -178,7 +178,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Out-of-plane stretch F_zz of an owned point in plane stress, at its deformation gradient and plastic
-    /// state; see [`Law::stretch_across`].
+    /// state. `None` if the law does not compute it; see [`Law::stretch_across`].
     pub fn stretch_across(
         &self,
         model: &Model<D>,

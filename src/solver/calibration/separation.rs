@@ -13,11 +13,11 @@ use crate::solver::bonds::BondUpdate;
 /// number.
 const MAX_BONDS: f64 = 1e6;
 
-/// Relative growth of the separation per step. It limits how far bonds exceed their criterion when they
-/// break. The overshoot energy is subtracted.
+/// Relative growth of the separation per step. A small growth limits how far bonds exceed their criterion
+/// when they break. The overshoot energy is subtracted.
 const GROWTH: f64 = 0.01;
 
-/// Ratio of the first separation to the one at which the first bond is expected to break.
+/// Ratio of the first separation to the separation at which the first bond is expected to break.
 const START: f64 = 0.02;
 
 /// Maximum number of steps; blocks need far fewer steps to separate.

@@ -18,8 +18,9 @@ const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z 
 /// value at the start. Also check that thermal stretches are above −1. Collective.
 ///
 /// # Errors
-/// The message names the first entry of the deck that fails the check, and its point with the smallest id.
-/// The error is the same on all ranks.
+/// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
+/// deck that fails the check, and the point with the smallest id at which it fails. The error is the same on
+/// all ranks.
 pub fn are_finite<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,

@@ -235,7 +235,7 @@ impl RigidBody {
             RigidMotion::Driven(_) => {
                 state.work -= work(&state.contact, &contact);
                 // In a load step, the velocity is 0 and work comes from `advance`. The first equilibrium
-                // resets `advance`, so further ones add no work.
+                // resets `advance`, so further equilibria of the load step add no work.
                 for (d, advance) in state.advance.iter_mut().enumerate() {
                     let advance = std::mem::take(advance);
                     state.work -= 0.5 * (state.contact[d] + contact[d]) * advance;

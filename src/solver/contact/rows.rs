@@ -58,7 +58,8 @@ impl Rows {
         rows
     }
 
-    /// Indices of the points that may touch an owned point, without points to which an intact bond joins it.
+    /// Indices of the points that may touch an owned point, without points to which an intact bond joins the
+    /// owned point.
     pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
         let row = self.starts[point]..self.starts[point + 1];
         row.filter(|pair| !self.is_bonded[*pair])

@@ -48,7 +48,7 @@ pub struct StepControl {
 
 impl StepControl {
     /// Start a stage. `step` (s) is the time step of the stage without adaptation: the fixed step of the
-    /// deck, or the one from the stable step.
+    /// deck, or the step that follows from the stable step.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);

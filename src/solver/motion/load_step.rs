@@ -43,7 +43,7 @@ pub struct LoadStep {
     /// Number of iterations since bonds last broke in this load step, or since its start.
     pub since_breaking: u64,
     /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
-    /// point. It is 0 if f is round-off, and NaN before the first load step.
+    /// point. The residual is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation; NaN if all points are at rest.
     pub(super) damping: f64,
@@ -301,7 +301,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Return an error if the load step has failed. Collective.
     ///
     /// # Errors
-    /// The message names a piece that has loads but no supports, or the residual if there is no such piece.
+    /// If the load step has failed. The message names a piece that has loads but no supports, or the residual
+    /// if there is no such piece.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.load_step.has_failed {
             return Ok(());

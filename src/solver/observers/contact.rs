@@ -273,8 +273,8 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
     homes
 }
 
-/// Find the nearest two of the given points of two bodies; `None` if their distance is not below the limit
-/// for their spacing.
+/// Find the nearest pair among the given points of two bodies. Only pairs whose distance is below the limit
+/// for their spacing and their reference distance count; `None` if there is no such pair.
 fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
     if first.is_empty() || second.is_empty() {
         return None;

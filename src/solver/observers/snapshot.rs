@@ -260,8 +260,9 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_settin
     share * (in_setting - D as f64 * free) + 3.0 * free
 }
 
-/// Thermal stretch of an owned point that can expand freely perpendicular to the plane or bar, or in 3-D. It
-/// is 0 under plane or uniaxial strain, because the determinant of F is then that of the 3-D deformation.
+/// Thermal stretch of an owned point in 3-D, in plane stress, or in a bar that can expand sideways; 0 without
+/// temperatures. Under plane or uniaxial strain, the result is 0, because the determinant of F is then also
+/// the determinant of the 3-D deformation.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],

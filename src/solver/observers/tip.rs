@@ -30,7 +30,8 @@ impl Tip {
     /// Find the points of the set in which the tip is tracked. Collective.
     ///
     /// # Errors
-    /// If the set is empty or lies behind the start; the error is the same on all ranks.
+    /// If the set is empty, or all its points lie behind the start of the line; the error is the same on all
+    /// ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::Tip,
