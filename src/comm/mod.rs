@@ -51,7 +51,7 @@ pub trait Communicator {
     /// Element-wise maximum over the ranks, in place. Values must not be NaN.
     fn max(&self, values: &mut [f64]);
 
-    /// Replace `data` on every rank by that of rank `root`.
+    /// Replace `data` on every rank by the data of rank `root`.
     fn broadcast(&self, root: usize, data: &mut Vec<u8>);
 
     /// Send `outgoing[q]` to rank q. Return the received buffers by rank.

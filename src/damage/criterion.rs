@@ -66,7 +66,7 @@ pub struct StretchConversion {
 }
 
 impl StretchConversion {
-    /// Return the critical stretch of each bond, from those of points i and j.
+    /// Return the critical stretch of each bond, from the critical stretches of points i and j.
     #[inline(always)]
     fn convert<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Lanes {
         let [[ii, ij], [ji, jj]] = self.ratios;

@@ -69,7 +69,8 @@ impl ToughnessByDirection {
     };
 
     /// Create the factor in 2 or 3 dimensions from a unit vector a. `ratio` is the fracture energy of cracks
-    /// across a divided by that of cracks along a. `None` if `ratio` is beyond [`Self::limits`].
+    /// across a, divided by the fracture energy of cracks along a. `None` if `ratio` is beyond
+    /// [`Self::limits`].
     pub fn new(dimension: usize, axis: [f64; 3], ratio: f64) -> Option<Self> {
         let is_tough_across = ratio >= 1.0;
         (0..=MOST_SQUARINGS).find_map(|squarings| {
@@ -114,14 +115,14 @@ impl ToughnessByDirection {
         power * self.share + Lanes::splat(self.base)
     }
 
-    /// Fracture energy of cracks across a, divided by that of cracks along a.
+    /// Fracture energy of cracks across a, divided by the fracture energy of cracks along a.
     pub fn ratio(&self, dimension: usize) -> f64 {
         let [across, _] = means(dimension, self.is_tough_across, self.squarings);
         self.base + self.share * across
     }
 
-    /// Fracture energy of cracks with a unit normal, divided by that of cracks along a. Computed as a sum
-    /// over directions.
+    /// Fracture energy of cracks with a unit normal, divided by the fracture energy of cracks along a.
+    /// Computed as a sum over directions.
     pub fn cost(&self, dimension: usize, normal: [f64; 3]) -> f64 {
         let quarter = f64::from(DIRECTIONS);
         let mut sums = [0.0; 2];

@@ -151,7 +151,7 @@ fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
 }
 
 impl Chunk {
-    /// Replace the rows of the chunk by those of a range of points.
+    /// Replace the rows of the chunk by the rows of a range of points.
     fn search(
         &mut self,
         domain: &Domain,

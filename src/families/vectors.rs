@@ -12,7 +12,7 @@ use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
-/// A lane group. Slot, local index and line are those of its first point.
+/// A lane group. Slot, local index and line belong to its first point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
     pub(super) slot: u32,

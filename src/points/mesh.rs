@@ -371,7 +371,7 @@ fn are_apart(mesh: &Mesh, points: &[Point], point_of: &[u32]) -> Result<()> {
     Err(mesh.elements.fault(second, message))
 }
 
-/// Find the first point whose key equals that of an earlier point. Return both indices, the earlier one
+/// Find the first point whose key equals the key of an earlier point. Return both indices, the earlier one
 /// first.
 fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     let mut order: Vec<(Key, u32)> = keys.zip(0..).collect();
@@ -381,7 +381,7 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     Some([pair[0].1, pair[1].1])
 }
 
-/// The ids of the points of a group. The points are those of
+/// The ids of the points of a group. A group has the points of
 ///
 /// - the elements of the group;
 /// - elements that have all corners of a face, edge or point element of the group;

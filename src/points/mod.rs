@@ -145,8 +145,8 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
 /// of the first point.
 ///
 /// # Errors
-/// If no mesh has a group of that name, or if the points differ from those of an earlier call. Only rank 0
-/// knows the names of the groups and can suggest similar names.
+/// If no mesh has a group of that name, or if the points differ from the points of an earlier call. Only rank
+/// 0 knows the names of the groups and can suggest similar names.
 fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result<()> {
     for (index, set) in problem.sets.iter().enumerate() {
         let Selector::Mesh(group) = &set.selector else {

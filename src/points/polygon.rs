@@ -146,7 +146,8 @@ fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
     let [a, b, p] = [a, b, p].map(Vector2::from);
     let (edge, offset) = (b - a, p - a);
     let along = edge.dot(&offset) / edge.dot(&edge);
-    // A repeated vertex creates an edge of length 0. The distance to the edge is then that to the vertex.
+    // A repeated vertex creates an edge of length 0. The distance to the edge is then the distance to the
+    // vertex.
     let along = if along.is_nan() {
         0.0
     } else {
@@ -249,7 +250,7 @@ mod tests {
             assert!(polygon.contains(within, 1e-9));
             assert!(!polygon.contains(within.map(|x| -3.0 - x), 1e-9));
             assert!(polygon.edges.len() <= 10 * count as usize);
-            // The tops of a circle have the most edges in a strip.
+            // The strips at the two ends of a circle contain the most edges.
             assert!(most_read(&polygon) < 400, "{}", most_read(&polygon));
         }
     }

@@ -97,7 +97,7 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
     Ok(columns)
 }
 
-/// Id of a point and its values: the components of the displacement, then those of the velocity.
+/// Id of a point and its values: the components of the displacement, then the components of the velocity.
 pub type Row = (u64, Vec<f64>);
 
 /// Read this rank's part of the rows. `total` is the number of points. Collective.

@@ -12,9 +12,9 @@ use super::grid_index_set::GridIndexSet;
 pub struct Node {
     /// The level of the node's block, which determines the spacing of its neighbours.
     pub level: u32,
-    /// Ratio of the node's volume to that of a level-0 cell.
+    /// Ratio of the node's volume to the volume of a level-0 cell.
     pub volume_fraction: f64,
-    /// Whether the volume is exactly that of a cell of its level.
+    /// Whether the volume is exactly the volume of a cell of the node's level.
     pub whole: bool,
 }
 

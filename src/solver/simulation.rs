@@ -96,7 +96,7 @@ pub struct Simulation<'a, const D: usize> {
 /// Wall-clock time by phase on this rank.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Times {
-    /// Creation of points, partition and families.
+    /// Set-up: points, partition, families, conditions and the first forces.
     pub set_up: Duration,
     /// Bond forces and halo exchanges in the time loop.
     pub forces: ForceTimes,
@@ -520,10 +520,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Check on all ranks that all values are finite and that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// If a value is not finite, the message names a condition that is not finite. Without such a condition,
-    /// it names the first point with such a value: that of the earliest step, then the smallest id. If the
-    /// motion of a rigid body is not finite, the message names this body. If no equilibrium has been found,
-    /// it names a loaded piece that no support holds, if there is one.
+    /// If a value is not finite, the message names a condition that is not finite or causes a thermal stretch
+    /// of −1 or less. Without such a condition, it names a point with such a value: from the earliest step,
+    /// the point with the smallest id. If the motion of a rigid body is not finite, the message names this
+    /// body. If no equilibrium has been found, it names a loaded piece that no support holds, if there is
+    /// one.
     pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -588,7 +589,8 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
     finite
 }
 
-/// Whether bonds may break at the initial positions.
+/// Whether bonds may break at the initial positions, because initial displacements or conditions can stretch
+/// them.
 fn starts_deformed(problem: &Problem) -> bool {
     let placed = |condition: &Condition| {
         let action = &condition.action;

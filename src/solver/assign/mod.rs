@@ -255,7 +255,7 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
             Criterion::Stretch(i.critical)
         }
         [CriticalStretch(i), CriticalStretch(j)] => {
-            // Each end compares the stretch with its threshold only, not with that of the other end.
+            // Each end compares the stretch with its own threshold only.
             let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
             let conversion = StretchConversion { ratios, stiffness };
             Criterion::StretchBetween([i.critical, j.critical], conversion)

@@ -103,8 +103,8 @@ fn loaded<const D: usize>(
         return (members(problem, model, set), None);
     }
     let mut shares = SetFractions::new(grids);
-    // Sets of loads in runs with refinement never contain ids, so the id 0 is not used; see
-    // `refinement::trigger::is_possible`.
+    // Sets of loads in runs with refinement never contain ids, so the id 0 that is passed here is not read;
+    // see `refinement::trigger::is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
         set::contains(&problem.sets[set], problem.horizon, 0, position, body)
     };
@@ -487,8 +487,8 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Add the work of loads and supports since [`Self::remember`]. Force densities and reactions must be
-    /// those at the present positions.
+    /// Add the work of loads and supports since [`Self::remember`]. Force densities and reactions must belong
+    /// to the present positions.
     pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
             load.add_work(part, work);

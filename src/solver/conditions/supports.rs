@@ -240,7 +240,7 @@ impl Supported {
         finite
     }
 
-    /// Add the work of the support in this step (J) to that of each point.
+    /// Add the work (J) of the support in this step to the external work of each point.
     pub fn add_work<const D: usize>(
         &self,
         supports: &[Support],

@@ -253,8 +253,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Break the bonds that reach their criterion at the present equilibrium. If no bond breaks, the load
-    /// step is finished. Returns whether any bond broke. If so, the forces no longer include those of the
-    /// broken bonds, and the reactions must be recomputed.
+    /// step is finished. Returns whether any bond broke. If so, the forces no longer include broken bonds,
+    /// and the reactions must be recomputed.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;

@@ -44,8 +44,8 @@ impl<const D: usize> Simulation<'_, D> {
         all
     }
 
-    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]; the
-    /// supports are those of the present stage. Collective.
+    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]. The
+    /// supports of the present stage apply. Collective.
     pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {

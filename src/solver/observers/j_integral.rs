@@ -25,7 +25,7 @@ const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.
 pub struct JIntegrals {
-    /// Different directions of growth.
+    /// Directions of growth, each contained once.
     directions: Vec<[f64; 3]>,
     boxes: Vec<WeightedBox>,
 }

@@ -19,7 +19,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Take a snapshot of a run. The forces must be those of the present positions.
+    /// Take a snapshot of a run. The forces must have been evaluated at the present positions.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.stored(&simulation.model);
         stored.softened = simulation.forces.softened(&simulation.model);
