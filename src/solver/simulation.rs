@@ -120,7 +120,7 @@ struct BadPoint {
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Create and distribute the points and bonds, and evaluate the forces at time 0.
+    /// Create and distribute the points and bonds, and evaluate the forces at time 0. Collective.
     ///
     /// # Errors
     /// If the problem cannot be run: for example, if the points cannot be created, if a set of a condition is
@@ -134,7 +134,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// ends the set-up; the error must be the same on all ranks.
     ///
     /// # Errors
-    /// Those of [`Self::new`] and of `between`.
+    /// The errors of [`Self::new`] and of `between`.
     pub fn set_up(
         problem: &'a Problem,
         comm: &'a dyn Communicator,

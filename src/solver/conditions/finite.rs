@@ -87,7 +87,7 @@ struct FiniteCheck<'a, const D: usize> {
 
 impl<const D: usize> FiniteCheck<'_, D> {
     /// Return an error if the thermal stretch of a point of a set is -1 or less. The bonds of this point
-    /// would have no length.
+    /// would have no length. Collective.
     fn look_at_stretches(
         &self,
         key: &str,
@@ -126,7 +126,7 @@ impl<const D: usize> FiniteCheck<'_, D> {
     }
 
     /// Return an error if a component, times its factor, is not finite at a point of a set. `names` are the
-    /// subjects of the messages.
+    /// subjects of the messages. Collective.
     fn look<'e>(
         &self,
         key: &str,

@@ -254,7 +254,7 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// Break the bonds that reach their criterion at the present equilibrium. If no bond breaks, the load
     /// step is finished. Returns whether any bond broke. If so, the forces no longer include broken bonds,
-    /// and the reactions must be recomputed.
+    /// and the reactions must be recomputed. Collective.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;
@@ -283,6 +283,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Raise `scale` to the norms of loads and reactions at the present equilibrium, if they are larger.
+    /// Collective.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, mut reactions] = sums(model, fields, |point, _| {

@@ -211,7 +211,7 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Begin a load step, and compute the residual at the predicted positions.
+    /// Begin a load step, and compute the residual at the predicted positions. Collective.
     fn begin_load_step(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let follows_the_last = !simulation.clock.is_new_size() && !simulation.load_step.has_broken;
         self.refresh(simulation);
@@ -224,7 +224,7 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Make the first iteration of a load step, linearized about the last equilibrium.
+    /// Make the first iteration of a load step, linearized about the last equilibrium. Collective.
     fn predict(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let owned = simulation.model.owned();
         let fields = &mut simulation.fields;
@@ -252,6 +252,7 @@ impl<const D: usize> Vectors<D> {
     }
 
     /// Make one Newton iteration: solve K x = f, move the points along x by the line search, and adapt η.
+    /// Collective.
     fn iterate(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         simulation.load_step.iterations += 1;
         simulation.load_step.since_breaking += 1;

@@ -151,6 +151,7 @@ impl ContactWatch {
     }
 
     /// Find the pairs of bodies whose bounding boxes overlap or are at most the mean of their spacings apart.
+    /// Collective.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();

@@ -58,7 +58,7 @@ impl Snapshot {
     }
 
     /// Compute a field over the owned points at the time of the snapshot. The values are ordered by point,
-    /// with [`Field::components`] entries per point.
+    /// with [`Field::components`] entries per point. Some fields need messages between ranks. Collective.
     pub fn field<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

@@ -146,6 +146,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Sum kinetic and strain energy (J) over all ranks, and count the intact bonds; each bond counts twice.
+    /// Collective.
     fn held(&self, snapshot: &Snapshot) -> (f64, u64) {
         let sums = point_sums(self, snapshot);
         // Both energies are in one sum, which is rounded once.
@@ -201,7 +202,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         grids.points(grids.unrefined(coarse))
     }
 
-    /// Create the run on other grids, at time 0.
+    /// Create the run on other grids, at time 0. Collective.
     fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
         Self::of_points(self.problem, self.comm, (pieces, grids), None, &mut || {
             Ok(())
@@ -258,7 +259,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Break the bonds that were broken before the refinement, and new bonds that cross facets. The last
-    /// number of a row is the previous block of the point.
+    /// number of a row is the previous block of the point. Collective.
     fn inherit(
         &mut self,
         rows: &[f64],

@@ -154,7 +154,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Return the nodes that `pick` selects for the blocks and positions of the marked points, over all
-    /// ranks.
+    /// ranks. Collective.
     fn picks(
         &self,
         marked: &[bool],
@@ -166,7 +166,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own.collect::<Vec<_>>())
     }
 
-    /// Mark the owned points that trigger refinement.
+    /// Mark the owned points that trigger refinement. Collective.
     fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
         let mut most = [0.0_f64];
@@ -196,7 +196,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (0..model.owned()).map(is_trigger).collect()
     }
 
-    /// Collect the marked points of all ranks with their horizons.
+    /// Collect the marked points of all ranks with their horizons. Collective.
     fn sources(&self, marked: impl Fn(usize) -> bool) -> Vec<Source> {
         let model = &self.model;
         let own = (0..model.owned()).filter(|point| marked(*point));
