@@ -31,7 +31,7 @@ const _: () = assert!(
 
 /// Whether `mpi-sys` was built for Open MPI.
 const OF_OPEN_MPI: bool = {
-    // If the bindings are those of Open MPI, their constant shadows the fallback below.
+    // If the bindings belong to Open MPI, their constant shadows the fallback below.
     #[allow(unused_imports)]
     use mpi_sys::*;
     OMPI_MAJOR_VERSION > 0

@@ -151,7 +151,7 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The level-0 cells whose nodes may differ from those without refinement, or that can contain finer
+    /// The level-0 cells whose nodes may differ from the nodes without refinement, or that can contain finer
     /// nodes.
     pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn volumes_at_interfaces_are_those_of_the_paper() {
-        // Volume removed from the node (0, 0), in volumes of the finer level.
+        // Volume removed from the node (0, 0), in cell volumes of the finer level.
         let taken = |bottom: i64, refined: &[[i64; 2]]| {
             let body = |cell: GridIndex| cell[1] >= bottom;
             let mut pattern = Pattern::new(2, 1);

@@ -26,7 +26,7 @@ pub struct Stored {
     /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³. Empty if no law softens, or
     /// if this sum was not requested.
     pub softened: Vec<f64>,
-    /// Number of intact bonds, including those beyond the point's own horizon.
+    /// Number of intact bonds, including bonds longer than the horizon of the point.
     pub neighbours: Vec<f64>,
     /// Energy density that bonds have dissipated without breaking, J/m³; empty if no law has a bond history
     /// or if energies were not requested.

@@ -118,7 +118,8 @@ impl<const D: usize> Kernel<D> for Softened {
 /// Index pairs of the entries of a symmetric tensor: xx, yy, zz, xy, yz, xz.
 pub(super) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// Add the tensor entries of the intact bonds to a symmetric tensor.
+/// Add the tensor entries of the intact bonds to a symmetric tensor. `entry` returns an entry, given its
+/// index in [`PAIRS`] and its row and column.
 #[inline(always)]
 fn add_tensor<S: Simd, const D: usize>(
     simd: S,

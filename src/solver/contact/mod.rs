@@ -122,7 +122,7 @@ struct PointSum<const D: usize> {
     /// Potential energy, J: half of the energy of each contact with a point, and all of the energy of
     /// contacts with rigid bodies.
     energy: f64,
-    /// Contribution to the step limits, summed over present contacts and those expected within the
+    /// Contribution to the step limits, summed over present contacts and contacts expected within the
     /// look-ahead.
     demand: Demand,
     /// Whether the point touches another point or a rigid body.

@@ -2,11 +2,11 @@
 //!
 //! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
 //! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
-//! a cell. The stiffness is the stiffness of the classical solid. The elastic constants of a cell are
-//! averages over its points, weighted by volume and by the fraction of intact bonds. Supported components of
-//! points are springs at their position in the cell. Forces on points are distributed to the nodes of their
-//! cells (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same
-//! weights, so the preconditioner is symmetric.
+//! a cell. The cells have the stiffness of the classical solid. The elastic constants of a cell are averages
+//! over its points, weighted by volume and by the fraction of intact bonds. Supported components of points
+//! are springs at their position in the cell. Forces on points are distributed to the nodes of their cells
+//! (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same weights,
+//! so the preconditioner is symmetric.
 //!
 //! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
 //! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of

@@ -23,8 +23,8 @@ const CELL: f64 = 8.0;
 /// the initial distance.
 const NEARER: f64 = 0.9;
 
-/// Two points of bodies that bonds joined count if their distance is below this fraction of their spacing and
-/// of their initial distance. Compression alone rarely reaches this distance.
+/// If bonds joined two bodies, two of their points are too near if their distance is below this fraction of
+/// their spacing and of their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Number of points that one task processes.
