@@ -132,9 +132,9 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
 /// Read a mesh and generate its points, on one rank.
 ///
 /// # Errors
-/// If the file cannot be read, or an element is invalid, belongs to two bodies or coincides with another.
-/// Also if a body's block is no group with elements of the problem's dimension, or the name of a block or set
-/// is ambiguous.
+/// If the name of the file does not end like a mesh file, if the file cannot be read or parsed, or if an
+/// element is invalid, belongs to two bodies or coincides with another. Also if a body's block is no group
+/// with elements of the problem's dimension, or the name of a block or set is ambiguous.
 pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     let users = users(problem, path);
     let Some(format) = Format::of(path) else {

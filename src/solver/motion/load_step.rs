@@ -299,7 +299,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.scale = self.load_step.scale.max(scale);
     }
 
-    /// Return an error if the load step has failed. Collective.
+    /// Check that the load step has not failed. Collective.
     ///
     /// # Errors
     /// If the load step has failed. The message names a piece that has loads but no supports, or the residual

@@ -27,7 +27,8 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region.
+    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region, or
+    /// if no damaged points are around it.
     ///
     /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
     /// ⊗ g over these points and the point itself, 1/m²; g is the result of

@@ -106,8 +106,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// numbers of created and removed points; `None` if the grids do not change. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -160,8 +160,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Continue the run on other grids, with the state of all points and bonds. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -213,8 +213,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Restore the grids that an earlier part of the run had refined, at time 0. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
