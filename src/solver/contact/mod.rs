@@ -93,7 +93,8 @@ pub struct ContactEvaluation {
     /// Whether the evaluation is part of a relaxation or static solution: there are no velocities, and
     /// contact adds to the fictitious density.
     pub is_quasi_static: bool,
-    /// Data of the step, if it ends here or if a load step has reached equilibrium; otherwise `None`.
+    /// Data of the step, if a step ends with this evaluation or a load step has reached equilibrium;
+    /// otherwise `None`.
     pub end: Option<StepEnd>,
 }
 
