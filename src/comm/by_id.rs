@@ -15,9 +15,10 @@ use super::Communicator;
 pub struct IdOrder {
     first: u64,
     count: usize,
-    /// For each rank, the owned points of this rank whose ids are in its range.
+    /// For each rank q: the local indices of the points that this rank owns and whose ids are in the range of
+    /// q.
     owned: Vec<Vec<u32>>,
-    /// For each rank, the rows of this rank's range of ids whose points it owns.
+    /// For each rank q: the rows of this rank's range of ids whose points q owns.
     rows: Vec<Vec<u32>>,
 }
 
@@ -28,7 +29,7 @@ impl IdOrder {
         let size = comm.size() as u64;
         let border =
             |rank: u64| (u128::from(coarsest) * u128::from(rank) / u128::from(size)) as u64;
-        // The estimate may be one too low, because the limits of the ranges are rounded down.
+        // The estimate can be too low, because the limits of the ranges are rounded down.
         let home = |id: u64| {
             let id = id % coarsest;
             let guess = (u128::from(id) * u128::from(size) / u128::from(coarsest)) as u64;
@@ -140,9 +141,11 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
     std::iter::once(0).chain(ends).collect()
 }
 
-/// Send rows of `values` to the other ranks. Write the received rows to a new array of length `size`.
+/// Send rows of `values` to the other ranks, and write the received rows to a new array of length `size`.
+/// Rows that stay on this rank are copied. Collective.
 ///
-/// `from_rows` and `to_rows` list the rows for each rank. `from` and `to` map a row to its range of values.
+/// `from_rows` lists, for each rank, the rows of `values` to send. `to_rows` lists the rows of the result to
+/// receive from that rank, in the same order. `from` and `to` map a row to its range of values.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),

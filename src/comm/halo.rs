@@ -92,7 +92,7 @@ impl Halo {
     }
 
     /// Send the packed values. `during` is called while the messages are in flight; see
-    /// [`Communicator::exchange`].
+    /// [`Communicator::exchange`]. Collective.
     pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut During<'_>) {
         let start = Instant::now();
         let mut working = Duration::ZERO;

@@ -51,7 +51,7 @@ pub trait Communicator {
     /// Element-wise maximum over the ranks, in place. Values must not be NaN.
     fn max(&self, values: &mut [f64]);
 
-    /// Replace `data` on every rank by that of rank `root`.
+    /// Replace `data` on every rank by the data of rank `root`.
     fn broadcast(&self, root: usize, data: &mut Vec<u8>);
 
     /// Send `outgoing[q]` to rank q. Return the received buffers by rank.
@@ -74,21 +74,21 @@ pub trait Communicator {
     fn raw(&self) -> Option<RawCommunicator>;
 }
 
-/// Sum of one value over the ranks.
+/// Sum of one value over the ranks. Collective.
 pub fn total(comm: &dyn Communicator, value: u64) -> u64 {
     let mut values = [value];
     comm.sum(&mut values);
     values[0]
 }
 
-/// Element-wise minimum over the ranks, in place. Values must not be NaN.
+/// Element-wise minimum over the ranks, in place. Values must not be NaN. Collective.
 pub fn min(comm: &dyn Communicator, values: &mut [f64]) {
     values.iter_mut().for_each(|value| *value = -*value);
     comm.max(values);
     values.iter_mut().for_each(|value| *value = -*value);
 }
 
-/// The value of every rank, in rank order.
+/// The value of every rank, in rank order. Collective.
 pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
     let mut values = vec![0; comm.size()];
     values[comm.rank()] = value;
@@ -97,6 +97,7 @@ pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
 }
 
 /// Gather the values of all ranks, concatenated in rank order. Ranks may have different numbers of values.
+/// Collective.
 pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
     bytemuck::pod_collect_to_vec(&comm.all_gather(bytemuck::cast_slice(own)))
 }
@@ -147,8 +148,8 @@ pub fn scan(comm: &dyn Communicator, value: u64) -> (u64, u64) {
     (before, values.iter().sum())
 }
 
-/// Make a result equal on all ranks. If any rank failed, all ranks return the error of the lowest failed
-/// rank.
+/// Return an error on all ranks if any rank failed: the error of the lowest failed rank. Otherwise, each rank
+/// returns its own result. Collective.
 pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     let none = comm.size() as f64;
     let mut first = [if result.is_err() {

@@ -31,7 +31,7 @@ const _: () = assert!(
 
 /// Whether `mpi-sys` was built for Open MPI.
 const OF_OPEN_MPI: bool = {
-    // If the bindings are those of Open MPI, their constant shadows the fallback below.
+    // If the bindings belong to Open MPI, their constant shadows the fallback below.
     #[allow(unused_imports)]
     use mpi_sys::*;
     OMPI_MAJOR_VERSION > 0
@@ -103,7 +103,7 @@ impl World {
         InFlight(self.requests.borrow_mut())
     }
 
-    /// Number of hosts on which ranks run.
+    /// Number of hosts on which ranks run. Collective.
     pub fn hosts(&self) -> usize {
         let name = mpi::environment::processor_name().unwrap_or_default();
         let outgoing = (0..self.size())
@@ -185,7 +185,7 @@ impl InFlight<'_> {
     fn advance(&mut self) -> bool {
         let count = self.0.len() as c_int;
         let mut arrived = 0;
-        // SAFETY: `count` requests created by MPI; completed ones are null.
+        // SAFETY: the array has `count` requests that MPI created; completed requests are null.
         unsafe {
             mpi_sys::MPI_Testall(
                 count,
@@ -201,7 +201,7 @@ impl InFlight<'_> {
 impl Drop for InFlight<'_> {
     fn drop(&mut self) {
         let count = self.0.len() as c_int;
-        // SAFETY: `count` requests created by MPI; completed ones are null.
+        // SAFETY: the array has `count` requests that MPI created; completed requests are null.
         unsafe {
             mpi_sys::MPI_Waitall(count, self.0.as_mut_ptr(), mpi_sys::RSMPI_STATUSES_IGNORE);
         }
@@ -271,7 +271,7 @@ impl Communicator for World {
         if all.is_empty() {
             return all;
         }
-        // An empty slice may have the address 1, which is MPI_IN_PLACE.
+        // An empty slice may have the address 1, which is `MPI_IN_PLACE` in Open MPI.
         let own = if own.is_empty() { &[0; 1][..0] } else { own };
         if all.len() <= LARGEST_MESSAGE {
             let counts: Vec<c_int> = sizes.iter().map(|size| *size as c_int).collect();

@@ -38,6 +38,9 @@ fn group(size: usize) -> Vec<ThreadRank> {
 }
 
 /// Run `body` on `size` ranks, each on its own thread. Return their results in rank order.
+///
+/// # Panics
+/// If `body` panics on a rank.
 pub fn run<T: Send>(size: usize, body: impl Fn(&dyn Communicator) -> T + Sync) -> Vec<T> {
     std::thread::scope(|scope| {
         let handles: Vec<_> = group(size)

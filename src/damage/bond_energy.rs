@@ -19,8 +19,8 @@ pub enum Calibration {
     /// energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None`
     /// until then.
     Opening(Option<f64>),
-    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). Their
-    /// w is the work on η, so it holds for small rotations only.
+    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). This
+    /// w is the work on η, so the criterion holds for small rotations only.
     Willberg2022,
     /// PeriLab's formula: a bond breaks at ¼ |(T_i − T_j)·η| = 3G0/(πδ³h) in the plane and 4G0/(πδ⁴) in
     /// space.
@@ -83,7 +83,7 @@ impl BondEnergy {
     }
 
     /// Return the threshold (J/m⁶) of a point with strength f and the smallest stretch s_min of its intact
-    /// bonds. It is w_c ((f s0 − α s_min)/s0)²; without scatter f = 1.
+    /// bonds. It is w_c ((f s0 − α s_min)/s0)², or 0 if f s0 < α s_min. Without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         let share = (strength - self.alpha * smallest / self.stretch).max(0.0);
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn as_printed_bonds_are_weaker() {
-        // Eq. 18, 3G0/(πδ³h), belongs to a work without the ½ of eq. 16.
+        // Eq. 18, 3G0/(πδ³h), belongs to the work of eq. 16, which has no factor ½.
         let (energy, horizon, thickness) = (135.0, 3e-3, 0.01);
         let printed = 3.0 * energy / (PI * horizon * horizon * horizon * thickness);
         let plane = Dimension::PlaneStress { thickness };

@@ -20,15 +20,16 @@ pub enum Criterion {
     /// Bonds break at this stretch.
     Stretch(f64),
     /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
-    /// of both blocks, 0 for a block without critical stretch. A law that scales thresholds scales this part
-    /// only, and leaves the part with α unchanged.
+    /// of both blocks, 0 for a block without critical stretch. A law that scales thresholds scales only these
+    /// critical stretches, not the part of the threshold with α.
     Thresholds([f64; 2], Directions),
     /// Same as [`Self::Stretch`], for critical stretches that belong to different horizons; ∞ for a block
     /// without critical stretch.
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
-    /// Bonds break when the work of the acting force states reaches the sum of their critical works, J/m⁶.
+    /// Bonds break when the work of the acting force states reaches the sum of the critical works (J/m⁶) of
+    /// the acting ends.
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
@@ -39,9 +40,9 @@ pub enum Criterion {
     StressThresholds(StressRule),
 }
 
-/// Factors w_c/w of the critical work by direction, at points i and j. `None` if both bodies have the same
-/// fracture energy in all directions. The factors multiply work thresholds; their square roots multiply
-/// stretch thresholds.
+/// Factors w_c/w of the critical work by direction, at points i and j; see [`ToughnessByDirection`]. `None`
+/// if both bodies have the same fracture energy in all directions. The factors multiply work thresholds;
+/// their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k
@@ -65,7 +66,7 @@ pub struct StretchConversion {
 }
 
 impl StretchConversion {
-    /// Return the critical stretch of each bond, from those of points i and j.
+    /// Return the critical stretch of each bond, from the critical stretches of points i and j.
     #[inline(always)]
     fn convert<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Lanes {
         let [[ii, ij], [ji, jj]] = self.ratios;

@@ -11,14 +11,14 @@
 //!
 //! A crack with the normal N breaks all bonds that cross its plane. Its fracture energy is proportional to
 //! the mean of w_c(n) over all directions n with the weight |n·N|. The mean of c^k is a product over j = 1 …
-//! k of these factors:
+//! k of these factors, for N parallel (∥) and perpendicular (⊥) to a:
 //!
 //! | c | N | plane | space |
 //! |---|---|---|---|
-//! | (n·a)² | along a | 2j/(2j + 1) | j/(j + 1) |
-//! | (n·a)² | across a | (2j − 1)/(2j + 1) | (2j − 1)/(2j + 2) |
-//! | 1 − (n·a)² | along a | (2j − 1)/(2j + 1) | j/(j + 1) |
-//! | 1 − (n·a)² | across a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
+//! | (n·a)² | ∥ a | 2j/(2j + 1) | j/(j + 1) |
+//! | (n·a)² | ⊥ a | (2j − 1)/(2j + 1) | (2j − 1)/(2j + 2) |
+//! | 1 − (n·a)² | ∥ a | (2j − 1)/(2j + 1) | j/(j + 1) |
+//! | 1 − (n·a)² | ⊥ a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
 //!
 //! p and q follow from the fracture energies of cracks along and across a. k is 1 if p is then at least 0.1,
 //! otherwise 2. Fracture energies with p < 0.1 for k = 2 are rejected: bonds in the weak direction would
@@ -69,7 +69,8 @@ impl ToughnessByDirection {
     };
 
     /// Create the factor in 2 or 3 dimensions from a unit vector a. `ratio` is the fracture energy of cracks
-    /// across a divided by that of cracks along a. `None` if `ratio` is beyond [`Self::limits`].
+    /// across a, divided by the fracture energy of cracks along a. `None` if `ratio` is beyond
+    /// [`Self::limits`].
     pub fn new(dimension: usize, axis: [f64; 3], ratio: f64) -> Option<Self> {
         let is_tough_across = ratio >= 1.0;
         (0..=MOST_SQUARINGS).find_map(|squarings| {
@@ -114,14 +115,14 @@ impl ToughnessByDirection {
         power * self.share + Lanes::splat(self.base)
     }
 
-    /// Fracture energy of cracks across a, divided by that of cracks along a.
+    /// Fracture energy of cracks across a, divided by the fracture energy of cracks along a.
     pub fn ratio(&self, dimension: usize) -> f64 {
         let [across, _] = means(dimension, self.is_tough_across, self.squarings);
         self.base + self.share * across
     }
 
-    /// Fracture energy of cracks with a unit normal, divided by that of cracks along a. Computed as a sum
-    /// over directions.
+    /// Fracture energy of cracks with a unit normal, divided by the fracture energy of cracks along a.
+    /// Computed as a sum over directions.
     pub fn cost(&self, dimension: usize, normal: [f64; 3]) -> f64 {
         let quarter = f64::from(DIRECTIONS);
         let mut sums = [0.0; 2];
@@ -155,7 +156,7 @@ impl ToughnessByDirection {
 }
 
 /// Return the means of c^k, k = 2^squarings, over the bonds that cross a plane. The first mean is for a
-/// normal along a, the second for a normal across a.
+/// normal parallel to a, the second for a normal perpendicular to a.
 fn means(dimension: usize, is_tough_across: bool, squarings: u32) -> [f64; 2] {
     let mut means = [1.0; 2];
     for j in 1..=1_u32 << squarings {
@@ -181,7 +182,7 @@ pub(super) struct DirectionFactors<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> DirectionFactors<'a, D> {
-    /// Copy what the factors depend on. With a reference to the bond, all its data would stay in memory.
+    /// Copy ξ and 1/|ξ| of the bonds. With a reference to the bonds, all their data would stay in memory.
     #[inline(always)]
     pub(super) fn new<S: Simd>(
         simd: S,

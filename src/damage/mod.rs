@@ -38,7 +38,7 @@ impl DamageLaw {
         }
     }
 
-    /// α: effect of the smallest stretch of a point on its threshold.
+    /// α: effect of the smallest stretch of a point on its threshold; 0 for the criterion of stress.
     pub fn alpha(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.alpha,

@@ -4,7 +4,7 @@
 //! extension Δ cos φ and breaks at s0|ξ|. Breaking a bond dissipates its energy ½ (A/m) ω|ξ|²s0², and at each
 //! end the loss of dilatation energy κ θ (d/m) ω|ξ|² s0. Here θ is the dilatation of the bonds that are still
 //! intact. The sum over all bonds across a unit area is G0 = δ s0² (A b + κ τ). The numbers b and τ depend
-//! only on the dimension and the influence function; ω, κ and A are those of [`crate::material::Ordinary`].
+//! only on the dimension and the influence function; ω, κ and A are defined in [`crate::material::Ordinary`].
 //! For the Poisson ratio of bond-based laws κ = 0. With ω = 1/|ξ| the result is then the critical stretch of
 //! the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014, eq. 5).
 
@@ -59,8 +59,8 @@ fn quadrature(dimension: i32, influence: Influence) -> [f64; 2] {
             }
         }
         crossing.sort_unstable_by(|a, b| b[0].total_cmp(&a[0]));
-        // The bonds are sorted from the last to break to the first. When a bond breaks, those before it in
-        // this order are still intact.
+        // The bonds are sorted from the last to break to the first. When a bond breaks, the bonds before it
+        // in this order are still intact.
         let mut intact = 0.0;
         for [opening, growth, moment] in crossing {
             let dilatation = factor * opening * (intact + 0.5 * growth);

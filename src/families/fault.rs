@@ -18,16 +18,18 @@ pub enum Fault {
     SamePlace([Point; 2]),
     /// A point with more than [`MOST_NEIGHBOURS`] neighbours.
     TooManyNeighbours {
-        /// The blocks of the point and of its neighbours.
+        /// The blocks of the point and of its neighbours. If the neighbours in all blocks were counted, both
+        /// entries are the block of the point.
         blocks: [usize; 2],
         /// Estimated number of neighbours; `None` if it is not known.
         neighbours: Option<f64>,
-        /// Ratio of the horizon to the spacing of the neighbours; `None` if they do not lie on a lattice.
+        /// Ratio of the horizon to the spacing of the neighbours; `None` if the neighbours do not lie on a
+        /// lattice, or if the neighbours in all blocks were counted.
         spacings: Option<f64>,
     },
     /// Bonds that do not fit in memory.
     TooLittleMemory {
-        /// The pair of blocks with the most bonds.
+        /// The pair of blocks whose lists take most memory, or whose lattice or weights do not fit.
         blocks: [usize; 2],
         /// Needed and available memory.
         shortage: Shortage,

@@ -10,11 +10,12 @@ use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
 /// Build the families of a domain, sorted by pair of blocks, and the layouts of the grids.
 ///
-/// The domain must have been [arranged](super::arrange()) for these grids. `cutoffs` is the symmetric `blocks`
-/// × `blocks` matrix of longest bonds, m.
+/// The domain must have been [arranged](super::arrange()) for these grids. `cutoffs` is the symmetric
+/// `blocks` × `blocks` matrix of longest bonds, m; 0 for a pair without bonds.
 ///
 /// # Errors
-/// If two points coincide, a point would have too many neighbours, or memory is insufficient.
+/// If two points coincide, a point would have too many neighbours, a grid layout has too many holes, or
+/// memory is insufficient.
 pub fn find(
     domain: &Domain,
     frames: &[GridFrame],
@@ -48,8 +49,8 @@ pub fn find(
         .iter()
         .map(layout)
         .collect::<Result<Vec<_>, Fault>>()?;
-    // `Grid::new` has checked that points of the same grid do not coincide. The list search checks all other
-    // points.
+    // `Grid::new` has checked that points of the same grid do not coincide. The list search checks the points
+    // of all other pairs of blocks with bonds.
     let listed: Vec<f64> = cutoffs
         .iter()
         .enumerate()

@@ -220,7 +220,7 @@ impl Grid {
     }
 
     /// Split a range of owned points into ranges with consecutive slots. Each item is the first slot and the
-    /// range of points.
+    /// range of points. Points that are not on the grid are skipped.
     pub fn slots_of(&self, points: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
         let end = |run: &Run| (run.point + run.length) as usize;
         let first = (self.by_point).partition_point(|run| end(run) <= points.start);

@@ -231,7 +231,7 @@ impl BondLattice {
         self.weighted[end] = true;
     }
 
-    /// Call `visit(group, lane, [i, j])` for each intact bond.
+    /// Call `visit(group, lane, [i, j])` with local indices i and j for each intact bond.
     fn for_each(&self, mut visit: impl FnMut(usize, usize, [usize; 2])) {
         for k in 0..self.vectors.len() {
             self.for_each_of(self.intact(k).iter().copied(), k, &mut visit);
@@ -244,7 +244,8 @@ impl BondLattice {
         &self.store.intact[vector * count..(vector + 1) * count]
     }
 
-    /// Call `visit(group, lane, [i, j])` for each set bit of the lane group with index `vector`.
+    /// Call `visit(group, lane, [i, j])` with local indices i and j for each set bit of the lane group with
+    /// index `vector`.
     fn for_each_of(
         &self,
         bits: impl Iterator<Item = u8>,
@@ -267,7 +268,7 @@ impl BondLattice {
         }
     }
 
-    /// Index of the lane group of a point; `None` if the point has no bonds.
+    /// Index of the lane group whose [`Self::points_of`] contain a point; `None` if there is none.
     fn vector_of(&self, point: usize) -> Option<usize> {
         let k = self.vectors_below(point + 1).checked_sub(1)?;
         (point < self.points_of(k).end).then_some(k)

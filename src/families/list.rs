@@ -27,7 +27,7 @@ pub struct BondList {
     /// State of the bonds; the intact bits of padding are clear.
     pub(super) store: Store,
     /// Volume weights of the ends i and j, 0 for padding. If the weights of i are `None`, all weights are 1.
-    /// If only those of j are `None`, the weights of i apply to both ends.
+    /// If only the weights of j are `None`, the weights of i apply to both ends.
     pub(super) weights: [Option<Vec<Lanes>>; 2],
     /// The largest local index in the list, plus one.
     pub(super) reach: usize,
@@ -41,8 +41,8 @@ pub struct Row<'a> {
     pub neighbours: NeighbourGroups<'a>,
     /// State of the bonds.
     pub groups: Groups<'a>,
-    /// Volume weights of the ends i and j. If the weights of i are `None`, all weights are 1. If only those
-    /// of j are `None`, the weights of i apply to both ends.
+    /// Volume weights of the ends i and j. If the weights of i are `None`, all weights are 1. If only the
+    /// weights of j are `None`, the weights of i apply to both ends.
     pub weights: [Option<&'a [Lanes]>; 2],
 }
 

@@ -89,7 +89,9 @@ impl BlockBonds {
         with!(self, bonds => bonds.for_each_neighbour(point, visit));
     }
 
-    /// The range of owned points that are in the same lane group as a point.
+    /// The range of owned points whose bonds are computed together with the bonds of a point. In a lattice,
+    /// these are the points of its lane group, up to the last point with bonds. In a list, the range contains
+    /// this point only.
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,

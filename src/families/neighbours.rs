@@ -48,6 +48,9 @@ pub enum Group<'a> {
 
 impl Neighbours {
     /// Append a group of eight neighbour indices.
+    ///
+    /// # Panics
+    /// If the smallest index or the number of full groups is 2³¹ or more.
     pub fn push(&mut self, indices: [u32; WIDTH]) {
         let first = indices.into_iter().fold(u32::MAX, u32::min);
         assert!(first < IN_FULL, "too many points for one rank");
@@ -65,6 +68,9 @@ impl Neighbours {
     }
 
     /// Append groups of another set.
+    ///
+    /// # Panics
+    /// If the number of full groups is 2³¹ or more.
     pub fn extend(&mut self, others: NeighbourGroups<'_>) {
         let before = self.compact.len();
         self.compact.extend_from_slice(others.compact);

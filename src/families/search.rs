@@ -21,8 +21,8 @@ const HORIZON_TOLERANCE: f64 = 1e-9;
 /// Number of points that one task searches.
 const CHUNK: usize = 512;
 
-/// Number of chunks that are searched before their rows are appended to the lists. It limits the memory of
-/// buffers.
+/// Number of chunks that are searched before their rows are appended to the lists. This number limits the
+/// memory of buffers.
 const WAVE: usize = 32;
 
 /// The longest bond (m) for a horizon (m).
@@ -71,7 +71,8 @@ impl Order {
         }
     }
 
-    /// Find another point of a block at the same position as the point with local index `index`.
+    /// Find another point of a block at the same position as the point with local index `index`. Without
+    /// another point, return the point itself.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
         let sorted = self.first[block] as usize..self.first[block + 1] as usize;
         let points = self.local[sorted].iter().map(|k| *k as usize);
@@ -91,7 +92,7 @@ struct Chunk {
     rows: Vec<(u32, u32, u32)>,
     neighbours: Neighbours,
     intact: Vec<u8>,
-    /// Sorted indices of one point's neighbours.
+    /// Buffer for the neighbours of one point, as indices in [`Order`].
     sorted: Vec<u32>,
 }
 
@@ -150,7 +151,7 @@ fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
 }
 
 impl Chunk {
-    /// Replace the rows of the chunk by those of a range of points.
+    /// Replace the rows of the chunk by the rows of a range of points.
     fn search(
         &mut self,
         domain: &Domain,

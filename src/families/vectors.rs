@@ -12,7 +12,7 @@ use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
-/// A lane group. Slot, local index and line are those of its first point.
+/// A lane group. Slot, local index and line belong to its first point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
     pub(super) slot: u32,
@@ -157,8 +157,8 @@ impl<'a> Vectors<'a> {
 }
 
 impl VectorBonds<'_> {
-    /// The slot of the first of the eight neighbours at an offset, which have consecutive slots. The slot is
-    /// in bounds even if none of the eight bonds exists.
+    /// The slot of the first of the eight neighbours at an offset, which have consecutive slots. All eight
+    /// slots are in bounds even if none of the eight bonds exists.
     ///
     /// # Safety
     /// The offset must be an element of [`Self::offsets`].

@@ -1,4 +1,5 @@
-//! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family.
+//! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family. Without correction, the
+//! factor is 1 within the horizon and 0 beyond.
 //!
 //! - `linear`: the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families contain
 //!   points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). `LinearInside` is the form of
@@ -32,8 +33,8 @@ const MOST_MULTIPLES: usize = 1 << 17;
 /// Bit pattern of a table entry that has not been computed.
 const UNKNOWN: u64 = u64::MAX;
 
-/// The longest bond (m) with a positive factor, if the factor is 0 from `length` (m) on. Bonds whose factor
-/// would be round-off are excluded by a tolerance.
+/// Length limit (m) of bonds with a positive factor, for a factor that falls to 0 at `length` (m). The limit
+/// is slightly below `length`, so bonds whose factor would be only round-off are excluded.
 fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }

@@ -38,8 +38,8 @@ impl Instructions {
     /// Select the largest set that all ranks have, limited by [`VARIABLE`]. Collective.
     ///
     /// # Errors
-    /// If the variable does not name a set, or a rank has none of the sets; the error is the same on all
-    /// ranks.
+    /// If the variable is set and names no set, or if a rank has none of the sets; the error is the same on
+    /// all ranks.
     pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
         let allowed = match std::env::var(VARIABLE) {
             Ok(name) if !name.is_empty() => named(&name),
@@ -57,7 +57,8 @@ impl Instructions {
         Self::up_to(BUILT.len() - 1)
     }
 
-    /// The largest set of this machine up to a level, which is an index in [`BUILT`].
+    /// The largest set of this machine up to a level, which is an index in [`BUILT`]; `None` if there is
+    /// none.
     #[cfg(target_arch = "x86_64")]
     fn up_to(level: usize) -> Option<Self> {
         match Avx512::detect() {
@@ -96,7 +97,7 @@ fn unsupported() -> Error {
     )
 }
 
-/// Index in [`BUILT`] of the instruction set with this name.
+/// Index in [`BUILT`] of the instruction set with this name. Hyphens and case are ignored.
 ///
 /// # Errors
 /// If no set has this name.

@@ -6,9 +6,9 @@
 pub enum IsaSet {
     /// AVX-512 and AVX2.
     Each,
-    /// AVX2 only; AVX-512 would be little faster.
+    /// AVX2 only, for loops that AVX-512 would hardly accelerate.
     Avx2,
-    /// No vector instructions and no fused multiply-adds.
+    /// One version for any processor of the target, without fused multiply-adds.
     One,
 }
 

@@ -30,7 +30,8 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Select the first [`Self::COUNT`] columns, to read.
     ///
     /// # Panics
-    /// If there are fewer columns, unless [`Self::PADDED`].
+    /// If there are fewer columns, unless [`Self::PADDED`]. The first tuple of a pair must have all its
+    /// columns.
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
     /// Select the first [`Self::COUNT`] columns, to add to.
@@ -42,7 +43,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// The column of a quantity.
     fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64];
 
-    /// Split all columns before an entry.
+    /// Split each column into the entries before `middle` and the entries from `middle` on.
     fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2];
 
     /// The column of a quantity, to add to.

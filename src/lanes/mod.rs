@@ -1,7 +1,8 @@
 //! Vectors of eight numbers: the same quantity of eight bonds or points.
 //!
-//! The operations are IEEE operations on plain arrays without contraction, so all instruction sets give
-//! bitwise the same results. Operations for which this is not guaranteed are in [`simd`].
+//! The operations are IEEE operations on plain arrays without contraction, and the exponential of `libm`.
+//! Therefore all instruction sets give bitwise the same results. Operations that depend on the instruction
+//! set, such as fused multiply-adds, are in [`simd`].
 
 mod column;
 pub mod instructions;
@@ -32,8 +33,8 @@ impl Lanes {
         Self([value; WIDTH])
     }
 
-    /// Apply a function to each lane. The lanes are written out instead of looped over, because the function
-    /// is compiled very often.
+    /// Apply a function to each lane. The lanes are written out instead of looped over: the function is
+    /// inlined at very many places, and a loop takes longer to compile.
     #[inline(always)]
     fn map(self, of: impl Fn(f64) -> f64) -> Self {
         let [a, b, c, d, e, f, g, h] = self.0;
@@ -103,7 +104,7 @@ impl Lanes {
         ((a + e) + (c + g)) + ((b + f) + (d + h))
     }
 
-    /// The smallest lane.
+    /// The smallest lane. No lane may be NaN.
     #[inline(always)]
     pub fn smallest(self) -> f64 {
         let mut smallest = self.0[0];

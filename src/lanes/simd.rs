@@ -42,8 +42,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Run a rarely needed task out of line, so it uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
-    /// Return the same value in a form that is opaque to the compiler. Otherwise, the compiler may split
-    /// operations by lane.
+    /// Return `a`. With AVX2 and AVX-512, the result is opaque to the compiler, which then does not split the
+    /// operations before and after this call by lane.
     #[inline(always)]
     fn whole(self, a: Lanes) -> Lanes {
         a
@@ -386,8 +386,8 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn transpose_avx512(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-        // Four numbers of two rows, from `first` on. The second half is loaded from memory, which needs no
-        // shuffle.
+        // Four numbers of each of two rows, from column `first` on. The second half is loaded from memory,
+        // which needs no shuffle.
         let halves = |a: usize, b: usize, first: usize| {
             // SAFETY: each row has eight numbers, and `first` is 0 or 4.
             let [a, b] =
@@ -397,7 +397,8 @@ mod x86 {
         let columns = |first: usize| {
             let [a, b] = [halves(0, 2, first), halves(1, 3, first)];
             let [c, d] = [halves(4, 6, first), halves(5, 7, first)];
-            // Rows 0, 1 | 2, 3 of two columns, and rows 4, 5 | 6, 7.
+            // `ab` has rows 0 and 1, then rows 2 and 3, of the columns `first` and `first` + 2. `cd` has rows
+            // 4 to 7 in the same order. `ab_next` and `cd_next` have the columns `first` + 1 and `first` + 3.
             let [ab, cd] = [_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d)];
             let [ab_next, cd_next] = [_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d)];
             [

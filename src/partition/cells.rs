@@ -1,4 +1,4 @@
-//! The cells that are partitioned between ranks, with edges of one or a few horizons.
+//! The cells that are partitioned between ranks. Their edges are at least as long as the longest bond.
 
 use crate::comm::{self, Communicator};
 use crate::points::Point;
@@ -30,7 +30,7 @@ pub fn max_cells(ranks: usize) -> usize {
 pub struct Cells {
     lower: [f64; 3],
     upper: [f64; 3],
-    /// Edge of a box, about the cutoff, m.
+    /// Edge of a box, at least the cutoff, m.
     edge: f64,
     /// Number of boxes per cell edge.
     boxes: usize,
@@ -42,12 +42,13 @@ pub struct Cells {
 pub struct CellLoads {
     /// Measured time of the points of each cell, ns.
     pub costs: Vec<u64>,
-    /// For each cell, a rank that owns points of it; −1 if the cell has no points.
+    /// For each cell, the highest rank that owns points of it; −1 if the cell has no points.
     pub ranks: Vec<f64>,
 }
 
 impl Cells {
-    /// Build the grid for the points of all ranks and a cutoff (m), with at most `most` cells. Collective.
+    /// Build the grid for the points of all ranks and a cutoff (m), with at most `most` cells. `points` are
+    /// this rank's points, and `total` is the number of points of all ranks. Collective.
     pub fn new(
         comm: &dyn Communicator,
         points: &[Point],

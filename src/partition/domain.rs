@@ -8,6 +8,8 @@ use crate::points::Point;
 /// 1. interior points, which have no bonds to ghosts, sorted by cell, box and id;
 /// 2. border points, sorted in the same way;
 /// 3. ghosts, grouped by owner and sorted by id.
+///
+/// [`Domain::reorder`] changes the order of the owned points.
 #[derive(Debug, Default)]
 pub struct Domain {
     /// The local points: owned points, then ghosts.
@@ -25,8 +27,8 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Permute the owned points. `order[new]` is the old local index of the point with local index `new`. The
-    /// first `interior` points are interior points.
+    /// Permute the owned points. `order[new]` is the old local index of the point with local index `new`.
+    /// After this, the first `interior` points are interior points.
     pub fn reorder(&mut self, order: &[u32], interior: usize) {
         let mut new_index = vec![0; order.len()];
         for (new, old) in (0..).zip(order) {

@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! Each rank sends its points in cells adjacent to the cells of another rank to that rank. The receiver then
-//! requests those within the cutoff of one of its owned points as ghosts.
+//! If cells of a rank are adjacent to cells of another rank, the rank sends the points of these cells to the
+//! other rank. The receiver then requests as ghosts the points within the cutoff of one of its owned points.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -16,14 +16,14 @@ use super::domain::Domain;
 use super::graph::NO_OWNER;
 use super::received;
 
-/// Number of values per point for which the halo buffers are allocated: those of a vector. Exchanges of more
-/// values per point enlarge the buffers.
+/// Number of values per point for which the halo buffers are allocated: the components of a vector. Exchanges
+/// of more values per point enlarge the buffers.
 const HALO_WIDTH: usize = 3;
 
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
-/// `owned` are this rank's points after migration, `owner` is the rank of each cell, and `cutoff` (m) is
-/// the longest bond.
+/// `owned` are this rank's points after migration, `owner` is the rank of each cell, `total` is the number of
+/// points of all ranks, and `cutoff` (m) is the length of the longest bond.
 pub fn domain(
     comm: &dyn Communicator,
     cells: &Cells,

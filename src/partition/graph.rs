@@ -20,7 +20,8 @@ pub const NO_OWNER: u32 = u32::MAX;
 /// empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points.
+/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If there are
+/// at most as many cells with points as ranks, each of these cells gets its own rank.
 ///
 /// - `occupation` is the number of points in each cell.
 /// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
@@ -100,8 +101,8 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Renumber parts so that few points migrate. For a cell, `current` returns the present rank and the number
-/// of points.
+/// Renumber parts so that few points migrate. For the index of a cell in `part`, `current` returns the
+/// present rank and the number of points.
 fn renumber(part: &mut [metis::Idx], ranks: usize, current: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {

@@ -15,7 +15,8 @@ use cells::{CellLoads, Cells, max_cells};
 
 /// Partition the points, migrate them to their owners and find the ghosts. Collective.
 ///
-/// `total` is the number of points of all ranks, and `cutoff` (m) is the longest bond.
+/// `pieces` are this rank's points, `total` is the number of points of all ranks, and `cutoff` (m) is the
+/// length of the longest bond.
 ///
 /// # Errors
 /// If METIS fails; equal on all ranks.

@@ -118,10 +118,10 @@ pub struct HeadingError {
 
 /// Find the layout of a file. `given` are the columns that the deck names.
 ///
-/// A heading with a column `x` names the columns. Any other heading is skipped.
+/// If the deck names no columns, a heading with a column `x` names them. Any other heading is skipped.
 ///
 /// # Errors
-/// If the file cannot be read; in the inner result, if its heading names too few columns.
+/// If the file cannot be read; in the inner result, if its heading lacks a column or names one twice.
 pub fn layout(
     path: &Path,
     given: Option<&Columns>,
@@ -152,7 +152,7 @@ pub fn layout(
     Ok(Ok(layout))
 }
 
-/// The heading of a file: the first row, if it contains no number.
+/// The heading of a file: the first row that is neither empty nor a comment, if it contains no number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
     /// Entries of the heading, without quotes.
@@ -163,10 +163,10 @@ pub struct Heading {
     pub line: u64,
 }
 
-/// Read the heading of a file, if it has one.
+/// Read the heading of a file; `None` if it has no heading.
 ///
 /// # Errors
-/// If the file cannot be read.
+/// If the file cannot be read or is not a regular file.
 pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
     // Opening a pipe would block until its other end is opened, so only regular files are read.
     if !std::fs::metadata(path)?.is_file() {
@@ -219,7 +219,7 @@ fn names(row: &str) -> Option<Vec<String>> {
 /// Split a row into entries.
 ///
 /// # Errors
-/// If an entry between two separators is empty.
+/// If an entry before or after a comma or semicolon is empty.
 pub fn entries(row: &str) -> Result<Vec<&str>, String> {
     let row = row.trim();
     let mut entries = Vec::new();

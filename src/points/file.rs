@@ -1,8 +1,8 @@
 //! Points from a text file; each rank reads a part of the bytes.
 //!
-//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Otherwise, it has the
-//! columns that the deck or a heading names. Empty rows, comments and a heading are skipped. A heading is a
-//! first row without any number.
+//! A row is `x [y [z]] volume block`, unless the deck or a heading names other columns. Entries are separated
+//! by commas, semicolons or white space. Empty rows, comments and a heading are skipped. A heading is a first
+//! row without any number.
 
 use std::path::Path;
 
@@ -82,7 +82,7 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
 /// Sample the points of a file. Return them and the number of points that each sample represents.
 ///
 /// From a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot be
-/// read.
+/// read or its heading is invalid.
 pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     let users = users(problem, path);
     let layout = layout_of(problem, path).ok()?.ok()?;

@@ -11,11 +11,11 @@ const LONGEST: u64 = 1 << 32;
 /// Read ids from a file. The returned ids are counted from 0, sorted, and without repeats. `first` is the
 /// number that the file uses for the first point.
 ///
-/// Numbers are separated by white space or commas. Comments and a heading are skipped.
+/// Numbers are separated by white space, commas or semicolons. Comments and a heading are skipped.
 ///
 /// # Errors
-/// If the file cannot be read, has no number, or has an entry that is not a number. The message names file
-/// and line.
+/// If the file cannot be read, is too long or not UTF-8 text, has no number, or has an entry that is not a
+/// number of at least `first`. The message names the file, and the line of a wrong entry.
 pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     let name = path.display();
     let unreadable = |error: std::io::Error| format!("cannot read {name}: {error}");
@@ -53,7 +53,8 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     Ok(ids)
 }
 
-/// The first line (from 1) that contains a number; `None` if no line contains it or the file cannot be read.
+/// The first line (from 1) in which the number `number` is an entry; `None` if there is no such line or the
+/// file cannot be read. Comments and the heading do not count.
 pub fn line_of(path: &Path, number: u64) -> Option<u64> {
     let heading = heading(path).ok()?.map(|heading| heading.line);
     let text = std::fs::read_to_string(path).ok()?;

@@ -8,16 +8,17 @@ use crate::problem::{Body, PointSource, Problem, Quadrature, Shape};
 use super::region::{Region, TOLERANCE};
 use super::{MAX_PER_RANK, Point, distance_squared, shape};
 
-/// Binary logarithm of the maximum number of cells per rank; this number of cells takes some minutes.
+/// Binary logarithm of the maximum number of cells per rank. Testing this number of cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
 /// Number of cells sampled to estimate the fraction of a region within a body.
 const SAMPLES: u64 = 1 << 17;
 
-/// Step of a low-discrepancy sequence in [0, 1): the golden ratio.
+/// Step of a low-discrepancy sequence in [0, 1): the inverse of the golden ratio.
 const EVEN_STEP: f64 = 0.618_033_988_749_894_9;
 
-/// Step of a low-discrepancy sequence in [0, 1)³: powers of the root of x⁴ = x + 1 (Roberts 2018).
+/// Step of a low-discrepancy sequence in [0, 1)³: the powers −1, −2 and −3 of the positive root of x⁴ = x + 1
+/// (Roberts 2018).
 const EVEN_STEP_3D: [f64; 3] = [
     0.819_172_513_396_164_4,
     0.671_043_606_703_789_2,
@@ -266,7 +267,8 @@ pub(super) fn piece(problem: &Problem, body: usize, comm: &dyn Communicator) -> 
 /// Check the number of cells and points of a body against the limits per rank.
 ///
 /// # Errors
-/// The message names the body; the error is the same on all ranks.
+/// If there are too many cells or points, or if cells are too far from the origin to be numbered. The message
+/// names the body; the error is the same on all ranks.
 pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
     let Some(lattice) = LatticeBody::new(problem, body)? else {
         return Ok(());

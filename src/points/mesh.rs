@@ -1,7 +1,7 @@
 //! Points from the elements of a mesh.
 //!
-//! Rank 0 reads the file, generates the points and sends each rank an equal part. It then frees the mesh. The
-//! points have the order of the elements, for any number of ranks.
+//! Rank 0 reads the file, generates the points, frees the mesh and sends each rank an equal part of the
+//! points. The points have the order of the elements, for any number of ranks.
 
 use std::ops::Range;
 use std::path::Path;
@@ -44,6 +44,9 @@ pub struct Found {
 }
 
 /// Index of the first body whose points come from this mesh.
+///
+/// # Panics
+/// If no body uses the mesh.
 pub fn first_user(problem: &Problem, path: &Path) -> usize {
     let users = users(problem, path);
     users.first().expect("a body names the mesh").body
@@ -72,7 +75,7 @@ fn users<'a>(problem: &'a Problem, file: &Path) -> Vec<User<'a>> {
 /// Read a mesh on rank 0. Return this rank's part of its points, for all bodies that use it. Collective.
 ///
 /// # Errors
-/// If the file cannot be read or an element is invalid; the error is the same on all ranks.
+/// Same as for [`read`]; the error is the same on all ranks.
 pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Found> {
     let read = if comm.rank() == 0 {
         read(problem, path).map(Some)
@@ -129,7 +132,9 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
 /// Read a mesh and generate its points, on one rank.
 ///
 /// # Errors
-/// If the file cannot be read or an element is invalid.
+/// If the name of the file does not end like a mesh file, if the file cannot be read or parsed, or if an
+/// element is invalid, belongs to two bodies or coincides with another. Also if a body's block is no group
+/// with elements of the problem's dimension, or the name of a block or set is ambiguous.
 pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     let users = users(problem, path);
     let Some(format) = Format::of(path) else {
@@ -366,7 +371,7 @@ fn are_apart(mesh: &Mesh, points: &[Point], point_of: &[u32]) -> Result<()> {
     Err(mesh.elements.fault(second, message))
 }
 
-/// Find the first point whose key equals that of an earlier point. Return both indices, the earlier one
+/// Find the first point whose key equals the key of an earlier point. Return both indices, the earlier one
 /// first.
 fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     let mut order: Vec<(Key, u32)> = keys.zip(0..).collect();
@@ -376,11 +381,11 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     Some([pair[0].1, pair[1].1])
 }
 
-/// The ids of the points of a group. The points are those of
+/// The ids of the points of a group. A group has the points of
 ///
 /// - the elements of the group;
-/// - elements that have all corners of one of its faces, edges or points;
-/// - elements that have one of its nodes.
+/// - elements that have all corners of a face, edge or point element of the group;
+/// - elements that have a node of the group.
 ///
 /// `marks` has one entry per node; all entries are false before and after the call.
 fn members(

@@ -36,7 +36,8 @@ pub const MAX_PER_RANK: f64 = 2_147_483_647.0;
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Point {
-    /// Global id, from 0 without gaps; equal on any number of ranks.
+    /// Global id, equal on any number of ranks. The ids of points without refinement are 0, 1, 2 … without
+    /// gaps.
     pub id: u64,
     /// Reference position, m; components beyond the dimension are 0.
     pub position: [f64; 3],
@@ -68,11 +69,12 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Generate this rank's piece of the points. Return the piece and the number of points of all ranks. The ids
-/// of a piece are contiguous per body. Collective.
+/// of a piece are contiguous per body, or per file or mesh if bodies share it. Collective.
 ///
 /// # Errors
-/// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, or a
-/// rank has too many points. The error is the same on all ranks.
+/// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, cells of
+/// a lattice are too far from the origin to be numbered, or a rank has too many points. The error is the same
+/// on all ranks.
 pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
@@ -128,7 +130,8 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     Ok((points, total))
 }
 
-/// Displace points randomly from the centres of their cells. `spacing` contains the edges of the cells, m.
+/// Displace points randomly from the centres of their cells, by at most `jitter.share` edges in each
+/// direction. `spacing` contains the edges of the cells, m.
 fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     for point in points {
         for (k, edge) in spacing.iter().enumerate() {
@@ -142,7 +145,8 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
 /// of the first point.
 ///
 /// # Errors
-/// On rank 0, if no mesh has a group of that name, or if the points differ from those of an earlier call.
+/// If no mesh has a group of that name, or if the points differ from the points of an earlier call. Only rank
+/// 0 knows the names of the groups and can suggest similar names.
 fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result<()> {
     for (index, set) in problem.sets.iter().enumerate() {
         let Selector::Mesh(group) = &set.selector else {

@@ -48,10 +48,11 @@ impl Polygon {
         polygon
     }
 
-    /// Build the index along the axis with the smaller total length of edges.
+    /// Build the index along the axis with the smaller ratio of total edge length to extent.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
-        // For each axis, the total length of all edges divided by the extent of the polygon.
+        // For each axis, the total length of the edges in the direction of this axis, divided by the extent
+        // of the polygon in this direction.
         let turns = [0, 1].map(|k| {
             let all: f64 = (0..count)
                 .map(|edge| {
@@ -145,7 +146,8 @@ fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
     let [a, b, p] = [a, b, p].map(Vector2::from);
     let (edge, offset) = (b - a, p - a);
     let along = edge.dot(&offset) / edge.dot(&edge);
-    // A repeated vertex creates an edge of length 0. The distance to the edge is then that to the vertex.
+    // A repeated vertex creates an edge of length 0. The distance to the edge is then the distance to the
+    // vertex.
     let along = if along.is_nan() {
         0.0
     } else {
@@ -248,7 +250,7 @@ mod tests {
             assert!(polygon.contains(within, 1e-9));
             assert!(!polygon.contains(within.map(|x| -3.0 - x), 1e-9));
             assert!(polygon.edges.len() <= 10 * count as usize);
-            // The tops of a circle have the most edges in a strip.
+            // The strips at the two ends of a circle contain the most edges.
             assert!(most_read(&polygon) < 400, "{}", most_read(&polygon));
         }
     }

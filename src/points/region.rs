@@ -48,8 +48,8 @@ struct Span {
 }
 
 impl Region {
-    /// Find the candidate cells of a lattice with a cell corner at `origin` (m), enlarged by `margin`
-    /// edges. `None` if some are too far from the origin to be numbered.
+    /// Find the candidate cells of a lattice with a cell corner at `origin` (m). The bounds of the shape are
+    /// enlarged by `margin` edges. `None` if some cells are too far from the origin to be numbered.
     pub fn new(
         shape: &Shape,
         spacing: [f64; 3],
@@ -117,7 +117,8 @@ fn parts(shape: &Shape) -> Vec<&Shape> {
     }
 }
 
-/// The cells whose centres can lie within a box (m), enlarged by `margin` edges.
+/// The cells whose centres can lie within a box (m) that is enlarged by `margin` edges. `None` if cells are
+/// too far from the origin to be numbered.
 fn cells(
     (lower, upper): ([f64; 3], [f64; 3]),
     spacing: [f64; 3],

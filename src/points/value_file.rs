@@ -48,7 +48,8 @@ impl ValueColumns {
 /// Find the columns of a file by its heading; upper and lower case are equivalent.
 ///
 /// # Errors
-/// If the file cannot be read, its heading has no column of values, or it has a name twice.
+/// If the file cannot be read or has no heading, or if the heading has no column of values or has a known
+/// name twice.
 pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumns, String> {
     let name = path.display();
     let found = heading(path).map_err(|error| format!("cannot read {name}: {error}"))?;
@@ -96,13 +97,14 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
     Ok(columns)
 }
 
-/// Id of a point and its values: the components of the displacement, then those of the velocity.
+/// Id of a point and its values: the components of the displacement, then the components of the velocity.
 pub type Row = (u64, Vec<f64>);
 
 /// Read this rank's part of the rows. `total` is the number of points. Collective.
 ///
 /// # Errors
-/// If the file cannot be read, a row is invalid, or a point does not exist; the message gives file and line.
+/// If the file cannot be read, a row is invalid, a point does not exist, or there are more rows than points.
+/// The message gives the file, and the line of an invalid row.
 pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<Vec<Row>> {
     let columns = &file.columns;
     let mut rows = Vec::new();

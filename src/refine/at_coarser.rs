@@ -8,7 +8,8 @@ use super::pattern::Pattern;
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// The nodes of the level that are not nodes of level 0.
+    /// The indices of the level that refinement of coarser levels adds to level 0. There are nodes at those
+    /// indices at which nodes are possible.
     finer: GridIndexSet,
     /// Bits of a word whose indices lie on the grid of level 0. All words with such indices have the same
     /// bits.

@@ -160,8 +160,8 @@ impl<'a> Grids<'a> {
         removed
     }
 
-    /// The node that is coarsened at the point of a body at a position (m); `None` if there is no such node,
-    /// or if it is permanent.
+    /// The refined node to be coarsened at the point of a body at a position (m). It is `None` if this node
+    /// is permanent or not refined, or if the body has no refined grid.
     pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
         let index = self.index_at(body, position)?;
         let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(index)?;
@@ -241,7 +241,7 @@ impl<'a> Grids<'a> {
         self.refine(refined)
     }
 
-    /// The node that is refined at the point of a block at a position (m); `None` if the point has the finest
+    /// The node to be refined at the point of a block at a position (m); `None` if the point has the finest
     /// level, or if its body is on no lattice.
     pub fn refining(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
         let level = self.problem.block(block).level;
@@ -256,14 +256,14 @@ impl<'a> Grids<'a> {
     }
 
     /// The grid index in steps of the finest level at a position (m) in a body; `None` if the body is on no
-    /// lattice.
+    /// lattice, or without refinement.
     pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
     /// Reference position (m) of a grid index in steps of the finest level; `None` if the index is not on the
-    /// grid of level 0, or if the body is on no lattice.
+    /// grid of level 0, if the body is on no lattice, or without refinement.
     pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))
@@ -378,8 +378,8 @@ impl<'a> Grids<'a> {
         self.problem.block_number(body, node.level, kind)
     }
 
-    /// The level-0 cells of a body whose points may differ from those without refinement; `None` for a body
-    /// that is not on a lattice.
+    /// The level-0 cells of a body whose points may differ from the points without refinement; `None` for a
+    /// body that is not on a lattice, or without refinement.
     pub fn changed(&self, body: usize) -> Option<GridIndexSet> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.pattern.changed())

@@ -12,9 +12,9 @@ use super::grid_index_set::GridIndexSet;
 pub struct Node {
     /// The level of the node's block, which determines the spacing of its neighbours.
     pub level: u32,
-    /// Ratio of the node's volume to that of a level-0 cell.
+    /// Ratio of the node's volume to the volume of a level-0 cell.
     pub volume_fraction: f64,
-    /// Whether the volume is exactly that of a cell of its level.
+    /// Whether the volume is exactly the volume of a cell of the node's level.
     pub whole: bool,
 }
 
@@ -57,8 +57,8 @@ impl Pattern {
         self.dimension
     }
 
-    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node was
-    /// not refined before.
+    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node is
+    /// possible and was not refined before.
     pub fn refine(
         &mut self,
         body: &impl Fn(GridIndex) -> bool,
@@ -151,7 +151,7 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The level-0 cells whose nodes may differ from those without refinement, or that can contain finer
+    /// The level-0 cells whose nodes may differ from the nodes without refinement, or that can contain finer
     /// nodes.
     pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
@@ -240,7 +240,8 @@ impl Pattern {
         self.suppressed.iter().copied()
     }
 
-    /// The nodes of one canonical level that exist now but not in `earlier`, as indices of this level.
+    /// The nodes of one canonical level (1 or more) that exist now but not in `earlier`, as indices of this
+    /// level, unordered.
     pub fn created_since(
         &self,
         earlier: &Self,
@@ -281,7 +282,7 @@ mod tests {
 
     #[test]
     fn volumes_at_interfaces_are_those_of_the_paper() {
-        // Volume removed from the node (0, 0), in volumes of the finer level.
+        // Volume removed from the node (0, 0), in cell volumes of the finer level.
         let taken = |bottom: i64, refined: &[[i64; 2]]| {
             let body = |cell: GridIndex| cell[1] >= bottom;
             let mut pattern = Pattern::new(2, 1);

@@ -18,7 +18,7 @@ const ON_GRID: f64 = 1e-6;
 /// Largest cell index; integers up to this size are exact in floating point.
 const FARTHEST: f64 = 1e15;
 
-/// Largest relative difference between the volume of a point and that of a cell.
+/// Largest relative difference between the volume of a point and the volume of a cell.
 const VOLUME: f64 = 1e-2;
 
 /// A grid: the centre of one cell, and the edges of all cells, m.
@@ -31,8 +31,8 @@ struct Cells {
 /// Find the grids of a deck; `longest` is the length of the longest bond, m. Collective.
 ///
 /// # Errors
-/// If the deck requests lattices and the points of a body do not lie on a grid; the error is the same on all
-/// ranks.
+/// If the deck requests lattices and the points of a body do not lie on a regular grid or have different
+/// volumes; the error is the same on all ranks.
 pub fn grids(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -117,7 +117,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
 }
 
 /// Detect the grid of a body's points. The result is `None` unless all points lie on the grid and have the
-/// volume of a cell. Collective.
+/// same volume, equal to the volume of a cell. If the points form a single layer, their volume is not
+/// compared with a cell. Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,

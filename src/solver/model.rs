@@ -16,7 +16,7 @@ pub struct Model<const D: usize> {
     pub block: Vec<u16>,
     /// Global ids; owned points, then ghosts.
     pub ids: Vec<u64>,
-    /// Density of each block, kg/m³.
+    /// Density of each block, multiplied by the density scale of the present stage, kg/m³.
     pub density: Vec<f64>,
     /// Viscous damping r of each block, 1/s.
     pub damping: Vec<f64>,
@@ -139,7 +139,7 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// Density of an owned point, kg/m³.
+    /// Density of an owned point, multiplied by the density scale of the present stage, kg/m³.
     pub fn density_of(&self, point: usize) -> f64 {
         self.density[usize::from(self.block[point])]
     }

@@ -1,4 +1,4 @@
-//! Rebalance during a run, when the loads of the ranks have drifted apart.
+//! Rebalance during a run, when the computing times of the ranks differ too much.
 //!
 //! Points migrate as in a restart on other ranks. The state is redistributed by id, bonds are found again,
 //! and their stored data are restored. The result of the run is therefore bitwise independent of rebalances.
@@ -45,10 +45,12 @@ impl BalanceWatch {
         }
     }
 
-    /// If a check is due and the loads of the ranks differ too much, rebalance. Collective.
+    /// If a check is due and the computing times of the ranks differ too much, rebalance and return the
+    /// result; otherwise return `None`. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     pub fn look<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -115,8 +117,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// check. Returns the number of points over all ranks that changed their owner. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

@@ -96,7 +96,7 @@ pub struct Simulation<'a, const D: usize> {
 /// Wall-clock time by phase on this rank.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Times {
-    /// Creation of points, partition and families.
+    /// Set-up: points, partition, families, conditions and the first forces.
     pub set_up: Duration,
     /// Bond forces and halo exchanges in the time loop.
     pub forces: ForceTimes,
@@ -120,7 +120,7 @@ struct BadPoint {
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Create and distribute the points and bonds, and evaluate the forces at time 0.
+    /// Create and distribute the points and bonds, and evaluate the forces at time 0. Collective.
     ///
     /// # Errors
     /// If the problem cannot be run: for example, if the points cannot be created, if a set of a condition is
@@ -134,7 +134,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// ends the set-up; the error must be the same on all ranks.
     ///
     /// # Errors
-    /// Those of [`Self::new`] and of `between`.
+    /// The errors of [`Self::new`] and of `between`.
     pub fn set_up(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -160,8 +160,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Distribute the points of grids and create their bonds. Initial values are not set, and forces are not
-    /// evaluated. `cost` is the computing cost of this rank's points; `None` if it is not known. `between` is
-    /// the same as for [`Self::set_up`].
+    /// evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if it is not known.
+    /// `between` is the same as for [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -484,7 +484,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Record the first point whose motion is not finite, at the time of a clock.
+    /// Record the first point whose motion is not finite, at the time of a clock, unless a point has been
+    /// recorded before.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
             self.bad = self.first_bad(clock);
@@ -516,12 +517,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
             })
     }
 
-    /// Check on all ranks that all values are finite and that the load step has not failed.
+    /// Check on all ranks that all values are finite and that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// The message names the first point with a value that is not finite: that of the earliest step, then the
-    /// smallest id. If no equilibrium has been found, it names a loaded piece that no support holds, if there
-    /// is one.
+    /// If a value is not finite, the message names a condition that is not finite or causes a thermal stretch
+    /// of −1 or less. Without such a condition, it names a point with such a value: from the earliest step,
+    /// the point with the smallest id. If the motion of a rigid body is not finite, the message names this
+    /// body. If no equilibrium has been found, it names a loaded piece that no support holds, if there is
+    /// one.
     pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -586,7 +589,8 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
     finite
 }
 
-/// Whether bonds may break at the initial positions.
+/// Whether bonds may break at the initial positions, because initial displacements or conditions can stretch
+/// them.
 fn starts_deformed(problem: &Problem) -> bool {
     let placed = |condition: &Condition| {
         let action = &condition.action;
@@ -597,8 +601,8 @@ fn starts_deformed(problem: &Problem) -> bool {
             || problem.conditions.iter().any(placed))
 }
 
-/// Break the bonds that cross a pre-crack, and count them by crack. On both ranks, the test starts from the
-/// end with the lower id, so the results agree.
+/// Break the bonds that cross a pre-crack, and count them by crack. The test starts from the end with the
+/// lower id. Both ends of a bond, also on different ranks, therefore get the same result.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

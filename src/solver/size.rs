@@ -10,7 +10,8 @@ use crate::problem::{PointSource, Problem};
 /// row-major.
 ///
 /// # Errors
-/// The message names the horizon or the body; the error is the same on all ranks.
+/// If one of the numbers is too large. The message names the horizon or the body; the error is the same on
+/// all ranks.
 pub fn is_feasible(problem: &Problem, cutoffs: &[f64], ranks: usize) -> Result<()> {
     let blocks = problem.block_count();
     (0..problem.bodies.len()).try_for_each(|body| lattice::is_feasible(problem, body, ranks))?;

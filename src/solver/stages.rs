@@ -45,7 +45,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Begin another stage at the present positions. Velocities are set to 0 at the beginning of a stage with
-    /// load steps and of the stage after it.
+    /// load steps and of the stage after it. Collective.
     pub(super) fn begin_stage(&mut self, stage: usize) {
         let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);

@@ -15,11 +15,11 @@ use super::simulation::Times;
 /// Driver that makes the steps of a simulation.
 ///
 /// Velocities are defined at half steps, as in the leapfrog form of Verlet. A step ends with the forces at
-/// the new positions. The next step applies this step's second half kick together with its first half kick,
-/// in one loop over the points. Until then, velocities, reactions, external forces, damping and their
-/// energies are not those of the full step. Therefore the simulation is accessible only through
-/// [`Self::at_full_step`], which applies the pending half kick first. The number of these calls does not
-/// change the results.
+/// the new positions. The second half kick of this step is applied together with the first half kick of the
+/// next step, in one loop over the points. Until then, velocities, reactions, external forces, damping and
+/// their energies do not yet have their values at the full step. Therefore the simulation is accessible only
+/// through [`Self::at_full_step`], which applies the pending half kick first. The number of these calls does
+/// not change the results.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
     /// Whether the second half kick of the last step must still be applied.

@@ -70,7 +70,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
     countable(problem, length, (step, steps))
 }
 
-/// Create the error for a body whose points have no bonds. `missing` is the quantity that cannot be computed.
+/// Create the error for a problem without any bond. `missing` is the quantity that cannot be computed.
 fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     let from_mesh = |body: &Body| matches!(body.points, PointSource::Mesh { .. });
     let scale = if problem.bodies.iter().any(from_mesh) {
@@ -135,7 +135,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
 /// at most (r Δt)²/4 of the damped kinetic energy.
 const DAMPED: f64 = 0.5;
 
-/// Largest allowed r Δt; with a larger one, viscous damping reverses the velocity in each step.
+/// Largest allowed r Δt; with a larger value, viscous damping reverses the velocity in each step.
 const SIGN_CHANGES: f64 = 2.0;
 
 /// The largest rate r of viscous damping of the bodies, 1/s.
@@ -169,8 +169,8 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
 }
 
 /// Return the first step (s) of a stage with an adaptive rule, and the number of its steps if no bond breaks.
-/// `step` and `steps` are those without the rule, and `length` is the duration of the stage, s. The first
-/// step is at most `largest` and grows up to `largest`.
+/// `step` and `steps` are the length and the number of steps without the rule, and `length` is the duration
+/// of the stage, s. The first step is at most `largest` and grows up to `largest`.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
     match rule.largest {
         Some(largest) if largest < step => (largest, steps_to(length, largest)),

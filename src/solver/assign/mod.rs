@@ -69,8 +69,8 @@ enum Breaks {
     Stress(StressMeasure),
 }
 
-/// Quantity that breaks the bonds of a body with this damage. In bond-based laws, the work follows from the
-/// stretch, so their bonds break at the equivalent critical stretch.
+/// Quantity that breaks the bonds of a body with this damage. In a bond-based law, the work of a bond follows
+/// from its stretch, so the bond breaks at the equivalent critical stretch.
 fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     match damage.rule {
@@ -117,7 +117,7 @@ fn build(
     (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
-/// Volume fractions of the cells of `neighbours` inside the families of points with this horizon.
+/// Volume correction factors of the cells of `neighbours` in the families of points with this horizon (m).
 fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
     // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
@@ -173,8 +173,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Data that failure criteria read of the points of this body, for its bonds to bodies with which it has a
-/// separate damage law.
+/// Data of the points of this body that failure criteria read. Only the bonds to bodies with which this body
+/// has a separate damage law count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -255,7 +255,7 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
             Criterion::Stretch(i.critical)
         }
         [CriticalStretch(i), CriticalStretch(j)] => {
-            // Each end compares the stretch with its threshold only, not with that of the other end.
+            // Each end compares the stretch with its own threshold only.
             let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
             let conversion = StretchConversion { ratios, stiffness };
             Criterion::StretchBetween([i.critical, j.critical], conversion)
@@ -352,7 +352,8 @@ fn criterion(
     }
 }
 
-/// Set laws, criterion and weights of the bonds between two blocks.
+/// Create the interaction of each pair of blocks: its bonds, with their weights, laws and criterion. `blocks`
+/// are the laws of all blocks.
 ///
 /// # Errors
 /// If there is not enough memory for the weights.
@@ -411,7 +412,7 @@ struct End {
     pair_damage: Option<DamageLaw>,
     /// Horizon, m.
     horizon: f64,
-    /// Volume fractions of the other block's cells inside the families of this end.
+    /// Volume correction factors of the other block's cells in the families of this end.
     share: CellShare,
 }
 

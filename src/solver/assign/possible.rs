@@ -11,7 +11,8 @@ use crate::problem::{
 /// of bodies.
 ///
 /// # Errors
-/// For problems created in Rust; most faults of decks are found when they are read.
+/// If a law does not support its dimension, its damage, its thermal expansion or a horizon, or if pairs have
+/// impossible damage. Most such faults of decks are found earlier, when the decks are read.
 pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     for body in &problem.bodies {
         let law = &body.material.law;

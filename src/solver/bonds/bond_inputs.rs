@@ -12,12 +12,15 @@ pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
     /// List nodes of these points; empty if there is no list.
     nodes: &'a mut [Node],
-    /// Slots of these points, one entry per grid.
+    /// Write access to the slots of the owned points, one entry per grid.
     places: &'a [OwnedPlaces<'a, D>],
 }
 
 impl<const D: usize> BondInputs<'_, D> {
     /// Split off the bond inputs of the first `count` points.
+    ///
+    /// # Panics
+    /// If there are fewer points.
     pub fn split_off_first(&mut self, count: usize) -> Self {
         let middle = self.points.start + count;
         assert!(middle <= self.points.end, "more points than there are");

@@ -28,13 +28,13 @@ pub struct Broken<const D: usize> {
     pub point: usize,
     /// Number of its bonds that broke.
     pub count: u64,
-    /// Energy that the point loses, J: its part of the energy of these bonds, and the change of its remaining
-    /// energy.
+    /// Energy that the point loses, J: its part of the energy of the broken bonds, and the change of its
+    /// remaining energy.
     pub energy: f64,
-    /// The point's part of the energy of these bonds above their criterion when they broke, J.
+    /// The point's part of the energy of the broken bonds above their criterion when they broke, J.
     pub overshoot: f64,
-    /// Force density that the point loses, N/m³: the forces of these bonds, and the change of the forces of
-    /// other bonds.
+    /// Force density that the point loses, N/m³: the forces of the broken bonds, and the change of the forces
+    /// of other bonds.
     pub force: [f64; D],
 }
 
@@ -162,7 +162,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Send the new point numbers to the ranks that read them. Return the owned points whose forces may
-    /// change.
+    /// change. Collective.
     fn send_numbers(
         &mut self,
         comm: &dyn Communicator,

@@ -64,7 +64,7 @@ impl Moments {
         Vector::from_fn(|d, _| self.0[first + d])
     }
 
-    /// Whether a bond of the point is broken.
+    /// Whether a bond within the horizon of the point is broken.
     pub fn has_broken(&self) -> bool {
         self.0[10] > 0.0
     }
@@ -77,8 +77,9 @@ impl Moments {
         }
     }
 
-    /// Gradient of a function that is 1 at the neighbours with a broken bond and 0 at the other neighbours, 1/m.
-    /// It is that of a linear function, fitted by least squares with the weights ω Ṽ.
+    /// Gradient of a function that is 1 at the neighbours with a broken bond and 0 at the other neighbours,
+    /// 1/m. The result is the gradient of the linear function that fits best, by least squares with the
+    /// weights ω Ṽ. The result is 0 if the matrix C, see [`LAYER`], is not invertible.
     pub fn gradient(&self) -> Vector {
         let mean = self.mean();
         let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);

@@ -65,10 +65,10 @@ impl ForceTimes {
 
 /// Fields that a force evaluation reads and writes.
 pub struct Acting<'a, const D: usize> {
-    /// Displacements of the local points, m; the evaluation updates those of ghosts.
+    /// Displacements of the local points, m; the evaluation updates the displacements of ghosts.
     pub displacement: &'a mut [Vec<f64>; D],
-    /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates
-    /// those of ghosts.
+    /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates the
+    /// stretches of ghosts.
     pub thermal_stretch: Option<&'a mut [f64]>,
     /// Internal force density of the owned points, N/m³. It must be 0 on entry, because bond forces are
     /// added to it.
@@ -274,7 +274,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Copy received displacements and thermal stretches of ghosts to the arrays that bonds read.
-    /// `BondInputs` has already written those of owned points.
+    /// `BondInputs` has already written the values of owned points.
     fn update_moved_ghosts(
         &mut self,
         model: &Model<D>,
@@ -298,7 +298,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Zero the sums of a pass over a range of points.
+    /// Reset the sums of a pass over a range of points: smallest stretches to ∞ and point sums to 0. Forces
+    /// are not reset.
     pub(super) fn clear(&mut self, pass: Pass, points: Range<usize>) {
         match pass {
             Pass::SmallestStretch => self.limits.thresholds[points].fill(f64::INFINITY),
@@ -380,7 +381,8 @@ impl<const D: usize> Forces<D> {
                     .with_min_len(CHUNK)
                     .zip(points)
                     .for_each(|(value, point)| {
-                        // The smallest stretch of a point without intact bonds is infinite.
+                        // A point without intact bonds has the minimum ∞. Its threshold is that for a
+                        // smallest stretch of 0.
                         let smallest = if value.is_infinite() {
                             0.0
                         } else {

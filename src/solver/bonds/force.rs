@@ -73,8 +73,8 @@ impl<L> Force<L> {
     }
 
     /// Return the work of the force states of each bond between two whole cells, J/m⁶, from the weighted
-    /// force density. It is 0 if the criterion does not read it. The force state of a point does not act
-    /// beyond its horizon.
+    /// force density. The result is 0 if the criterion does not read the work. The force state of a point
+    /// does no work beyond the horizon of the point.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,

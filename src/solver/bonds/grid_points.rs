@@ -26,7 +26,7 @@ pub struct GridValues<const D: usize> {
 }
 
 impl<const D: usize> GridValues<D> {
-    /// Create the values of a grid without displacements. Bonds read `numbers` point numbers, the limits in
+    /// Create the values of a grid with zero displacements. Bonds read `numbers` point numbers, the limits in
     /// `limits`, and thermal stretches if `is_thermal`.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();

@@ -30,7 +30,7 @@ pub struct BlockLaws {
     pub weibull: Option<Weibull>,
     /// Factor of the critical work by the direction of a bond; `None` if it is 1 in all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Data that criteria read of these points, for bonds between bodies that have a separate damage law.
+    /// Data of these points that criteria read for bonds between bodies with a separate damage law.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,

@@ -20,7 +20,7 @@ pub struct LimitsRead {
 }
 
 impl LimitsRead {
-    /// Collect the limits that the damage laws of the blocks read in `D` dimensions.
+    /// Collect the limits that the damage laws of the blocks, and of pairs of bodies, read in `D` dimensions.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());

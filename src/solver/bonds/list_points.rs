@@ -182,7 +182,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// Load the bonds of a group.
     ///
     /// # Safety
-    /// The row must belong to a list with this reach.
+    /// The row must belong to a list whose reach is at most the `reach` of [`Self::new`]. `group` must be the
+    /// index of a group of the row.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd>(
         &self,

@@ -26,10 +26,10 @@ pub struct Stored {
     /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³. Empty if no law softens, or
     /// if this sum was not requested.
     pub softened: Vec<f64>,
-    /// Number of intact bonds, including those beyond the point's own horizon.
+    /// Number of intact bonds, including bonds longer than the horizon of the point.
     pub neighbours: Vec<f64>,
-    /// Energy density that bonds have dissipated without breaking, J/m³; empty if no law dissipates or if
-    /// energies were not requested.
+    /// Energy density that bonds have dissipated without breaking, J/m³; empty if no law has a bond history
+    /// or if energies were not requested.
     pub dissipated: Vec<f64>,
 }
 
@@ -46,8 +46,8 @@ impl<const D: usize> Forces<D> {
         sums
     }
 
-    /// Sum the quantities of [`Stored`] for each owned point, at the displacements of the last
-    /// [evaluation](Self::evaluate).
+    /// Sum the quantities of [`Stored`] except `softened` for each owned point, at the displacements of the
+    /// last [evaluation](Self::evaluate).
     pub fn stored(&mut self, model: &Model<D>) -> Stored {
         self.stored_at(model, 0..model.owned())
     }
@@ -118,7 +118,7 @@ impl<const D: usize> Forces<D> {
         columns.swap_remove(0)
     }
 
-    /// Compute the moments of each owned point. In 3-D only.
+    /// Compute the [`Moments`] of each owned point. In 3-D only.
     pub fn broken_moments(&mut self, model: &Model<D>) -> Vec<Moments> {
         let columns = self.measure(model.owned(), 14, |interaction, sums, source| {
             sweep_all(&mut interaction.bonds, sums, &MomentSums, source);
@@ -137,8 +137,8 @@ impl<const D: usize> Forces<D> {
         columns.try_into().expect("six columns")
     }
 
-    /// Stress of each owned point (Pa), columns xx, yy, zz, xy, yz, xz, at the displacements of the last
-    /// [evaluation](Self::evaluate).
+    /// Kirchhoff stress of each owned point (Pa), columns xx, yy, zz, xy, yz, xz, at the displacements of the
+    /// last [evaluation](Self::evaluate).
     pub fn stress(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let [law, _] = interaction.laws.laws();
@@ -150,6 +150,7 @@ impl<const D: usize> Forces<D> {
 
     /// Out-of-plane Kirchhoff stress of each owned point (Pa) in plane strain, at the displacements of the
     /// last [evaluation](Self::evaluate) and the plastic state of each point; see [`Law::stress_across`].
+    /// `None` for a point whose law does not compute this stress.
     pub fn stress_across(
         &mut self,
         model: &Model<D>,
@@ -177,7 +178,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Out-of-plane stretch F_zz of an owned point in plane stress, at its deformation gradient and plastic
-    /// state; see [`Law::stretch_across`].
+    /// state. `None` if the law does not compute it; see [`Law::stretch_across`].
     pub fn stretch_across(
         &self,
         model: &Model<D>,

@@ -15,10 +15,10 @@ pub(super) const fn wanted(linear: bool) -> Wanted {
     }
 }
 
-/// Sums of a point, by index:
+/// Kernel that computes the sums of each point, by index:
 /// 0. strain energy density of its intact bonds, J/m³;
-/// 1. volume of the intact neighbours within its horizon, m³;
-/// 2. number of intact bonds, including those beyond its own horizon;
+/// 1. volume of the intact neighbours within the horizon of the point, m³;
+/// 2. number of intact bonds, including bonds longer than the horizon of the point;
 /// 3. energy density that all bonds have dissipated without breaking, J/m³.
 #[derive(Clone, Copy)]
 pub struct Stored {
@@ -118,7 +118,8 @@ impl<const D: usize> Kernel<D> for Softened {
 /// Index pairs of the entries of a symmetric tensor: xx, yy, zz, xy, yz, xz.
 pub(super) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// Add the tensor entries of the intact bonds to a symmetric tensor.
+/// Add the tensor entries of the intact bonds to a symmetric tensor. `entry` returns an entry, given its
+/// index in [`PAIRS`] and its row and column.
 #[inline(always)]
 fn add_tensor<S: Simd, const D: usize>(
     simd: S,

@@ -83,6 +83,9 @@ fn history_width<const D: usize>(interaction: &Interaction) -> usize {
 }
 
 /// Check that the bond history fits in memory.
+///
+/// # Errors
+/// If it does not fit. The error names the pair of blocks with the largest bond history.
 pub fn history_fits<const D: usize>(
     interactions: &[Interaction],
 ) -> std::result::Result<(), Fault> {
@@ -405,7 +408,7 @@ impl<const D: usize> Forces<D> {
         self.halo.update_ghosts(comm, columns);
     }
 
-    /// Exchange the displacements of the ghosts.
+    /// Exchange the displacements of the ghosts. Collective.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         let mut components = displacement.each_mut().map(Vec::as_mut_slice);
         self.halo.update_ghosts(comm, &mut components);

@@ -4,7 +4,7 @@ use crate::lanes::Lanes;
 
 use super::Forces;
 
-/// Bond state at the end of a step, for a rollback.
+/// Copy of the intact bits and histories of all bonds, for a rollback.
 #[derive(Debug, Default)]
 pub struct KeptBonds(Vec<(Vec<u8>, Vec<Lanes>)>);
 

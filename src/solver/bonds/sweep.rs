@@ -93,7 +93,8 @@ trait Runner<P: Part>: Sync {
 /// over all owned points. Return the sums over breaking bonds, by ascending point.
 ///
 /// # Panics
-/// If an array that the kernel reads is too short for the bonds.
+/// If an array that the kernel reads is too short for the bonds, or if the kernel is not implemented in `D`
+/// dimensions.
 pub fn sweep<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
@@ -369,7 +370,8 @@ impl FastPathGate {
         }
     }
 
-    /// Sum over the bonds of a lane group. Return the sums and the bits of the breaking bonds.
+    /// Sum over the bonds of a lane group. Return the sums, and a bit for each point (lane) with a breaking
+    /// bond.
     #[inline(always)]
     fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
@@ -433,7 +435,8 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over all bonds of a lane group and returns the bits of the breaking bonds.
+/// Task that sums over all bonds of a lane group. It returns the sums, and a bit for each point (lane) with a
+/// breaking bond.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.

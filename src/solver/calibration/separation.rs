@@ -13,11 +13,11 @@ use crate::solver::bonds::BondUpdate;
 /// number.
 const MAX_BONDS: f64 = 1e6;
 
-/// Relative growth of the separation per step. It limits how far bonds exceed their criterion when they
-/// break. The overshoot energy is subtracted.
+/// Relative growth of the separation per step. A small growth limits how far bonds exceed their criterion
+/// when they break. The overshoot energy is subtracted.
 const GROWTH: f64 = 0.01;
 
-/// Ratio of the first separation to the one at which the first bond is expected to break.
+/// Ratio of the first separation to the separation at which the first bond is expected to break.
 const START: f64 = 0.02;
 
 /// Maximum number of steps; blocks need far fewer steps to separate.
@@ -171,8 +171,8 @@ fn is_separated<const D: usize>(
     crossing == 0
 }
 
-/// Energy (J/m²) that the points of the middle column have dissipated, per area of the plane. `height` is
-/// that of the column, m.
+/// Energy (J/m²) that the points of the middle column have dissipated, per area of the plane. The overshoot
+/// energy is subtracted. `height` is the height of the column, m.
 fn spent<const D: usize>(simulation: &mut Simulation<'_, D>, middle: &[bool], height: f64) -> f64 {
     let dissipated = simulation.forces.stored(&simulation.model).dissipated;
     let (model, fields) = (&simulation.model, &simulation.fields);

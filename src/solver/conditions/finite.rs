@@ -18,8 +18,9 @@ const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z 
 /// value at the start. Also check that thermal stretches are above −1. Collective.
 ///
 /// # Errors
-/// The message names the first entry of the deck that fails the check, and its point with the smallest id.
-/// The error is the same on all ranks.
+/// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
+/// deck that fails the check, and the point with the smallest id at which it fails. The error is the same on
+/// all ranks.
 pub fn are_finite<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -86,7 +87,7 @@ struct FiniteCheck<'a, const D: usize> {
 
 impl<const D: usize> FiniteCheck<'_, D> {
     /// Return an error if the thermal stretch of a point of a set is -1 or less. The bonds of this point
-    /// would have no length.
+    /// would have no length. Collective.
     fn look_at_stretches(
         &self,
         key: &str,
@@ -125,7 +126,7 @@ impl<const D: usize> FiniteCheck<'_, D> {
     }
 
     /// Return an error if a component, times its factor, is not finite at a point of a set. `names` are the
-    /// subjects of the messages.
+    /// subjects of the messages. Collective.
     fn look<'e>(
         &self,
         key: &str,

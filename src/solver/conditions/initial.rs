@@ -9,10 +9,11 @@ use crate::solver::motion::Fields;
 
 use super::{members, not_empty};
 
-/// Set the initial displacements and velocities.
+/// Set the initial displacements and velocities. Collective.
 ///
 /// # Errors
-/// If a set is empty, or a file has an invalid row or lacks a point; the error is the same on all ranks.
+/// If a set is empty, or a file cannot be read, has an invalid row, or does not have exactly one row for each
+/// point of the set. The error is the same on all ranks.
 pub fn apply_initials<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,

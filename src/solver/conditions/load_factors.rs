@@ -59,7 +59,8 @@ impl LoadFactors {
         self.present.copy_from_slice(&self.requested);
     }
 
-    /// Record the factors of the current step as those of an equilibrium, at the end of a load step.
+    /// Record the factors of the current step as the factors at the last equilibrium, at the end of a load
+    /// step.
     pub fn settle(&mut self) {
         self.at_equilibrium.copy_from_slice(&self.present);
     }

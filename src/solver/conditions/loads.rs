@@ -6,7 +6,7 @@ use crate::solver::motion::walk::Part;
 use super::Work;
 use super::values::{At, Values};
 
-/// A body force density.
+/// A load, as a force density on points.
 pub struct Load<const D: usize> {
     values: [Values; D],
     factors: [f64; D],
@@ -139,7 +139,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Store force density and displacement for the work of the next step. `displacement` (m) is that of all
+    /// Store force density and displacement for the work of the next step. `displacement` (m) contains all
     /// points of the part.
     pub fn remember(&mut self, displacement: [&[f64]; D]) {
         self.before.copy_from_slice(&self.force);
@@ -148,7 +148,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the work of the load in this step (J) to that of each point.
+    /// Add the work (J) of the load in this step to the external work of each point.
     pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {
             return;

@@ -103,7 +103,8 @@ fn loaded<const D: usize>(
         return (members(problem, model, set), None);
     }
     let mut shares = SetFractions::new(grids);
-    // Sets of loads in runs with refinement never contain ids, so the id 0 is not used; see `is_possible`.
+    // Sets of loads in runs with refinement never contain ids, so the id 0 that is passed here is not read;
+    // see `refinement::trigger::is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
         set::contains(&problem.sets[set], problem.horizon, 0, position, body)
     };
@@ -135,7 +136,7 @@ pub fn output_members<const D: usize>(
     Ok(Some(points))
 }
 
-/// Return an input error if the set of a condition or output has no points on any rank.
+/// Return an input error if the set of a condition or output has no points on any rank. Collective.
 pub fn not_empty(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -155,7 +156,7 @@ pub fn not_empty(
 
 impl<const D: usize> Conditions<D> {
     /// Find the points of the conditions for which `acting` is true. If two supports prescribe the same
-    /// component of a point, the later support applies.
+    /// component of a point, the later support applies. Collective.
     ///
     /// # Errors
     /// If a set is empty; the error is the same on all ranks.
@@ -313,7 +314,8 @@ impl<const D: usize> Conditions<D> {
         free
     }
 
-    /// Sum the force of the supports on a set by component, N. `members` is sorted.
+    /// Sum the force of the supports on this rank's points of a set by component, N. `members` are the sorted
+    /// local indices of these points.
     pub fn reaction(&self, model: &Model<D>, fields: &Fields<D>, members: &[u32]) -> [ExactSum; D] {
         let mut sums = [const { ExactSum::ZERO }; D];
         let Some(reaction) = &fields.reaction else {
@@ -475,7 +477,8 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Compute the reactions that keep supported points at rest. Returns whether they are finite.
+    /// Set the velocities of supported points to 0, and compute the reactions that keep these points at rest.
+    /// Returns whether the reactions are finite.
     pub fn project_residual(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
@@ -484,8 +487,8 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Add the work of loads and supports since [`Self::remember`]. Force densities and reactions must be
-    /// those at the present positions.
+    /// Add the work of loads and supports since [`Self::remember`]. Force densities and reactions must belong
+    /// to the present positions.
     pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
             load.add_work(part, work);

@@ -204,7 +204,8 @@ impl Supported {
         })
     }
 
-    /// Compute the reactions that keep the points at rest. Returns whether they are finite.
+    /// Set the velocities of the points to 0, and compute the reactions that keep the points at rest. Returns
+    /// whether the reactions are finite.
     pub fn project_residual<const D: usize>(
         &self,
         supports: &[Support],
@@ -239,7 +240,7 @@ impl Supported {
         finite
     }
 
-    /// Add the work of the support in this step (J) to that of each point.
+    /// Add the work (J) of the support in this step to the external work of each point.
     pub fn add_work<const D: usize>(
         &self,
         supports: &[Support],

@@ -29,8 +29,8 @@ pub struct Touching {
     pub count: u64,
     /// The largest overlap, m.
     pub overlap: f64,
-    /// Force on the first of the two bodies by component, N; 0 in [`ContactNow::all`]. Friction and damping
-    /// are computed from the velocities at the full step.
+    /// Force on the first of the two bodies by component, N; 0 in [`ContactNow::all`] and for a body with
+    /// itself. Friction and damping are computed from the velocities at the full step.
     pub force: Vec<f64>,
 }
 

@@ -34,7 +34,7 @@ pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item 
 pub(super) struct Cells {
     edge: f64,
     dimension: usize,
-    /// Index of the first point of each bucket in `entries`.
+    /// Index in `entries` of the first point of each bucket, followed by the number of points.
     starts: Vec<u32>,
     /// Cell and index of each point.
     entries: Vec<(Cell, u32)>,

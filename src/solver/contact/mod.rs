@@ -93,7 +93,8 @@ pub struct ContactEvaluation {
     /// Whether the evaluation is part of a relaxation or static solution: there are no velocities, and
     /// contact adds to the fictitious density.
     pub is_quasi_static: bool,
-    /// Data of the step, if it ends here or if a load step has reached equilibrium; otherwise `None`.
+    /// Data of the step, if a step ends with this evaluation or a load step has reached equilibrium;
+    /// otherwise `None`.
     pub end: Option<StepEnd>,
 }
 
@@ -122,7 +123,7 @@ struct PointSum<const D: usize> {
     /// Potential energy, J: half of the energy of each contact with a point, and all of the energy of
     /// contacts with rigid bodies.
     energy: f64,
-    /// Contribution to the step limits, summed over present contacts and those expected within the
+    /// Contribution to the step limits, summed over present contacts and contacts expected within the
     /// look-ahead.
     demand: Demand,
     /// Whether the point touches another point or a rigid body.
@@ -134,7 +135,7 @@ impl<const D: usize> Contact<D> {
     /// Collective.
     ///
     /// # Errors
-    /// If a point lies in a rigid body; the error is the same on all ranks.
+    /// If a point starts in a rigid body or on its surface; the error is the same on all ranks.
     pub fn new(
         problem: &Problem,
         comm: &dyn Communicator,
@@ -228,7 +229,8 @@ impl<const D: usize> Contact<D> {
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
     /// friction and damping from the present velocities, record their work, and apply the second half kick of
-    /// rigid bodies. Otherwise, friction and damping do not change. Collective.
+    /// rigid bodies. Otherwise, friction and damping do not change. If a position is not finite, nothing is
+    /// added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,

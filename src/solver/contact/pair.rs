@@ -194,8 +194,8 @@ impl PairRule {
         })
     }
 
-    /// Contact force of the second point on the first; `None` if they do not touch or if they coincide. If
-    /// the points are exchanged, the forces are exactly opposite.
+    /// Contact force of the second point on the first; `None` if the points do not touch or if they coincide.
+    /// If the two points are exchanged, the force has exactly the opposite sign.
     pub fn touch<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -241,8 +241,8 @@ impl Response {
     }
 
     /// Contact force on a point for an overlap (m) and a stiffness (N/m). `normal` points from the point
-    /// towards the other point or body. `velocity` (m/s) is that of the point relative to this other object.
-    /// `mass` is the reduced mass, kg.
+    /// towards the other point or body. `velocity` (m/s) is the velocity of the point relative to this other
+    /// object. `mass` is the reduced mass, kg.
     pub fn touch<const D: usize>(
         &self,
         stiffness: f64,

@@ -59,7 +59,8 @@ pub(super) struct RigidBody {
     /// Inertia tensor in the body's axes (kg m²), and its inverse.
     inertia: [Matrix3<f64>; 2],
     response: Response,
-    /// Stiffness of the contact layer by block: modulus over thickness, N/m³.
+    /// Stiffness of the contact layer by block: modulus times out-of-plane measure over thickness (N/m³ in
+    /// 3-D).
     layers: Vec<f64>,
 }
 
@@ -234,7 +235,7 @@ impl RigidBody {
             RigidMotion::Driven(_) => {
                 state.work -= work(&state.contact, &contact);
                 // In a load step, the velocity is 0 and work comes from `advance`. The first equilibrium
-                // resets `advance`, so further ones add no work.
+                // resets `advance`, so further equilibria of the load step add no work.
                 for (d, advance) in state.advance.iter_mut().enumerate() {
                     let advance = std::mem::take(advance);
                     state.work -= 0.5 * (state.contact[d] + contact[d]) * advance;
@@ -261,7 +262,8 @@ impl RigidBody {
 
     /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
     /// The overlap is contact distance minus present distance. The contact distance is half the edge of the
-    /// point's cell, or the distance at the start if that is smaller.
+    /// point's cell, or the distance at the start if that is smaller. The overlap is set to 0 if the point is
+    /// farther from the surface than half the edge.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.place());
         let half = 0.5 * point.edge;

@@ -8,7 +8,7 @@ const CHUNK: usize = 1024;
 /// The points that may touch each owned point: one row per owned point, in ascending order of ids.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    /// Index of the first pair of each owned point.
+    /// Index of the first pair of each owned point, followed by the number of pairs.
     starts: Vec<usize>,
     /// Index of the other point of each pair: owned points first, then ghosts.
     others: Vec<u32>,
@@ -58,7 +58,8 @@ impl Rows {
         rows
     }
 
-    /// Indices of the points that may touch an owned point, without points to which an intact bond joins it.
+    /// Indices of the points that may touch an owned point, without points to which an intact bond joins the
+    /// owned point.
     pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
         let row = self.starts[point]..self.starts[point + 1];
         row.filter(|pair| !self.is_bonded[*pair])

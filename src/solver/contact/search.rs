@@ -12,9 +12,9 @@ use super::ghosts::{Ghost, Ghosts};
 use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
-/// Skin as a fraction of the largest contact distance. It is the distance by which two points may approach
-/// between searches. With this skin and penalty contact, the rows of a lattice at rest contain only nearest
-/// neighbours.
+/// Skin as a fraction of the largest contact distance. The skin is the distance by which two points may
+/// approach between searches. With this skin and penalty contact, the rows of a lattice at rest contain only
+/// nearest neighbours.
 const SKIN: f64 = 0.4;
 
 impl<const D: usize> Contact<D> {

@@ -60,7 +60,7 @@ fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     (*beyond, *normal)
 }
 
-/// Unit vector along a vector of this length; an arbitrary axis if the length is 0.
+/// Unit vector along a vector of this length; the x axis if the length is 0.
 fn direction(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     if length > 0.0 {
         vector / length
@@ -99,7 +99,8 @@ pub(super) fn inertia(shape: &RigidShape, dimension: usize) -> Matrix3<f64> {
                 square(0) + square(2),
                 square(0) + square(1),
             );
-            // A rectangle does not rotate about its own axes.
+            // The moment about an axis is 0 if the box has no extent across this axis. It is replaced by 1,
+            // so the tensor is invertible.
             Matrix3::from_diagonal(&moments.map(|moment| if moment > 0.0 { moment } else { 1.0 }))
         }
         RigidShape::HalfSpace { .. } => Matrix3::identity(),

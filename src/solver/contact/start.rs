@@ -8,7 +8,7 @@ use crate::solver::model::Model;
 use super::Contact;
 use super::rigid::RigidBody;
 
-/// Return an error if a point starts in a rigid body. Collective.
+/// Return an error if a point starts in a rigid body or on its surface. Collective.
 pub(super) fn check_outside<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,

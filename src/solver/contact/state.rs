@@ -63,8 +63,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Restore the state before a step that is rolled back, with unchanged points. The bonds must have been
-    /// restored before.
+    /// Restore the state before a step that is rolled back. The rank must own the same points as before the
+    /// step. The bonds must have been restored already.
     pub fn undo(&mut self, state: &ContactState, model: &Model<D>, forces: &Forces<D>) {
         self.set_state(state);
         self.update_bonds(model, forces);
@@ -113,7 +113,8 @@ impl<const D: usize> Contact<D> {
         };
     }
 
-    /// Scale the limits after the densities of the points were multiplied by a factor.
+    /// Scale the limits after the densities of the points were multiplied by a factor. A factor above 1 does
+    /// not change the limits, which are then upper bounds.
     pub fn scale_density(&mut self, factor: f64) {
         self.demand.stiffness /= factor.min(1.0);
         self.demand.damping /= factor.min(1.0);

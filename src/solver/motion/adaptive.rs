@@ -48,7 +48,7 @@ pub struct StepControl {
 
 impl StepControl {
     /// Start a stage. `step` (s) is the time step of the stage without adaptation: the fixed step of the
-    /// deck, or the one from the stable step.
+    /// deck, or the step that follows from the stable step.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);
@@ -99,7 +99,8 @@ impl StepControl {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Make one explicit step with the size that the rule requests. Collective.
+    /// Make one explicit step with the size that the rule requests. Contact and the end of the stage can
+    /// require a shorter step. Collective.
     fn make_adaptive_step(&mut self, rule: &Adaptive) {
         let mut kept = std::mem::take(&mut self.kept);
         self.keep(&mut kept);

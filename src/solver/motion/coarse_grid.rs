@@ -2,9 +2,9 @@
 //!
 //! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
 //! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
-//! a cell. The stiffness is that of the classical solid. The elastic constants of a cell are averages over
-//! its points, weighted by volume and by the fraction of intact bonds. Supported components of points are
-//! springs at their position in the cell. Forces on points are distributed to the nodes of their cells
+//! a cell. The cells have the stiffness of the classical solid. The elastic constants of a cell are averages
+//! over its points, weighted by volume and by the fraction of intact bonds. Supported components of points
+//! are springs at their position in the cell. Forces on points are distributed to the nodes of their cells
 //! (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same weights,
 //! so the preconditioner is symmetric.
 //!

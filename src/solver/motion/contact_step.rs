@@ -12,8 +12,8 @@ const CONTACT_RESERVE: f64 = 0.95;
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a new step (s) if contact is too stiff for the present step, or if enough steps could have been
-    /// longer. The new step divides the rest of the stage evenly.
+    /// Return a new step (s) if contact is too stiff for the present step, or if enough consecutive steps
+    /// could have been longer. The new step divides the rest of the stage evenly.
     pub fn step_for_contact(&self) -> Option<f64> {
         if self.is_quasi_static() {
             return None;

@@ -168,8 +168,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Velocity u̇ at full steps, m/s. Between the steps of a [`Stepper`](crate::solver::Stepper), velocities
-    /// are those of half steps.
+    /// Velocity u̇ at full steps, m/s. Between the steps of a [`Stepper`](crate::solver::Stepper), they are
+    /// velocities at half steps.
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",
@@ -608,7 +608,7 @@ impl<const D: usize> Fields<D> {
         potential[point] = energy;
     }
 
-    /// Set the contact fields of an owned point without contact to 0.
+    /// Set contact force, contact energy and contact density of an owned point without contact to 0.
     pub fn clear_contact(&mut self, point: usize) {
         let columns = self.contact_force.iter_mut().flatten();
         let scalars = self
@@ -677,8 +677,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds of a further result, given its index among those with this
-    /// count.
+    /// Reset the count of newly broken bonds of a further result, given its index among the further results
+    /// with this count.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);

@@ -41,7 +41,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Collective.
     ///
     /// # Errors
-    /// The message names the piece with the smallest point id.
+    /// If a piece is loaded along an axis in which no support holds it. Of several such pieces, the message
+    /// names the one with the smallest point id.
     pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
         for stage in 0..self.stages.len() {
             let found = self.at_load_steps(stage, |simulation, pieces, time| {
@@ -62,8 +63,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Find loads of the first stage that rotate a piece, if no support holds the piece in the plane of the
-    /// rotation. Later stages are not checked, because their positions are not known yet. The simulation must
-    /// be at time 0. Collective.
+    /// rotation. Later stages are not checked, because the positions of the points in these stages are not
+    /// known yet. The simulation must be at time 0. Collective.
     pub fn unheld_torque(&mut self) -> Option<UnheldTorque> {
         if D == 1 {
             return None;
@@ -73,8 +74,9 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Call `look` at the first and at the last load step of a stage, until it returns a value. Its arguments
-    /// are the simulation with the loads and supports of this load step, the pieces, and the time, s.
+    /// Call `look` at the first and at the last load step of a stage, until it returns a value. The arguments
+    /// of `look` are the simulation with the loads and supports of this load step, the pieces, and the time,
+    /// s.
     ///
     /// `look` is not called for explicit stages and for stages without loads. It is not called in runs with
     /// contact either, because contact can hold pieces. Afterwards, the loads and supports of the first stage
@@ -118,10 +120,8 @@ impl<const D: usize> Simulation<'_, D> {
         self.apply_loads(time, true);
     }
 
-    /// Return an error if a piece is loaded along an axis in which no support holds it. Collective.
-    ///
-    /// # Errors
-    /// The message names the piece with the smallest point id.
+    /// Return an error if a piece is loaded along an axis in which no support holds it. Of several such
+    /// pieces, the message names the one with the smallest point id. Collective.
     pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
         let pieces = self.find_pieces(self.unloaded_points());
         self.unheld_load(&pieces).map_or(Ok(()), |unheld| {

@@ -43,7 +43,7 @@ pub struct LoadStep {
     /// Number of iterations since bonds last broke in this load step, or since its start.
     pub since_breaking: u64,
     /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
-    /// point. It is 0 if f is round-off, and NaN before the first load step.
+    /// point. The residual is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation; NaN if all points are at rest.
     pub(super) damping: f64,
@@ -253,8 +253,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Break the bonds that reach their criterion at the present equilibrium. If no bond breaks, the load
-    /// step is finished. Returns whether any bond broke. If so, the forces no longer include those of the
-    /// broken bonds, and the reactions must be recomputed.
+    /// step is finished. Returns whether any bond broke. If so, the forces no longer include broken bonds,
+    /// and the reactions must be recomputed. Collective.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;
@@ -283,6 +283,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Raise `scale` to the norms of loads and reactions at the present equilibrium, if they are larger.
+    /// Collective.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, mut reactions] = sums(model, fields, |point, _| {
@@ -298,10 +299,11 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.scale = self.load_step.scale.max(scale);
     }
 
-    /// Return an error if the load step has failed. Collective.
+    /// Check that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// The message names a piece that has loads but no supports, or the residual if there is no such piece.
+    /// If the load step has failed. The message names a piece that has loads but no supports, or the residual
+    /// if there is no such piece.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.load_step.has_failed {
             return Ok(());

@@ -211,7 +211,7 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Begin a load step, and compute the residual at the predicted positions.
+    /// Begin a load step, and compute the residual at the predicted positions. Collective.
     fn begin_load_step(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let follows_the_last = !simulation.clock.is_new_size() && !simulation.load_step.has_broken;
         self.refresh(simulation);
@@ -224,7 +224,7 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Make the first iteration of a load step, linearized about the last equilibrium.
+    /// Make the first iteration of a load step, linearized about the last equilibrium. Collective.
     fn predict(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let owned = simulation.model.owned();
         let fields = &mut simulation.fields;
@@ -252,6 +252,7 @@ impl<const D: usize> Vectors<D> {
     }
 
     /// Make one Newton iteration: solve K x = f, move the points along x by the line search, and adapt η.
+    /// Collective.
     fn iterate(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         simulation.load_step.iterations += 1;
         simulation.load_step.since_breaking += 1;
@@ -387,7 +388,8 @@ impl<const D: usize> Vectors<D> {
     }
 
     /// Move the points along x until |x·f| is at most 0.9 of its first value, and compute the residual at the
-    /// new positions. Returns ‖f‖, N. Collective.
+    /// new positions. The search also ends if the residual is within the tolerance, if x·f is not positive at
+    /// first, or after `MAX_LINE_SEARCH_STEPS` step lengths. Returns ‖f‖, N. Collective.
     fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
         let at_base = dot(simulation, &self.force, &self.correction);
         let mut length = 1.0;
@@ -434,7 +436,8 @@ impl<const D: usize> Vectors<D> {
         reduce(simulation.comm, &mut { power })[0]
     }
 
-    /// Recompute the preconditioner if bonds have broken since its last computation. Collective.
+    /// Compute the preconditioner at the first call, and if bonds have broken since its last computation.
+    /// Collective.
     fn refresh(&mut self, simulation: &mut Simulation<'_, D>) {
         if !std::mem::take(&mut self.is_stale) {
             return;

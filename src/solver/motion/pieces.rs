@@ -44,8 +44,8 @@ impl<const D: usize> Simulation<'_, D> {
         all
     }
 
-    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]; the
-    /// supports are those of the present stage. Collective.
+    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]. The
+    /// supports of the present stage apply. Collective.
     pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {
@@ -93,8 +93,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Describe a piece in two texts: the name of a body that it belongs to; its size and the position of a
-    /// point. Collective.
+    /// Describe a piece in two texts: the name of a body to which the piece belongs; the size of the piece
+    /// and the position of one of its points. Collective.
     pub(super) fn describe_piece(&self, piece: &Piece) -> [String; 2] {
         let ids = &self.model.ids;
         let named = piece.points.iter().find(|k| ids[**k] == piece.first);

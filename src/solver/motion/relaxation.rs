@@ -139,7 +139,7 @@ impl<const D: usize> Simulation<'_, D> {
         Before { power, inertia }
     }
 
-    /// Compute damping and residual from the forces at the new positions.
+    /// Compute damping and residual from the forces at the new positions. Collective.
     fn look(&mut self, before: Option<Before>) {
         let (model, fields) = (&self.model, &self.fields);
         let [power, free, loads, reactions, stiffness] = sums(model, fields, |point, density| {

@@ -29,8 +29,8 @@ pub struct Saved {
 /// Column of one component of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedColumn {
-    /// Name of the field and index of the component. For a count of newly broken bonds, the name of the
-    /// further result.
+    /// Name of the field, `_`, and index of the component. For a count of newly broken bonds of a further
+    /// result: `newly_broken_of_` and the name of this result.
     pub name: String,
     /// Values of the points, ordered by id.
     pub values: Vec<f64>,

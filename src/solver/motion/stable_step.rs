@@ -13,7 +13,7 @@ use crate::comm::{self, Communicator};
 use crate::solver::model::Model;
 
 /// Return the stable step over all ranks, s; infinite if no point has a bond. `stiffness` is D of each owned
-/// point (N/m⁴) as columns xx, yy, zz, xy, yz, xz.
+/// point (N/m⁴) as columns xx, yy, zz, xy, yz, xz. Collective.
 pub fn stable_step<const D: usize>(
     comm: &dyn Communicator,
     model: &Model<D>,

@@ -68,6 +68,7 @@ pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bo
 
 /// Apply [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next step in one loop. The steps
 /// have the same length (s), and there is no damping. The results are bitwise the same as with two loops.
+/// Returns whether all velocities between both half kicks are finite.
 pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
     for_each_component(part, |place, velocity, force, (density, _)| {
         let half_kick = 0.5 * step * (force / density);
@@ -79,8 +80,8 @@ pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool
     })
 }
 
-/// Call `work` with displacement (m), velocity (m/s) and force density (N/m³) of each component of each
-/// point. Returns whether all calls returned true.
+/// Call `work` with displacement (m), velocity (m/s), force density (N/m³) and constants, for each component
+/// of each point. Returns whether all calls returned true.
 fn for_each_component<const D: usize>(
     part: &mut Part<'_, D>,
     work: impl Fn(&mut f64, &mut f64, f64, Constants) -> bool,

@@ -45,8 +45,8 @@ pub type Branch = Vec<Vertex>;
 pub struct Reach {
     /// Points up to this distance apart are connected, m.
     pub link: f64,
-    /// Length of a section, m; at least `link`. Shorter branches are dropped. Paths begin at the points up to
-    /// this distance from the start of the crack.
+    /// Length of a section, m; at least `link`. Shorter branches are dropped. Paths begin at all points
+    /// within one section length of the start of the crack.
     pub section_length: f64,
 }
 
@@ -58,7 +58,7 @@ pub fn length(branches: &[Branch]) -> f64 {
 }
 
 /// Find the branches of a crack that starts at `from` (m). The first branch has the longest path to its tip.
-/// The result is empty if no point is near the start. It depends only on the points and their order.
+/// The result is empty if no point is near the start. The result depends only on the points and their order.
 pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch> {
     let places: Vec<[f64; 3]> = points.iter().map(|point| point.place).collect();
     let bins = Bins::new(&places, reach.link * (1.0 + TOLERANCE));
@@ -79,7 +79,7 @@ struct Ways {
 }
 
 /// A candidate for the next reached point. The order makes the candidate with the shortest path the greatest;
-/// equal ones are ordered by index, the lowest first.
+/// among equal paths, the candidate with the lowest index is the greatest.
 #[derive(PartialEq)]
 struct Next {
     length: f64,
@@ -215,7 +215,7 @@ fn drop_stubs(parts: &mut [Part]) {
             parts[*last].members.sort_unstable();
             kept.push(*last);
         }
-        // The child with the longest path comes first; equal ones are ordered by their index.
+        // The child with the longest path comes first; children with equal paths are ordered by their index.
         kept.sort_by(|a, b| {
             let order = parts[*b].farthest.total_cmp(&parts[*a].farthest);
             order.then(a.cmp(b))

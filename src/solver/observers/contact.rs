@@ -23,8 +23,8 @@ const CELL: f64 = 8.0;
 /// the initial distance.
 const NEARER: f64 = 0.9;
 
-/// Two points of bodies that bonds joined count if their distance is below this fraction of their spacing and
-/// of their initial distance. Compression alone rarely reaches this distance.
+/// If bonds joined two bodies, two of their points are too near if their distance is below this fraction of
+/// their spacing and of their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Number of points that one task processes.
@@ -151,6 +151,7 @@ impl ContactWatch {
     }
 
     /// Find the pairs of bodies whose bounding boxes overlap or are at most the mean of their spacings apart.
+    /// Collective.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();
@@ -209,7 +210,8 @@ fn place_of<const D: usize>(
     place
 }
 
-/// Select the owned points in the boxes where bodies may touch, packed for each rank.
+/// Select the owned points in the boxes where bodies may touch, packed for each rank. If bonds joined the
+/// bodies, select only points with broken bonds.
 fn candidates<const D: usize>(
     simulation: &Simulation<'_, D>,
     meetings: &[Meeting],
@@ -272,8 +274,8 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
     homes
 }
 
-/// Find the nearest two of the given points of two bodies; `None` if their distance is not below the limit
-/// for their spacing.
+/// Find the nearest pair among the given points of two bodies. Only pairs whose distance is below the limit
+/// for their spacing and their reference distance count; `None` if there is no such pair.
 fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
     if first.is_empty() || second.is_empty() {
         return None;

@@ -27,11 +27,13 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region.
+    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region, or
+    /// if no damaged points are around it.
     ///
     /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
-    /// ⊗ g over these points and the point itself, 1/m². `mean` is the mean ξ̄ of the point's family, m.
-    /// `radius` is the radius of the family, m.
+    /// ⊗ g over these points and the point itself, 1/m²; g is the result of
+    /// [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `mean` is the mean ξ̄ of the point's
+    /// family, m. `radius` is the radius of the family, m.
     ///
     /// At the edge, the damaged points lie on one side of the family, and no damaged point lies in the cone
     /// ahead.

@@ -5,8 +5,8 @@ use crate::problem::{CrackPath, Problem};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
-/// Distance, in horizons, up to which damaged points are connected. It bridges a gap of one point in a row,
-/// but branches soon separate.
+/// Distance, in horizons, up to which damaged points are connected. This distance bridges a gap of one point
+/// in a row, but branches soon separate.
 const LINK: f64 = 2.0 / 3.0;
 
 /// Find the owned points of the set of a crack. Collective.

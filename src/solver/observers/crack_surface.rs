@@ -1,9 +1,9 @@
 //! Crack surfaces in 3-D: area and front of the crack that starts at a given position.
 //!
 //! Let H be 1 on one side of a crack and 0 on the other. The integral of |∇H| over the volume is the area of
-//! the crack. At point i, the gradient g of H is that of a linear function fitted to H by least squares. The
-//! fit has the weights ω Ṽ. H is 1 at neighbours j with a broken bond ij, and 0 at the other neighbours. With
-//! the mean ξ̄ of the family,
+//! the crack. At point i, the gradient g of H is the gradient of a linear function fitted to H by least
+//! squares. The fit has the weights ω Ṽ. H is 1 at neighbours j with a broken bond ij, and 0 at the other
+//! neighbours. With the mean ξ̄ of the family,
 //!
 //! g = C⁻¹ Σ_broken (ξ − ξ̄) ω Ṽ,   C = Σ (ξ − ξ̄) ⊗ (ξ − ξ̄) ω Ṽ over all bonds,   area = Σ |g| V.
 //!
@@ -62,7 +62,8 @@ pub struct Surface {
     /// Largest distance between the start of the crack and a damaged point of the crack, m; 0 without damaged
     /// points.
     pub reach: f64,
-    /// Positions of the points of the front, m, in the order of their ids.
+    /// Positions of the points of the front, moved to the mid-plane of the crack, m. They are in the order of
+    /// the ids of the points.
     pub front: Vec<[f64; 3]>,
 }
 

@@ -35,7 +35,7 @@ impl Cracked {
         cracked
     }
 
-    /// Corners (m) of the bounding box of the cracked points of all ranks; NaN if there are none.
+    /// Corners (m) of the bounding box of the cracked points of all ranks; NaN if there are none. Collective.
     pub fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
         comm::min(comm, &mut self.lower);
         comm.max(&mut self.upper);

@@ -99,11 +99,12 @@ pub struct HistoryRow {
 }
 
 impl HistoryObserver {
-    /// Find the points of all sets, probes, fronts, crack paths and tips of the history.
+    /// Find the points of all sets, probes, fronts, cracks, tips and J integrals of the history. Collective.
     ///
     /// # Errors
     /// If a set is empty, if no point lies along the line of a front, if all points of a tip lie behind its
-    /// start, or if the bodies do not fill the box of a J integral. The error is the same on all ranks.
+    /// start, or if the box of a J integral contains no point or is too near to the end of the bodies. The
+    /// error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;
@@ -230,7 +231,8 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// Compute the present row. Collective.
+    /// Compute the present row. Afterwards, the largest number of broken bonds of a step is counted from 0
+    /// again. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

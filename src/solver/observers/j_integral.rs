@@ -6,8 +6,8 @@
 //!
 //! J = −(1/h) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
 //!
-//! In an equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010) over
-//! the boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
+//! In an equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010)
+//! over the boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
 
 use crate::comm;
 use crate::comm::sum::{ExactSum, reduce};
@@ -25,7 +25,7 @@ const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.
 pub struct JIntegrals {
-    /// Different directions of growth.
+    /// Directions of growth, each contained once.
     directions: Vec<[f64; 3]>,
     boxes: Vec<WeightedBox>,
 }
@@ -153,7 +153,7 @@ fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f64; 
 }
 
 /// Check that the box contains points, and that the bodies reach at least one horizon beyond it in the
-/// directions of the axes along which the crack grows.
+/// directions of the axes along which the crack grows. Collective.
 fn is_in_the_bodies<const D: usize>(
     simulation: &Simulation<'_, D>,
     rule: &JIntegral,

@@ -13,7 +13,7 @@ pub struct Nearest {
     pub position: [f64; 3],
     /// Distance from the given position, m.
     pub distance: f64,
-    /// Local index on the rank that owns the point.
+    /// Local index on the rank that owns the point; `None` on other ranks.
     pub own: Option<usize>,
 }
 

@@ -59,9 +59,9 @@ impl Course {
         total(comm, self.points.len() as u64) == 0
     }
 
-    /// Find how far the points whose `value` exceeds the threshold extend along the line. `value` is given by
-    /// local index. The result is `None` if no value exceeds the threshold. It is bitwise the same for any
-    /// number of ranks. Collective.
+    /// Find how far the points whose `value` exceeds the threshold extend along the line. `value` returns the
+    /// value of a point, given its local index. The result is `None` if no value exceeds the threshold. The
+    /// result is bitwise the same for any number of ranks. Collective.
     ///
     /// The search starts at the farthest point above the threshold; if several are equally far, at the one
     /// with the smallest id. The next points are the nearest points ahead of this point, within one horizon.

@@ -19,7 +19,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Take a snapshot of a run. The forces must be those of the present positions.
+    /// Take a snapshot of a run. The forces must have been evaluated at the present positions.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.stored(&simulation.model);
         stored.softened = simulation.forces.softened(&simulation.model);
@@ -58,7 +58,7 @@ impl Snapshot {
     }
 
     /// Compute a field over the owned points at the time of the snapshot. The values are ordered by point,
-    /// with [`Field::components`] entries per point.
+    /// with [`Field::components`] entries per point. Some fields need messages between ranks. Collective.
     pub fn field<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -260,8 +260,9 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_settin
     share * (in_setting - D as f64 * free) + 3.0 * free
 }
 
-/// Thermal stretch of an owned point that can expand freely perpendicular to the plane or bar, or in 3-D. It
-/// is 0 under plane or uniaxial strain, because the determinant of F is then that of the 3-D deformation.
+/// Thermal stretch of an owned point in 3-D, in plane stress, or in a bar that can expand sideways; 0 without
+/// temperatures. Under plane or uniaxial strain, the result is 0, because the determinant of F is then also
+/// the determinant of the 3-D deformation.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],

@@ -30,7 +30,8 @@ impl Tip {
     /// Find the points of the set in which the tip is tracked. Collective.
     ///
     /// # Errors
-    /// If the set is empty or lies behind the start; the error is the same on all ranks.
+    /// If the set is empty, or all its points lie behind the start of the line; the error is the same on all
+    /// ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::Tip,
@@ -95,11 +96,11 @@ impl Tip {
 ///
 /// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
 /// latest row in which the crack was at least one horizon shorter. If there is no such row, it begins at the
-/// latest row with the initial length.
+/// latest row in which the crack was not longer than at first.
 ///
 /// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
 /// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
-/// speed falls as one horizon divided by the length of the interval.
+/// speed falls as one horizon divided by the duration of the interval.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.

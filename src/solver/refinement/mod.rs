@@ -45,7 +45,8 @@ pub struct Regridded {
 pub struct Refined {
     /// Kinetic and strain energy that refinements have added, J; negative if they have removed energy.
     pub energy: f64,
-    /// Number of intact bonds that refinements have added, minus those removed. Each bond counts twice.
+    /// Number of intact bonds that refinements have added, minus the number of removed bonds. Each bond
+    /// counts twice.
     pub bonds: i64,
 }
 
@@ -80,7 +81,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Check that the bonds of new points can get a state.
     ///
     /// # Errors
-    /// If bonds have a history; the error is the same on all ranks.
+    /// If refinement can add points during the run, and bonds have a history; the error is the same on all
+    /// ranks.
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
         let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
                        have not; refine `[refinement.region]` from the start";
@@ -104,8 +106,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// numbers of created and removed points; `None` if the grids do not change. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -145,6 +147,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Sum kinetic and strain energy (J) over all ranks, and count the intact bonds; each bond counts twice.
+    /// Collective.
     fn held(&self, snapshot: &Snapshot) -> (f64, u64) {
         let sums = point_sums(self, snapshot);
         // Both energies are in one sum, which is rounded once.
@@ -157,8 +160,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Continue the run on other grids, with the state of all points and bonds. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -200,7 +203,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         grids.points(grids.unrefined(coarse))
     }
 
-    /// Create the run on other grids, at time 0.
+    /// Create the run on other grids, at time 0. Collective.
     fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
         Self::of_points(self.problem, self.comm, (pieces, grids), None, &mut || {
             Ok(())
@@ -210,8 +213,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Restore the grids that an earlier part of the run had refined, at time 0. Collective.
     ///
     /// # Errors
-    /// If METIS fails; the error is the same on all ranks. The run cannot continue, because its points are
-    /// freed.
+    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
+    /// The run cannot continue, because its points are freed.
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
@@ -257,7 +260,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Break the bonds that were broken before the refinement, and new bonds that cross facets. The last
-    /// number of a row is the previous block of the point.
+    /// number of a row is the previous block of the point. Collective.
     fn inherit(
         &mut self,
         rows: &[f64],
@@ -323,8 +326,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.forces.cut(|point| concerned[point], cut);
     }
 
-    /// Set the state of the owned points from rows. The last number of a row is the previous block, which is
-    /// not part of the state.
+    /// Set the state of the owned points from rows. Fields of [`Birth::Shared`] are multiplied by the volume,
+    /// because rows contain their densities. The last number of a row is the previous block, which is not
+    /// part of the state.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
         let volume = &self.model.volume;
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);

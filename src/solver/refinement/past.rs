@@ -16,8 +16,8 @@ pub struct Past {
     pub columns: Vec<Vec<f64>>,
     /// For each column, the rule by which new points get their values.
     births: Vec<Birth>,
-    /// Local index by body and grid index (in steps of the finest level). It contains the points where one of
-    /// the grids is refined.
+    /// Local index by body and grid index (in steps of the finest level). The map contains only points at
+    /// which the grid before or after the refinement is refined.
     at: FxHashMap<(usize, GridIndex), usize>,
     /// Whether each local point is removed.
     leaves: Vec<bool>,
@@ -183,6 +183,7 @@ impl Past {
     }
 
     /// Index of the first number in the row of a new point. The row is the mean of the rows of its parents.
+    /// The entries for fields of [`Birth::FoundAnew`] are 0, and the entry for the block is [`NOWHERE`].
     fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
         if let Some(row) = born.at.get(&(body, place)) {
             return *row;

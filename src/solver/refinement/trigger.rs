@@ -29,15 +29,16 @@ pub struct Wanted {
 /// Smallest damage that is not round-off.
 const LEAST_DAMAGE: f64 = 1e-9;
 
-/// Maximum number of grid positions within the horizon of a finer point, for which coarsening is checked.
+/// Maximum number of grid positions in the box that encloses the horizon of a refined point. The search for
+/// coarser nodes visits all of these positions.
 const MOST_PLACES: f64 = 1e4;
 
 /// Check that a run supports the refinement of its problem.
 ///
 /// # Errors
-/// If horizons have very many spacings, or if loads or temperatures act on sets given by ids or by groups of
-/// meshes. For refinement during a run, also with scatter of the strength, with load steps, or with an
-/// adaptive step.
+/// If the horizon contains too many spacings, or if loads or temperatures act on sets given by ids or by
+/// groups of meshes. If refinement is triggered during the run, also if strengths scatter, or if the run has
+/// load steps or an adaptive step.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
@@ -120,8 +121,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Select nodes to refine at the points within the horizon of a triggering point. Select nodes to coarsen
-    /// at refined points for which this was not true for the time in the deck. The points must also have been
-    /// outside the horizons of points with broken bonds for this time. Collective.
+    /// at refined points that have been outside the horizons of triggering points, and of points with broken
+    /// bonds, for the time in the deck. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
         let pick = |block, position| self.grids.refining(block, position);
@@ -153,7 +154,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Return the nodes that `pick` selects for the blocks and positions of the marked points, over all
-    /// ranks.
+    /// ranks. Collective.
     fn picks(
         &self,
         marked: &[bool],
@@ -165,7 +166,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own.collect::<Vec<_>>())
     }
 
-    /// Mark the owned points that trigger refinement.
+    /// Mark the owned points that trigger refinement. Collective.
     fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
         let mut most = [0.0_f64];
@@ -195,7 +196,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (0..model.owned()).map(is_trigger).collect()
     }
 
-    /// Collect the marked points of all ranks with their horizons.
+    /// Collect the marked points of all ranks with their horizons. Collective.
     fn sources(&self, marked: impl Fn(usize) -> bool) -> Vec<Source> {
         let model = &self.model;
         let own = (0..model.owned()).filter(|point| marked(*point));
