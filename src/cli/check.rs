@@ -22,7 +22,7 @@ const MAX_CELLS: f64 = 1e7;
 const MAX_POINTS: f64 = 2e6;
 const MAX_BONDS: f64 = 1.5e8;
 
-/// Validate the decks and print their figures.
+/// Validate the decks and print their numbers.
 ///
 /// # Errors
 /// If a deck is invalid or the output cannot be written.
@@ -154,9 +154,10 @@ fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<String>
     // Without a lattice body, the stable step is unknown.
     let time = if stable.is_finite() {
         let steps = choose_steps(problem, stable)?;
+        let first = problem.all_stages()[0].time;
         let clock = even_clock(problem, &steps);
         Some(TimeEstimate {
-            stable_step: stable,
+            stable_step: stable * first.density_scale.sqrt(),
             cost: Cost::estimate(problem, size, &clock),
             steps,
         })

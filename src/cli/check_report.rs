@@ -353,7 +353,7 @@ pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
         .as_ref()
         .map(|refinement| &refinement.trigger);
     let note = if matches!(trigger, Some(Some(_))) {
-        " at the start; what follows does not know how many are born"
+        " at the start; the estimates below leave out points that refinement adds"
     } else {
         ""
     };
@@ -457,7 +457,7 @@ pub fn run_time(
     ranks: u32,
 ) {
     let threads = rayon::current_num_threads();
-    let on = format!("{ranks} rank(s) × {threads} thread(s) like these");
+    let on = format!("{ranks} rank(s) × {threads} thread(s) of this machine");
     let seconds = seconds / f64::from(ranks);
     let stages = problem.all_stages();
     let explicit = stages.iter().zip(steps);

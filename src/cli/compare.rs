@@ -21,7 +21,7 @@ use super::{Verbosity, outln, print, result_file};
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  fissure compare out/today out/yesterday                  equal to the bit?
+  fissure compare out/today out/yesterday                  bit-identical?
   fissure compare out/new out/old --tolerance 1e-9         up to round-off?
   fissure compare out/new out/old --tolerance 1e-9 --tolerance damage=0.02
   fissure compare out/a out/b --tolerance rank=inf         do not compare the field `rank`
@@ -38,7 +38,7 @@ pub struct CompareArguments {
     second: PathBuf,
 
     /// Allowed difference, relative to the largest value of a field or column in A. NAME=VALUE applies to one
-    /// field or column. May be repeated [default: 0, equal to the bit].
+    /// field or column. May be repeated [default: 0, bit-identical].
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }

@@ -53,7 +53,7 @@ use fissure::error::{Error, Result};
 
 /// Peridynamics for batch jobs: cracks that start, run and branch by themselves.
 ///
-/// A deck, which is a TOML file, describes a run. Results are equal to the bit on any number of MPI ranks and
+/// A deck, which is a TOML file, describes a run. Results are bit-identical on any number of MPI ranks and
 /// threads.
 #[derive(Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
@@ -69,7 +69,7 @@ Examples:
   fissure compare out/plate out/before          the differences between two results
   fissure sweep plate.toml --set dx=2e-3,1e-3   the deck for several values
   fissure import disk_impact.yaml               a deck of Peridigm, PeriLab or LAMMPS
-  fissure bench                                 how fast this machine is at it
+  fissure bench                                 measure the speed of this machine
   fissure slurm hybrid > job.sbatch             a job script
 
 Exit codes: 0 done, 1 the run failed or the compared results differ, 2 the deck or the arguments are
@@ -116,9 +116,9 @@ Examples:
   fissure run plate.toml --threads 8 --output /scratch/plate
   mpirun -n 2 --bind-to none fissure run plate.toml --threads 4
   srun fissure run plate.toml                   in a Slurm job, see slurm/
-  fissure run plate.toml --restart              go on from the last checkpoint
+  fissure run plate.toml --restart              continue from the last checkpoint
   fissure run plate.toml --set tension=20e6     another value of a parameter of the deck
-  fissure run plate.toml --set time.safety=0.4  another value of any key, or one that is missing
+  fissure run plate.toml --set time.safety=0.4  another value of any key, also one that the deck lacks
   fissure run plate.toml --with slow.toml       the keys of another deck over those of this one
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
@@ -127,7 +127,7 @@ The loops use the largest vector instruction set that all ranks have; AVX-512 an
 FISSURE_INSTRUCTIONS (avx2, avx512) limits it.
 
 SIGTERM, SIGINT or SIGUSR1 to any rank: within a few steps, the run writes a checkpoint and ends with exit
-code 75. Another signal more than a second later ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
+code 75. Another signal more than a second later ends the rank at once. SIGUSR2: write a checkpoint and continue.")]
 struct RunArguments {
     /// Deck to run.
     deck: PathBuf,
@@ -173,7 +173,7 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
-/// Validate decks and print their figures, without running them.
+/// Validate decks and print their numbers (mass, bonds, step, memory, time), without running them.
 ///
 /// Creates the points and finds the bonds on this machine. If a deck is too large for that, the numbers of
 /// points and bonds are estimated.

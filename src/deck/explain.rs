@@ -60,8 +60,14 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     };
     grid.volume_correction
         .get_or_insert(Spanned::new(0..0, correction));
-    let zeros = vec![default_number(0.0); problem.dimension.count()];
-    grid.origin = grid.origin.take().or(Some(Spanned::new(0..0, zeros)));
+    grid.origin = grid.origin.take().or_else(|| {
+        let origin = common_origin(problem)?;
+        let origin = &origin[..problem.dimension.count()];
+        Some(Spanned::new(
+            0..0,
+            origin.iter().copied().map(default_number).collect(),
+        ))
+    });
     for body in deck.body.values_mut().map(|body| body.get_mut()) {
         if body.shape.is_some() {
             body.spacing = body.spacing.take().or(grid.spacing.clone());
@@ -146,6 +152,19 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         let threshold = history.damage_threshold.clone();
         tip.threshold = tip.threshold.take().or(threshold);
     }
+}
+
+/// Return the grid origin of all lattice bodies, m; `None` if their origins differ.
+///
+/// Without `origin`, the origin is chosen for each spacing, so bodies of different spacings may have different
+/// origins. One key cannot express these.
+fn common_origin(problem: &Problem) -> Option<[f64; 3]> {
+    let mut origins = problem.bodies.iter().filter_map(|body| match &body.points {
+        problem::PointSource::Lattice { origin, .. } => Some(*origin),
+        problem::PointSource::File { .. } | problem::PointSource::Mesh { .. } => None,
+    });
+    let first = origins.next().unwrap_or_default();
+    origins.all(|origin| origin == first).then_some(first)
 }
 
 /// Put the keys of a law in the order of the grammar, and add missing keys with their defaults.

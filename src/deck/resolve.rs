@@ -236,12 +236,15 @@ impl<'a> Scope<'a> {
     /// Evaluate a vector, and scale it to unit length. A zero vector is an error.
     pub fn direction(&self, vector: &Vector, key: &str) -> Result<[f64; 3]> {
         let values = Vector3::from(self.vector(vector, key)?);
-        let length = values.dot(&values).sqrt();
-        if length > 0.0 {
-            Ok((values / length).into())
-        } else {
-            Err(self.error(vector.span(), format!("{key}: must not be zero")))
+        let largest = values.amax();
+        if largest == 0.0 {
+            return Err(self.error(vector.span(), format!("{key}: must not be zero")));
         }
+        // The squares of very large and very small components are not representable. A power of two does not
+        // change the digits.
+        let (_, exponent) = libm::frexp(largest);
+        let scaled = values.map(|value| libm::scalbn(value, -exponent));
+        Ok((scaled / scaled.dot(&scaled).sqrt()).into())
     }
 
     /// Return the index of the only given key among mutually exclusive keys. No key and several keys are

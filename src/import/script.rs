@@ -171,11 +171,18 @@ impl Variables {
         Ok(())
     }
 
-    /// Replace `$x`, `${name}` and `$(formula)`, also between quotes.
+    /// Replace `$x`, `${name}` and `$(formula)` outside quotes, as LAMMPS does.
     fn substitute(&self, text: &str) -> Result<String, String> {
         let mut result = String::new();
         let mut rest = text;
-        while let Some(at) = rest.find('$') {
+        while let Some(at) = rest.find(['$', '"', '\'']) {
+            if let Some(quote) = rest[at..].chars().next().filter(|c| *c != '$') {
+                let end = rest[at + 1..].find(quote).ok_or("a quote is not closed")?;
+                let (quoted, after) = rest.split_at(at + end + 2);
+                result.push_str(quoted);
+                rest = after;
+                continue;
+            }
             result.push_str(&rest[..at]);
             rest = &rest[at + 1..];
             let value = if let Some(inner) = rest.strip_prefix('{') {
@@ -324,13 +331,15 @@ mod tests {
     fn commands_are_joined_and_variables_replaced() {
         let text = "units si # metres\nvariable a equal 2*PI\nvariable n index 7\n\
                     fix 1 all indent 1e17 sphere 0 &\n  ${a} $n v_y # to here\n\
-                    timestep 1e-7\nvariable y0 equal 0.5\nvariable y equal \"v_y0 - step*dt*100\"\nrun $(10*v_n)\n";
+                    timestep 1e-7\nvariable y0 equal 0.5\nvariable y equal \"v_y0 - step*dt*100\"\n\
+                    fix 2 all print 9 \"$(step)\"\nrun $(10*v_n)\n";
         let script = parse(text).unwrap();
         let names: Vec<&str> = script.commands.iter().map(Command::name).collect();
         assert_eq!(
             names,
             [
-                "units", "variable", "variable", "fix", "timestep", "variable", "variable", "run"
+                "units", "variable", "variable", "fix", "timestep", "variable", "variable", "fix",
+                "run"
             ]
         );
         let fix = &script.commands[3];
@@ -338,7 +347,7 @@ mod tests {
         assert_eq!(fix.words[6..], ["0", "6.283185307179586", "7", "v_y"]);
         let variables = behind(&script);
         assert_eq!(variables.of_time("v_y").unwrap(), "0.5-t*100");
-        assert_eq!(script.commands[7].words[1], "70.0");
+        assert_eq!(script.commands[8].words[1], "70.0");
         assert_eq!(variables.step, Some(1e-7));
     }
 

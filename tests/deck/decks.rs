@@ -119,6 +119,57 @@ fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
     }
 }
 
+#[test]
+fn a_deck_with_its_defaults_written_out_has_the_same_grid() {
+    // Cells from 0 do not fill the first body, so the origins of the grids are in its corner.
+    let lower = |corner: &str, fine: &str| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.glass.pmb = {{ density = 2440, youngs_modulus = 72e9 }}
+            body.coarse = {{ material = 'glass', shape.box = {{ lower = {corner}, upper = [5.5, 5.5] }} }}
+            body.fine = {{ material = 'glass', spacing = {fine}, shape.box = {{ lower = [7.2, 0.3], upper = [9.2, 4.3] }} }}
+            time.end = 1e-5
+            "
+        );
+        let source = Source::new("tests/decks/good/deck.toml", text);
+        let full = deck::explain(&source).unwrap();
+        let full = Source::new("tests/decks/good/full.toml", full);
+        let points = |source: &Source| prepare(source).unwrap().0;
+        assert_eq!(points(&source), points(&full));
+        points(&full)
+    };
+    assert_eq!(lower("[0.5, 0.5]", "1"), 25 + 8);
+    assert_eq!(lower("[0.5, 0.5]", "0.5"), 25 + 32);
+    assert_eq!(lower("[0, 0.5]", "1"), 25 + 8);
+}
+
+#[test]
+fn a_direction_has_any_length_but_zero() {
+    let force = |direction: &str| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.glass.pmb = {{ density = 2440, youngs_modulus = 72e9 }}
+            body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [5, 5] }} }}
+            time.end = 1e-5
+            history.force.push = {{ set = 'plate', direction = {direction} }}
+            "
+        );
+        let deck = Deck::new(Source::new("tests/decks/good/deck.toml", text)).unwrap();
+        deck.problem()
+            .map(|problem| problem.history.support_forces[0].direction)
+    };
+    for direction in ["[3, 4]", "[3e-200, 4e-200]", "[3e200, 4e200]"] {
+        let [x, y, z] = force(direction).unwrap();
+        assert!(
+            (x - 0.6).abs() < 1e-15 && (y - 0.8).abs() < 1e-15 && z == 0.0,
+            "{direction}: {x} {y} {z}"
+        );
+    }
+    assert!(force("[0, 0]").is_err());
+}
+
 /// A random change of a deck's text; positions are fractions of the text.
 #[derive(Debug, Clone)]
 enum Change {

@@ -23,7 +23,7 @@ pub struct PictureArguments {
     #[arg(short, long, value_name = "NAME")]
     pub(super) component: Option<String>,
 
-    /// Factor on the drawn displacement, or `auto`.
+    /// Factor by which the drawn displacement is multiplied, or `auto`.
     #[arg(
         long,
         value_name = "FACTOR",
@@ -76,7 +76,7 @@ pub struct PictureArguments {
     #[arg(long, value_name = "FIELD")]
     pub(super) vectors: Option<String>,
 
-    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: damage for damage, else viridis].
+    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: damage for the field damage, otherwise viridis].
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 

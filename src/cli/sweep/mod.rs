@@ -38,7 +38,7 @@ A value with commas, such as [1, 2] or max(a, b), is one value.
 
 With a reference, the error of a value f is (f - reference)/|reference|, and its rate p over a
 parameter h is that of |f - reference| ~ h^p, from each run and the one before it. Without one, the
-rate is that of f - f0 ~ h^p from three successive runs, where f0 is unknown; it is there where h
+rate is that of f - f0 ~ h^p from three successive runs, where f0 is unknown; it is printed only if h
 changes a spacing, a horizon or a time step, or is named by --x.
 
 Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 stopped by a signal; the same
