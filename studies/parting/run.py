@@ -47,8 +47,7 @@ def main():
         panel.set_title(f"{law.replace('_', ' ')}, ν = {ratio}", fontsize=10)
         panel.set_ylim(0, 1.6)
         panel.set_xticks(range(0, 91, 15))
-    for panel in axes[1]:
-        panel.set_xlabel("angle between separation and normal of the crack, degrees (90: sliding)")
+    figure.supxlabel("angle between separation and normal of the crack, degrees (90: sliding)", fontsize=10)
     for panel in axes[:, 0]:
         panel.set_ylabel("separation energy / fracture energy")
     axes[0, 0].legend(fontsize=8, loc="lower left")
