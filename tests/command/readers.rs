@@ -57,7 +57,7 @@ fn vtk_and_h5py_agree() {
             let out = folder.join(format!("{dimension}-{ranks}"));
             let mut command = fissure(ranks);
             succeed(command.arg("run").arg(&deck).arg("--output").arg(&out));
-            let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/check_result.py");
+            let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scripts/check_result.py");
             let mut check = Command::new(&python);
             let output = finish(check.arg(script).arg(out.join("result.vtkhdf")));
             assert!(output.status.success(), "{}", text(&output));

@@ -86,7 +86,7 @@ fn a_rigid_sphere_on_a_half_space_has_the_force_of_hertz() {
     assert!(ratio > 1.3, "{coarse} {fine}");
 }
 
-/// Return the points of `inputs/sphere.csv` with n spacings in the radius, as `scripts/sphere_points` does.
+/// Return the points of `inputs/sphere.csv` with n spacings in the radius, as `inputs/sphere_points` does.
 fn sphere_points(n: usize) -> String {
     let spacing = 1.0 / n as f64;
     let centre = |i: usize| (i as f64 + 0.5) * spacing - 1.0;

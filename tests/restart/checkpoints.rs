@@ -131,7 +131,7 @@ fn killed_while_the_grid_grows_and_continued_on_any_number_of_ranks() {
 }
 
 /// Kill and restart runs of a deck. A checkpoint every 15 steps makes kills during a write likely.
-/// scripts/kill_test is the long form of this test.
+/// tests/scripts/kill_test is the long form of this test.
 fn survives_kills(name: &str, text: &str) {
     let kills: usize = std::env::var("FISSURE_KILLS").map_or(6, |text| text.parse().unwrap());
     let folder = Folder::new(name);

@@ -1,4 +1,4 @@
-"""Plots of scripts/scaling as SVG, without a plotting library."""
+"""Plots of benches/scaling as SVG, without a plotting library."""
 
 import math
 

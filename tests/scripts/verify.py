@@ -27,7 +27,7 @@ from pathlib import Path
 import fissure
 import numpy
 
-FOLDER = Path(__file__).resolve().parent.parent / "tests/decks/verification"
+FOLDER = Path(__file__).resolve().parent.parent / "decks/verification"
 # Column of each component.
 VECTOR = {"x": 0, "y": 1, "z": 2}
 SYMMETRIC = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
