@@ -1117,6 +1117,7 @@ fn damaged_files_of_gmsh_are_errors() {
 #[test]
 fn damaged_files_of_abaqus_are_errors() {
     survives_mutants("bracket.inp", ABAQUS.as_bytes(), 7);
+    survives_mutants("own.inp", OWN_MESHES.as_bytes(), 13);
 }
 
 #[test]
