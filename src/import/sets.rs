@@ -22,17 +22,18 @@ pub struct Sets<'n> {
     defined: Vec<Defined<'n>>,
     /// Sets of the mesh: name in the mesh and name in the new deck.
     of_mesh: Vec<(String, String)>,
-    /// Whether the points come from a mesh, which may have node sets.
-    has_mesh: bool,
+    /// Prefix of the names of sets of the mesh in the new deck; `None` if the points come from no mesh.
+    mesh_prefix: Option<&'static str>,
 }
 
 impl<'n> Sets<'n> {
-    /// Create an empty collection; `has_mesh` if the mesh may have node sets.
-    pub fn new(has_mesh: bool) -> Self {
+    /// Create an empty collection. `mesh_prefix` is the kind of the mesh's groups that are node sets, written
+    /// before their names; `None` without a mesh.
+    pub fn new(mesh_prefix: Option<&'static str>) -> Self {
         Self {
             defined: Vec::new(),
             of_mesh: Vec::new(),
-            has_mesh,
+            mesh_prefix,
         }
     }
 
@@ -73,7 +74,7 @@ impl<'n> Sets<'n> {
         if let Some((_, written)) = self.of_mesh.iter().find(|(known, _)| known == name) {
             return Ok(written.clone());
         }
-        if !self.has_mesh {
+        let Some(prefix) = self.mesh_prefix else {
             let mut message = format!("the deck defines no node set {}", excerpt(name));
             let declared = self.defined.iter().filter(|set| set.is_declared);
             let known: Vec<String> = declared.map(|set| excerpt(&set.name)).collect();
@@ -84,10 +85,10 @@ impl<'n> Sets<'n> {
                 message += "; node sets are parameters of `Boundary Conditions` with `Node Set` in their names";
             }
             return Err(translation.error(user.line, message));
-        }
+        };
         let written = translation.new_name("set", name);
         let mut section = Section::new(format!("set.{written}"));
-        section.set("mesh", Value::text(name));
+        section.set("mesh", Value::text(format!("{prefix}{name}")));
         translation.add(section);
         self.of_mesh.push((name.to_owned(), written.clone()));
         Ok(written)

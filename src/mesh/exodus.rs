@@ -138,6 +138,11 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         let order = order(kind);
         let connectivity = file.integers(&variable)?;
         let first = mesh.elements.len();
+        if kind.form == Form::Point {
+            let volumes = sphere_volumes(file, block, &name)?;
+            mesh.volumes.resize(first, 0.0);
+            mesh.volumes.extend(volumes);
+        }
         for element in connectivity.chunks_exact(each) {
             let index = mesh.elements.len();
             let number = numbers
@@ -186,6 +191,51 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         }
     }
     Ok(())
+}
+
+/// Return the volumes of a block of sphere elements; empty if the block has no volumes.
+///
+/// The volume is the attribute whose name ends with `volume`. In a block without names of attributes, the
+/// volume is the second attribute, as in the files of Peridigm, whose first attribute is a radius.
+fn sphere_volumes(file: &Netcdf, block: usize, name: &str) -> Fault<Vec<f64>> {
+    let [variable, names] = ["attrib", "attrib_name"].map(|prefix| format!("{prefix}{block}"));
+    if !file.has(&variable) {
+        return Ok(Vec::new());
+    }
+    let shape = file.shape(&variable)?;
+    let [_, each] = shape[..] else {
+        let message = format!("{variable}: must have an entry for each element and attribute");
+        return Err(message);
+    };
+    let names = if file.has(&names) {
+        file.texts(&names)?
+    } else {
+        Vec::new()
+    };
+    let named = names
+        .iter()
+        .position(|name| name.to_ascii_lowercase().ends_with("volume"));
+    let has_no_names = names.iter().all(String::is_empty);
+    let second = (has_no_names && each > 1).then_some(1);
+    let Some(column) = named.or(second).filter(|column| *column < each) else {
+        return Ok(Vec::new());
+    };
+    let attributes = file.reals(&variable)?;
+    let volumes: Vec<f64> = attributes
+        .chunks_exact(each)
+        .map(|attributes| attributes[column])
+        .collect();
+    let wrong = volumes
+        .iter()
+        .position(|volume| !(*volume > 0.0 && volume.is_finite()));
+    match wrong {
+        None => Ok(volumes),
+        Some(wrong) => Err(format!(
+            "block {name}: the volume of sphere {} of the block is {:e}, must be above 0",
+            wrong + 1,
+            volumes[wrong]
+        )),
+    }
 }
 
 /// Test whether a number lies between 1 and `count`.

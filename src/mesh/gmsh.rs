@@ -119,8 +119,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
         indices: FxHashMap::default(),
         names: FxHashMap::default(),
         physical: FxHashMap::default(),
-        groups: Vec::new(),
-        group_indices: FxHashMap::default(),
+        groups: Grouping::default(),
+        entities: Grouping::default(),
     };
     file.mesh.elements.continue_in(path);
     while let Some(section) = file.cursor.section()? {
@@ -141,9 +141,29 @@ struct File<'a> {
     names: FxHashMap<(i64, i64), String>,
     /// Tags of the physical groups of an entity, by its dimension and tag.
     physical: FxHashMap<(i64, i64), Vec<i64>>,
-    /// Elements of physical groups by dimension and tag, in the order of the file.
+    /// Elements of physical groups.
+    groups: Grouping,
+    /// Elements of geometrical entities.
+    entities: Grouping,
+}
+
+/// Elements by a dimension and a tag, in the order of the file.
+#[derive(Default)]
+struct Grouping {
     groups: Vec<((i64, i64), Runs)>,
-    group_indices: FxHashMap<(i64, i64), usize>,
+    indices: FxHashMap<(i64, i64), usize>,
+}
+
+impl Grouping {
+    fn add(&mut self, dimension: usize, tag: i64, element: u64) {
+        let key = (dimension as i64, tag);
+        let groups = &mut self.groups;
+        let index = *self.indices.entry(key).or_insert_with(|| {
+            groups.push((key, Runs::default()));
+            groups.len() - 1
+        });
+        groups[index].1.push(element);
+    }
 }
 
 impl File<'_> {
@@ -346,15 +366,15 @@ impl File<'_> {
         self.mesh.elements.push(*kind, (number, line), nodes);
     }
 
-    /// Add the last element to a physical group.
-    fn add_to_group(&mut self, dimension: usize, tag: i64) {
-        let key = (dimension as i64, tag);
-        let groups = &mut self.groups;
-        let index = *self.group_indices.entry(key).or_insert_with(|| {
-            groups.push((key, Runs::default()));
-            groups.len() - 1
-        });
-        groups[index].1.push(self.mesh.elements.len() as u64 - 1);
+    /// Add the last element to its geometrical entity and to its physical groups. The tag 0 means none.
+    fn add_to_groups(&mut self, dimension: usize, entity: i64, physical: &[i64]) {
+        let last = self.mesh.elements.len() as u64 - 1;
+        if entity != 0 {
+            self.entities.add(dimension, entity, last);
+        }
+        for tag in physical.iter().filter(|tag| **tag != 0) {
+            self.groups.add(dimension, *tag, last);
+        }
     }
 
     fn read_elements_2(&mut self) -> Result<()> {
@@ -380,11 +400,14 @@ impl File<'_> {
                 if is_binary {
                     number = self.cursor.int()?;
                 }
-                let mut physical = 0;
+                // The first tag is the physical group, the second tag is the geometrical entity.
+                let (mut physical, mut entity) = (0, 0);
                 for k in 0..tags {
                     let tag = self.cursor.int()?;
-                    if k == 0 {
-                        physical = tag.abs();
+                    match k {
+                        0 => physical = tag.abs(),
+                        1 => entity = tag.abs(),
+                        _ => {}
                     }
                 }
                 nodes.clear();
@@ -395,9 +418,7 @@ impl File<'_> {
                 if !self.repeats_last_element(found, &nodes) {
                     self.add_element(found, number as u64, &nodes);
                 }
-                if physical != 0 {
-                    self.add_to_group(found.0.dimension(), physical);
-                }
+                self.add_to_groups(found.0.dimension(), entity, &[physical]);
             }
             read += following;
         }
@@ -427,6 +448,7 @@ impl File<'_> {
             let found = self.kind(found)?;
             let count = self.cursor.size()?;
             let physical = self.physical.get(&(dimension, tag)).cloned();
+            let physical = physical.unwrap_or_default();
             for _ in 0..count {
                 let number = self.cursor.size()?;
                 nodes.clear();
@@ -435,16 +457,20 @@ impl File<'_> {
                     nodes.push(self.node(number, tag)?);
                 }
                 self.add_element(&found, number, &nodes);
-                for tag in physical.iter().flatten() {
-                    self.add_to_group(found.0.dimension(), *tag);
-                }
+                self.add_to_groups(found.0.dimension(), tag, &physical);
             }
         }
         Ok(())
     }
 
     fn finish(mut self) -> Result<Mesh> {
-        for (key, elements) in self.groups {
+        // Entities are the groups of the dimensions that have no physical group.
+        let physical = self.groups.groups;
+        let has_groups = |dimension| physical.iter().any(|(key, _)| key.0 == dimension);
+        let mut groups = self.entities.groups;
+        groups.retain(|(key, _)| !has_groups(key.0));
+        groups.extend(physical);
+        for (key, elements) in groups {
             self.mesh.groups.push(Group {
                 name: self.names.get(&key).cloned(),
                 number: Some(key.1),

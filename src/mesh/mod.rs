@@ -76,6 +76,9 @@ pub struct Mesh {
     pub nodes: Vec<[f64; 3]>,
     /// The elements, in the order of the file.
     pub elements: Elements,
+    /// Volumes of single-node elements by the index of the element, in the units of the file. The volume is 0
+    /// for all other elements, also for those beyond the end of the list.
+    volumes: Vec<f64>,
     /// Named or numbered groups of elements and of nodes.
     pub groups: Vec<Group>,
     /// Names of groups are matched without regard to case.
@@ -214,6 +217,19 @@ impl fmt::Display for GroupKey {
 }
 
 impl Mesh {
+    /// Return the volume that the file gives for a single-node element.
+    pub fn volume(&self, element: usize) -> Option<f64> {
+        self.volumes
+            .get(element)
+            .copied()
+            .filter(|volume| *volume > 0.0)
+    }
+
+    /// Test whether an element becomes a point of a problem with this number of dimensions.
+    pub fn is_solid(&self, element: usize, dimension: usize) -> bool {
+        self.elements.kind(element).dimension() == dimension || self.volume(element).is_some()
+    }
+
     /// Return the largest dimension of a group's elements; 0 for nodes.
     pub fn dimension(&self, group: &Group) -> usize {
         match &group.members {
@@ -298,12 +314,9 @@ impl Mesh {
         ))
     }
 
-    /// Return the names, or else the numbers, of the groups with a dimension that `wanted` accepts.
-    pub fn names(&self, wanted: impl Fn(usize) -> bool) -> Vec<String> {
-        let groups = self
-            .groups
-            .iter()
-            .filter(|group| wanted(self.dimension(group)));
+    /// Return the names, or else the numbers, of the groups that `wanted` accepts.
+    pub fn names(&self, wanted: impl Fn(&Group) -> bool) -> Vec<String> {
+        let groups = self.groups.iter().filter(|group| wanted(group));
         let name = |group: &Group| match (&group.name, group.number) {
             (Some(name), _) => Some(name.clone()),
             (None, number) => number.map(|number| number.to_string()),

@@ -37,8 +37,14 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
         for entry in words(row) {
             let id = entry.parse::<u64>().ok().filter(|id| *id >= first);
             let id = id.ok_or_else(|| {
+                let hint = match entry.parse::<u64>() {
+                    Ok(0) => format!(
+                        "; the first point has the number {first}; if the file counts from 0, set `first_id = 0`"
+                    ),
+                    _ => String::new(),
+                };
                 format!(
-                    "{name}:{line}: must contain numbers of points, {first} or more, has {}",
+                    "{name}:{line}: must contain numbers of points, {first} or more, has {}{hint}",
                     excerpt(entry)
                 )
             })?;

@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::comm::{Communicator, agree};
+use crate::dimension::Dimension;
 use crate::error::{Error, Result};
 use crate::mesh::{self, Format, Group, GroupKey, Members, Mesh, Runs};
 use crate::problem::{PointSource, Problem, Selector};
@@ -18,6 +19,10 @@ const NO_BODY: u16 = u16::MAX;
 
 /// Value for an element without a point.
 const NO_POINT: u32 = u32::MAX;
+
+/// End of a message about single-node elements without a volume.
+const NO_VOLUME: &str = "only single-node elements without a volume; sphere elements of an Exodus file need the \
+                         volume as an attribute with the name `volume`, or as their second attribute";
 
 /// Maximum number of corners of an element.
 const MOST_CORNERS: usize = 8;
@@ -177,7 +182,7 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     }
     Ok(Found {
         sets,
-        names: mesh.names(|own| own <= dimension),
+        names: mesh.names(|group| mesh.dimension(group) <= dimension),
         points,
     })
 }
@@ -185,7 +190,7 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
 /// The index of each element's body, or [`NO_BODY`].
 fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<Vec<u16>> {
     let dimension = problem.dimension.count();
-    let is_solid = |element: usize| mesh.elements.kind(element).dimension() == dimension;
+    let is_solid = |element: usize| mesh.is_solid(element, dimension);
     let mut bodies = vec![NO_BODY; mesh.elements.len()];
     for user in users {
         let Some(block) = user.block else { continue };
@@ -206,12 +211,16 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
             None => mesh.find(block, has_solids).map_err(ambiguous)?,
         };
         let Some(group) = group else {
-            let known = mesh.names(|own| own == dimension);
-            let message = format!(
-                "[body.{}] points block: the mesh has no group {block} of {dimension}-D elements{}",
-                problem.bodies[user.body].name,
-                mesh::suggestion(block, &known)
-            );
+            let body = &problem.bodies[user.body].name;
+            let message = if has_single_nodes(mesh, block) {
+                format!("[body.{body}] points block: {block} has {NO_VOLUME}")
+            } else {
+                let known = mesh.names(has_solids);
+                format!(
+                    "[body.{body}] points block: the mesh has no group {block} of {dimension}-D elements{}",
+                    mesh::suggestion(block, &known)
+                )
+            };
             return Err(Error::input(message).at(user.block_span));
         };
         let Members::Elements(elements) = &group.members else {
@@ -238,8 +247,24 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
                 *body = rest.body as u16;
             }
         }
+        let is_single = |element| mesh.elements.kind(element).dimension() == 0;
+        if (0..mesh.elements.len()).all(is_single) && !bodies.contains(&(rest.body as u16)) {
+            let body = &problem.bodies[rest.body].name;
+            let message = format!("[body.{body}] points mesh: the mesh has {NO_VOLUME}");
+            return Err(Error::input(message).at(rest.block_span));
+        }
     }
     Ok(bodies)
+}
+
+/// Test whether all elements of a block are single nodes.
+fn has_single_nodes(mesh: &Mesh, block: &GroupKey) -> bool {
+    let is_single = |group: &Group| match &group.members {
+        Members::Elements(_) => mesh.dimension(group) == 0,
+        Members::Nodes(_) => false,
+    };
+    mesh.find(block, is_single)
+        .is_ok_and(|group| group.is_some())
 }
 
 /// Generate the points of the elements that belong to bodies. Also return the point of each element, or
@@ -251,7 +276,6 @@ fn points(
     bodies: &[u16],
 ) -> Result<(Vec<Point>, Vec<u32>)> {
     let dimension = problem.dimension.count();
-    let thickness = problem.dimension.out_of_plane_measure();
     let mut scales = vec![1.0; problem.bodies.len()];
     for user in users {
         scales[user.body] = user.scale;
@@ -274,32 +298,12 @@ fn points(
         for node in &mut nodes {
             *node = node.map(|x| scale * x);
         }
-        let kind = mesh.elements.kind(element);
-        let measure = mesh::measure(kind, &nodes);
-        if measure.is_folded() {
-            let message = "det J changes sign; the nodes must follow the order of the format, and no part of the \
-                           element may be inverted";
-            return Err(mesh.elements.fault(element, message));
-        }
-        // A face or a line may have either orientation.
-        let size = if dimension < 3 {
-            measure.size.abs()
-        } else {
-            measure.size
+        let (volume, centroid) = match mesh.volume(element) {
+            Some(volume) => (volume * scale.powi(3), nodes[0]),
+            None => solid(mesh, element, &nodes, problem.dimension)?,
         };
-        let volume = size * thickness;
-        if !(volume > 0.0 && volume.is_finite()) {
-            let message = if dimension == 3 && size < 0.0 {
-                format!(
-                    "has the volume {volume:e} m³; its nodes are in the order of a mirrored element"
-                )
-            } else {
-                format!("has the volume {volume:e} m³, must be above 0")
-            };
-            return Err(mesh.elements.fault(element, message));
-        }
         let mut position = [0.0; 3];
-        position[..dimension].copy_from_slice(&measure.centroid[..dimension]);
+        position[..dimension].copy_from_slice(&centroid[..dimension]);
         point_of[element] = points.len() as u32;
         points.push(Point::new(
             points.len() as u64,
@@ -309,6 +313,40 @@ fn points(
         ));
     }
     Ok((points, point_of))
+}
+
+/// Return volume and centroid of an element. `nodes` are the positions of its nodes, m.
+fn solid(
+    mesh: &Mesh,
+    element: usize,
+    nodes: &[[f64; 3]],
+    dimension: Dimension,
+) -> Result<(f64, [f64; 3])> {
+    let measure = mesh::measure(mesh.elements.kind(element), nodes);
+    if measure.is_folded() {
+        let message = "det J changes sign; the nodes must follow the order of the format, and no part of the \
+                       element may be inverted";
+        return Err(mesh.elements.fault(element, message));
+    }
+    let is_solid = dimension.count() == 3;
+    // A face or a line may have either orientation.
+    let size = if is_solid {
+        measure.size
+    } else {
+        measure.size.abs()
+    };
+    let volume = size * dimension.out_of_plane_measure();
+    if !(volume > 0.0 && volume.is_finite()) {
+        let message = if is_solid && size < 0.0 {
+            format!(
+                "has the volume {volume:e} m³; its nodes are in the order of a mirrored element"
+            )
+        } else {
+            format!("has the volume {volume:e} m³, must be above 0")
+        };
+        return Err(mesh.elements.fault(element, message));
+    }
+    Ok((volume, measure.centroid))
 }
 
 /// Check that an element lies in the line or plane of the problem. The line or plane contains the first node
@@ -403,7 +441,7 @@ fn members(
         Members::Elements(elements) => {
             for element in elements.iter().map(|element| element as usize) {
                 let kind = mesh.elements.kind(element);
-                if kind.dimension() < dimension {
+                if kind.dimension() < dimension && !mesh.is_solid(element, dimension) {
                     let mut corners = mesh.elements.nodes(element)[..kind.corners()].to_vec();
                     corners.sort_unstable();
                     faces.push(corners);

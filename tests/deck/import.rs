@@ -5,6 +5,7 @@ use fissure::comm::threads;
 use fissure::deck::{Deck, Source};
 use fissure::import::log::Fate;
 use fissure::import::{Code, Import, translate};
+use fissure::points::{generate, set};
 use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::survey::dry_run;
@@ -781,6 +782,87 @@ fn materials_of_perilab_expand() {
     ] {
         assert!(on.text.contains(line), "{line}\n{}", on.text);
     }
+}
+
+/// Return a deck of PeriLab with a mesh and blocks of these numbers.
+fn perilab_mesh(kind: &str, file: &str, blocks: &[u32]) -> String {
+    let block = |id: &u32| {
+        format!(
+            "    block_{id}:\n      Block ID: {id}\n      Material Model: Alu\n      Density: 1\n      Horizon: 1.2\n"
+        )
+    };
+    let blocks: String = blocks.iter().map(block).collect();
+    format!(
+        "PeriLab:
+  Discretization:
+    Type: {kind}
+    Input Mesh File: {file}
+  Models:
+    Material Models:
+      Alu:
+        Material Model: PD Solid Elastic
+        Young's Modulus: 7.0e+4
+        Poisson's Ratio: 0.34
+  Blocks:
+{blocks}  Boundary Conditions:
+    Pull:
+      Variable: Displacements
+      Node Set: First
+      Coordinate: x
+      Value: 2*t
+  Solver:
+    Initial Time: 0.0
+    Final Time: 1.0e-6
+    Verlet:
+      Safety Factor: 1.0
+"
+    )
+}
+
+/// Blocks and node sets of an Abaqus mesh are element sets in PeriLab. The set of the condition is the last
+/// block.
+#[test]
+fn blocks_of_perilab_are_element_sets_of_abaqus() {
+    let folder = Folder::new("abaqus");
+    let mut nodes = String::new();
+    for x in 0..4 {
+        for (k, (y, z)) in [(0, 0), (1, 0), (1, 1), (0, 1)].iter().enumerate() {
+            nodes += &format!("{}, {x}., {y}., {z}.\n", 4 * x + k + 1);
+        }
+    }
+    let mut elements = String::new();
+    for element in 0..3 {
+        let corners =
+            [1, 2, 3, 4, 5, 6, 7, 8].map(|corner: usize| (corner + 4 * element).to_string());
+        elements += &format!("{}, {}\n", element + 1, corners.join(", "));
+    }
+    let mesh = format!(
+        "*Instance, name=bar-1, part=bar\n*Node\n{nodes}*Element, type=C3D8R\n{elements}*Nset, nset=First\n1, 2\n\
+         *Elset, elset=First\n1\n*Elset, elset=Rest, generate\n2, 3\n*End Instance\n"
+    );
+    folder.write("bar.inp", &mesh);
+    let imported = folder
+        .import("bar.yaml", &perilab_mesh("Abaqus", "bar.inp", &[1, 2]))
+        .unwrap();
+    let key = |block: u32| format!("PeriLab > Blocks > block_{block} > Block ID");
+    let (fate_of_id, note) = fate(&imported, &key(1));
+    assert_eq!(fate_of_id, Fate::Approximated);
+    assert!(note.contains("`Rest`"), "{note}");
+    let problem = folder.problem(&imported);
+    let found = dry_run(&problem, 1, false).unwrap();
+    assert_eq!(found.points, 3);
+    let (points, _) = generate(&problem, &threads::alone()).unwrap();
+    let blocks: Vec<u32> = points.iter().map(|point| point.block).collect();
+    assert_eq!(blocks, [1, 0, 0]);
+    let set = problem.sets.iter().find(|set| set.name == "first").unwrap();
+    let is_first = |id: &u64| set::contains(set, 1.0, *id, [0.0; 3], 0);
+    assert_eq!((0..3).filter(is_first).collect::<Vec<_>>(), [0]);
+    // The only block of a mesh has all elements.
+    let imported = folder
+        .import("bar.yaml", &perilab_mesh("Abaqus", "bar.inp", &[1]))
+        .unwrap();
+    let found = dry_run(&folder.problem(&imported), 1, false).unwrap();
+    assert_eq!(found.points, 3);
 }
 
 /// Steps of PeriLab: conditions of two steps, and settings that only one step has.

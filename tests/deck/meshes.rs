@@ -679,6 +679,42 @@ fn a_block_may_be_a_number_and_a_body_without_one_gets_the_rest() {
 }
 
 #[test]
+fn entities_are_the_groups_of_a_mesh_without_physical_groups() {
+    let folder = Folder::new("mesh-entities");
+    let mut written = two_cubes();
+    written.names.clear();
+    for (_, physical, ..) in &mut written.elements {
+        *physical = 0;
+    }
+    // The cubes are the volumes 1 and 2, and the faces have a physical group.
+    written.elements[0].1 = 7;
+    for (encoding, bytes) in written.all() {
+        let path = folder.write("two.msh", &bytes);
+        let deck = format!(
+            "dimension = '3d'\ngrid.horizon = 1\ntime.end = 1\n\
+             material.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n\
+             set.face.mesh = 'surface 7'\nset.edge.mesh = 'curve 1'\n\
+             [body.b]\nmaterial = 'a'\npoints = {{ mesh = '{0}', block = 2 }}\n\
+             [body.a]\nmaterial = 'a'\npoints = {{ mesh = '{0}', block = 'volume 1' }}\n",
+            path.display()
+        );
+        let problem = problem(&deck);
+        let found = points(&problem);
+        let blocks: Vec<u32> = found.iter().map(|(_, _, block)| *block).collect();
+        assert_eq!(blocks, [1, 0], "{encoding}");
+        assert_eq!(ids(&problem, "face"), [0], "{encoding}");
+        assert_eq!(ids(&problem, "edge"), [1], "{encoding}");
+        // The tag of a surface without a physical group is no group, because another surface has one.
+        let mesh = parse("two.msh", &bytes).unwrap();
+        let second = GroupKey::Name("surface 2".to_owned());
+        assert!(
+            mesh.find(&second, |_| true).unwrap().is_none(),
+            "{encoding}"
+        );
+    }
+}
+
+#[test]
 fn version_2_repeats_an_element_for_each_of_its_groups() {
     let folder = Folder::new("mesh-repeated");
     let mut written = two_cubes();
@@ -791,6 +827,79 @@ fn parts_instances_and_sets_of_abaqus() {
     }
 }
 
+/// The second instance has a mesh of its own, its part has none, and the file does not list the part of the
+/// third instance.
+const OWN_MESHES: &str = "\
+*Part, name=Meshed
+*Node
+ 1, 0., 0., 0.
+ 2, 1., 0., 0.
+ 3, 1., 1., 0.
+ 4, 0., 1., 0.
+ 5, 0., 0., 1.
+ 6, 1., 0., 1.
+ 7, 1., 1., 1.
+ 8, 0., 1., 1.
+*Element, type=C3D8, elset=Cube
+ 1, 1, 2, 3, 4, 5, 6, 7, 8
+*End Part
+*Part, name=Bare
+*End Part
+*Assembly, name=Assembly
+*Instance, name=First, part=Meshed
+*End Instance
+*Instance, name=Second, part=Bare
+ 4., 0., 0.
+*Node
+ 1, 0., 0., 0.
+ 2, 1., 0., 0.
+ 3, 1., 1., 0.
+ 4, 0., 1., 0.
+ 5, 0., 0., 1.
+ 6, 1., 0., 1.
+ 7, 1., 1., 1.
+ 8, 0., 1., 1.
+*Element, type=C3D8, elset=Cube
+ 7, 1, 2, 3, 4, 5, 6, 7, 8
+*End Instance
+*Instance, name=Third, part=Elsewhere
+*Node
+ 1, 0., 6., 0.
+ 2, 1., 6., 0.
+ 3, 1., 7., 0.
+ 4, 0., 7., 0.
+ 5, 0., 6., 1.
+ 6, 1., 6., 1.
+ 7, 1., 7., 1.
+ 8, 0., 7., 1.
+*Element, type=C3D8R
+ 1, 1, 2, 3, 4, 5, 6, 7, 8
+*Nset, nset=Top, generate
+ 5, 8
+*End Instance
+*Elset, elset=Seventh, instance=Second
+ 7
+*End Assembly
+";
+
+#[test]
+fn an_instance_of_abaqus_may_have_its_own_mesh() {
+    let folder = Folder::new("mesh-own");
+    let path = folder.write("own.inp", OWN_MESHES);
+    let problem = solid(&path, &["Second", "Third", "Seventh", "Cube", "Third.Top"]);
+    let expected = [[0.5, 0.5, 0.5], [4.5, 0.5, 0.5], [0.5, 6.5, 0.5]];
+    assert_unit_cubes(&points(&problem), &expected);
+    for (set, expected) in [
+        ("Second", &[1][..]),
+        ("Third", &[2]),
+        ("Seventh", &[1]),
+        ("Cube", &[0, 1]),
+        ("Third.Top", &[2]),
+    ] {
+        assert_eq!(ids(&problem, set), expected, "{set}");
+    }
+}
+
 #[test]
 fn files_of_abaqus_include_others() {
     let folder = Folder::new("mesh-include");
@@ -897,8 +1006,8 @@ fn damaged_lines_of_abaqus_have_their_message() {
             "a.inp:6: GENERATE: needs first ≤ last and a step of at least 1",
         ),
         (
-            "*INSTANCE, PART=p\n",
-            "a.inp:1: *INSTANCE: there is no part `p`",
+            "*INSTANCE, PART=p\n*END INSTANCE\n",
+            "a.inp:1: *INSTANCE: there is no part `p`, and the instance has no nodes of its own",
         ),
         (
             "*PART, NAME=p\n*PART, NAME=q\n",
@@ -1008,6 +1117,7 @@ fn damaged_files_of_gmsh_are_errors() {
 #[test]
 fn damaged_files_of_abaqus_are_errors() {
     survives_mutants("bracket.inp", ABAQUS.as_bytes(), 7);
+    survives_mutants("own.inp", OWN_MESHES.as_bytes(), 13);
 }
 
 #[test]
@@ -1318,8 +1428,10 @@ fn damaged_files_of_vtk_are_errors() {
 
 /// The variables of a small Exodus file: the two cubes of [`two_cubes`] as blocks, a node set and a side set.
 struct Exodus {
-    /// Name and coordinates.
-    reals: Vec<(&'static str, Vec<f64>)>,
+    /// Type of the elements of all blocks.
+    element: &'static str,
+    /// Name, lengths, values.
+    reals: Vec<(&'static str, Vec<usize>, Vec<f64>)>,
     /// Name, lengths, values.
     integers: Vec<(&'static str, Vec<usize>, Vec<i32>)>,
     /// Name and rows.
@@ -1332,6 +1444,7 @@ const NAME: usize = 33;
 fn exodus() -> Exodus {
     let written = two_cubes();
     let axis = |k: usize| written.nodes.iter().map(|node| node[k]).collect();
+    let count = written.nodes.len();
     let nodes = |element: usize| {
         written.elements[element]
             .3
@@ -1340,10 +1453,11 @@ fn exodus() -> Exodus {
             .collect()
     };
     Exodus {
+        element: "HEX8",
         reals: vec![
-            ("coordx", axis(0)),
-            ("coordy", axis(1)),
-            ("coordz", axis(2)),
+            ("coordx", vec![count], axis(0)),
+            ("coordy", vec![count], axis(1)),
+            ("coordz", vec![count], axis(2)),
         ],
         integers: vec![
             ("eb_prop1", vec![2], vec![10, 20]),
@@ -1373,11 +1487,11 @@ impl Exodus {
             data: Vec<u8>,
         }
         let mut variables = Vec::new();
-        for (name, values) in &self.reals {
+        for (name, shape, values) in &self.reals {
             let data = values.iter().flat_map(|x| x.to_be_bytes()).collect();
             variables.push(Variable {
                 name,
-                shape: vec![values.len()],
+                shape: shape.clone(),
                 kind: 6,
                 data,
             });
@@ -1446,7 +1560,7 @@ impl Exodus {
                     word(&mut out, 1);
                     text(&mut out, "elem_type");
                     word(&mut out, 2);
-                    text(&mut out, "HEX8");
+                    text(&mut out, self.element);
                 } else {
                     word(&mut out, 0);
                     word(&mut out, 0);
@@ -1479,11 +1593,13 @@ impl Exodus {
     fn hdf5(&self, path: &Path) {
         use hdf5_metno::types::FixedAscii;
         let file = hdf5_metno::File::create(path).unwrap();
-        for (name, values) in &self.reals {
-            file.new_dataset_builder()
-                .with_data(values)
+        for (name, shape, values) in &self.reals {
+            let dataset = file
+                .new_dataset::<f64>()
+                .shape(shape.clone())
                 .create(*name)
                 .unwrap();
+            dataset.write_raw(values).unwrap();
         }
         for (name, shape, values) in &self.integers {
             let dataset = file
@@ -1494,11 +1610,11 @@ impl Exodus {
             dataset.write_raw(values).unwrap();
             if name.starts_with("connect") {
                 let attribute = dataset
-                    .new_attr::<FixedAscii<4>>()
+                    .new_attr::<FixedAscii<8>>()
                     .create("elem_type")
                     .unwrap();
                 attribute
-                    .write_scalar(&FixedAscii::<4>::from_ascii("HEX8").unwrap())
+                    .write_scalar(&FixedAscii::<8>::from_ascii(self.element).unwrap())
                     .unwrap();
             }
         }
@@ -1540,6 +1656,97 @@ fn exodus_files_of_both_kinds_have_blocks_and_sets() {
     }
 }
 
+/// Three spheres in two blocks: a radius and the volume for each sphere.
+fn spheres() -> Exodus {
+    Exodus {
+        element: "SPHERE",
+        reals: vec![
+            ("coordx", vec![3], vec![0.0, 0.5, 1.0]),
+            ("coordy", vec![3], vec![0.0; 3]),
+            ("coordz", vec![3], vec![0.25; 3]),
+            ("attrib1", vec![2, 2], vec![0.5, 0.125, 0.6, 0.25]),
+            ("attrib2", vec![1, 2], vec![0.7, 0.375]),
+        ],
+        integers: vec![
+            ("eb_prop1", vec![2], vec![1, 2]),
+            ("connect1", vec![2, 1], vec![1, 2]),
+            ("connect2", vec![1, 1], vec![3]),
+            ("ns_prop1", vec![1], vec![1]),
+            ("node_ns1", vec![2], vec![2, 3]),
+        ],
+        texts: Vec::new(),
+    }
+}
+
+#[test]
+fn spheres_of_exodus_become_points_with_their_volume() {
+    let folder = Folder::new("mesh-spheres");
+    let mut named = spheres();
+    // The name of an attribute counts more than its position.
+    named
+        .texts
+        .push(("attrib_name1", vec!["SPHERE_VOLUME", "other"]));
+    named.reals[3].2 = vec![0.125, 0.5, 0.25, 0.6];
+    let named_path = folder.join("named.e");
+    named.hdf5(&named_path);
+    let classic = folder.write("classic.g", &spheres().classic(1));
+    for path in [
+        classic,
+        folder.write("named.g", &named.classic(2)),
+        named_path,
+    ] {
+        let problem = problem(&format!(
+            "dimension = '3d'\ngrid.horizon = 2\nmaterial.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n\
+             time.end = 1\nset.nodes.mesh = 'nodelist_1'\nset.block.mesh = 'block_2'\n\
+             [body.a]\nmaterial = 'a'\npoints = {{ mesh = '{0}', block = 'block_1', scale = 2 }}\n\
+             [body.b]\nmaterial = 'a'\npoints = {{ mesh = '{0}', block = 2, scale = 2 }}\n",
+            path.display()
+        ));
+        let expected = [
+            ([0.0, 0.0, 0.5], 1.0, 0),
+            ([1.0, 0.0, 0.5], 2.0, 0),
+            ([2.0, 0.0, 0.5], 3.0, 1),
+        ];
+        assert_eq!(points(&problem), expected);
+        assert_eq!(ids(&problem, "nodes"), [1, 2]);
+        assert_eq!(ids(&problem, "block"), [2]);
+    }
+}
+
+#[test]
+fn spheres_without_a_volume_are_an_error() {
+    let folder = Folder::new("mesh-no-volume");
+    let comm = threads::alone();
+    let need = "only single-node elements without a volume; sphere elements of an Exodus file need the volume as an \
+                attribute with the name `volume`, or as their second attribute";
+    let mut bare = spheres();
+    bare.reals.truncate(3);
+    let mut radius = spheres();
+    radius.texts.push(("attrib_name1", vec!["radius", "mass"]));
+    radius.texts.push(("attrib_name2", vec!["radius", "mass"]));
+    for written in [bare, radius] {
+        let path = folder.write("bare.e", &written.classic(1));
+        let error = generate(&solid(&path, &[]), &comm).unwrap_err().message;
+        assert_eq!(error, format!("[body.a] points mesh: the mesh has {need}"));
+        let deck = format!(
+            "dimension = '3d'\ngrid.horizon = 2\nmaterial.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n\
+             time.end = 1\n[body.a]\nmaterial = 'a'\npoints = {{ mesh = '{0}', block = 'block_1' }}\n",
+            path.display()
+        );
+        let error = generate(&problem(&deck), &comm).unwrap_err().message;
+        assert_eq!(
+            error,
+            format!("[body.a] points block: `block_1` has {need}")
+        );
+    }
+    let mut flat = spheres();
+    flat.reals[3].2[3] = 0.0;
+    assert_eq!(
+        parse("a.exo", flat.classic(1)).unwrap_err(),
+        "a.exo: block block_1: the volume of sphere 2 of the block is 0e0, must be above 0"
+    );
+}
+
 #[test]
 fn damaged_exodus_files_have_their_message() {
     let folder = Folder::new("mesh-damaged-exodus");
@@ -1578,4 +1785,5 @@ fn damaged_exodus_files_have_their_message() {
 fn damaged_classic_exodus_files_are_errors() {
     survives_mutants("two.exo", &exodus().classic(1), 21);
     survives_mutants("two.exo", &exodus().classic(2), 22);
+    survives_mutants("spheres.exo", &spheres().classic(1), 23);
 }

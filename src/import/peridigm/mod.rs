@@ -57,7 +57,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
         let note = "checkpoints are written by default; `fissure run --restart` continues a run";
         translation.log.whole(restart, Fate::Approximated, note);
     }
-    let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
+    let mut sets = Sets::new(matches!(points, Points::Mesh(_)).then_some(""));
     let has_temperature = conditions(translation, root, &mut sets, &stages, &expanding)?;
     contact(translation, root, discretization, &names)?;
     let mut outputs = Outputs::new(has_temperature);

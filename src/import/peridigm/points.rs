@@ -65,8 +65,7 @@ pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Point
         translation.log.taken(file, note);
         return Ok(Points::File(value, known));
     }
-    let note = "points.mesh of the bodies; sphere elements are not read";
-    translation.log.taken(file, note);
+    translation.log.taken(file, "points.mesh of the bodies");
     Ok(Points::Mesh(value))
 }
 

@@ -1,12 +1,51 @@
 //! Blocks of PeriLab, which become bodies.
 
 use super::materials::{Laws, write_material};
-use super::points::Points;
+use super::points::{MeshBlocks, Points};
 use crate::error::{Result, excerpt};
 use crate::import::bodies::{self, Body, Material};
 use crate::import::draft::Value;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
+
+/// Return the `block` of the points of a block; `None` if its body has all elements of the mesh.
+fn block_of_points(
+    translation: &Translation,
+    points: &Points,
+    id_node: &Node,
+    id: u64,
+    is_only: bool,
+) -> Option<Value> {
+    let number = Value::Number(id.to_string());
+    let Points::Mesh(_, blocks) = points else {
+        translation.log.taken(id_node, "block of the points");
+        return Some(number);
+    };
+    let set = match blocks {
+        MeshBlocks::Numbers => None,
+        _ if is_only && id == 1 => {
+            let note = "the only block has all elements of the mesh";
+            translation.log.taken(id_node, note);
+            return None;
+        }
+        MeshBlocks::NumbersOrAll => None,
+        MeshBlocks::Sets(sets) => sets.get((id as usize).wrapping_sub(1)),
+    };
+    match set {
+        Some(set) => {
+            let note = format!(
+                "block of the points: the element set {}; PeriLab numbers the sets in no fixed order",
+                excerpt(set)
+            );
+            translation.log.approximated(id_node, note);
+            Some(Value::text(set))
+        }
+        None => {
+            translation.log.taken(id_node, "block of the points");
+            Some(number)
+        }
+    }
+}
 
 /// Write the materials and bodies. Return name, number and body of each block.
 pub(super) fn read_blocks(
@@ -22,7 +61,7 @@ pub(super) fn read_blocks(
         let what = format!("the block `{name}`");
         let id_node = translation.required(table, "Block ID", &what)?;
         let id = translation.count(id_node, "Block ID")?;
-        translation.log.taken(id_node, "block of the points");
+        let block = block_of_points(translation, points, id_node, id, node.tables().count() == 1);
         if let Points::File(_, Some(file)) = points
             && !file.blocks.iter().any(|block| u64::from(*block) == id)
         {
@@ -148,12 +187,10 @@ pub(super) fn read_blocks(
         let body = translation.new_name("set", name);
         let points = match points {
             Points::File(file, _) => ("file", file),
-            Points::Mesh(file) => ("mesh", file),
+            Points::Mesh(file, _) => ("mesh", file),
         };
-        let source = vec![
-            (points.0.to_owned(), points.1.clone()),
-            ("block".to_owned(), Value::Number(id.to_string())),
-        ];
+        let mut source = vec![(points.0.to_owned(), points.1.clone())];
+        source.extend(block.map(|block| ("block".to_owned(), block)));
         blocks.push((name.to_owned(), id, body.clone()));
         bodies.push(Body {
             name: body,

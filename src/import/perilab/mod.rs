@@ -32,7 +32,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let materials = translation.required(models, "Material Models", "`Models`")?;
     let blocks = translation.required(root, "Blocks", "the deck")?;
     let stages = stages(translation, root)?;
-    let points = points(translation, discretization)?;
+    let points = points(translation, discretization, root.get("Boundary Conditions"))?;
     let setting = setting(translation, discretization, materials, &points);
     translation.draft.top("dimension", Value::text(setting));
     if translation.dimension == 2 {
@@ -72,7 +72,10 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
                 .any(|known| is_key(&known.name, model))
         })
     });
-    let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
+    let mut sets = Sets::new(match &points {
+        Points::Mesh(_, blocks) => Some(blocks.prefix_of_sets()),
+        Points::File(..) => None,
+    });
     if let Some(node_sets) = discretization.get("Node Sets") {
         for (name, node) in node_sets.entries() {
             sets.define(name, node, true);

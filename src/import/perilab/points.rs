@@ -5,16 +5,87 @@ use crate::import::draft::Value;
 use crate::import::files::PointFile;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
-use crate::mesh::Format;
+use crate::mesh::{self, Format, Members};
 
 /// Source of the points of the blocks.
 pub(super) enum Points {
     File(Value, Option<PointFile>),
-    Mesh(Value),
+    Mesh(Value, MeshBlocks),
+}
+
+/// Meaning of the block numbers of a deck with a mesh.
+pub(super) enum MeshBlocks {
+    /// The numbers of groups of the mesh.
+    Numbers,
+    /// The numbers of groups of the mesh, but a mesh without groups is the block 1.
+    NumbersOrAll,
+    /// Positions, from 1, in this list of element sets.
+    Sets(Vec<String>),
+}
+
+impl MeshBlocks {
+    /// Return the kind of groups that are node sets, as a prefix of their names in the new deck.
+    pub(super) fn prefix_of_sets(&self) -> &'static str {
+        match self {
+            Self::Sets(_) => "element set ",
+            _ => "",
+        }
+    }
+}
+
+/// Return the element sets of an Abaqus file that are blocks in PeriLab, in the order of their numbers.
+///
+/// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
+/// last. PeriLab has no fixed order for the other sets, so the order is that of the file.
+fn blocks_of_abaqus(
+    translation: &Translation,
+    path: &str,
+    conditions: Option<&Node>,
+) -> Vec<String> {
+    let path = translation.path(path);
+    let mesh = mesh::load(&path)
+        .ok()
+        .and_then(|bytes| mesh::parse(Format::Abaqus, &path, &bytes).ok());
+    let Some(mesh) = mesh else {
+        return Vec::new();
+    };
+    let used: Vec<&str> = conditions
+        .into_iter()
+        .flat_map(Node::tables)
+        .filter_map(|(_, condition)| condition.get("Node Set")?.text())
+        .collect();
+    let mut sets = Vec::new();
+    for group in &mesh.groups {
+        if let (Some(name), Members::Elements(elements), "element set") =
+            (&group.name, &group.members, group.kind)
+            // Names with a point belong to one instance; the same sets without it follow.
+            && !name.contains('.')
+        {
+            let place = used.iter().position(|used| used == name);
+            sets.push((place.map_or(0, |place| place + 1), name, elements));
+        }
+    }
+    sets.sort_by_key(|(place, ..)| *place);
+    let mut is_in_block = vec![false; mesh.elements.len()];
+    let mut names = Vec::new();
+    for (_, name, elements) in sets {
+        let mut is_block = false;
+        for element in elements.iter() {
+            is_block |= !std::mem::replace(&mut is_in_block[element as usize], true);
+        }
+        if is_block {
+            names.push(name.clone());
+        }
+    }
+    names
 }
 
 /// Read the source of the points.
-pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Points> {
+pub(super) fn points(
+    translation: &mut Translation,
+    node: &Node,
+    conditions: Option<&Node>,
+) -> Result<Points> {
     let file = translation.required(node, "Input Mesh File", "the discretization")?;
     let path = translation.text(file, "Input Mesh File")?.to_owned();
     let name = match node.get("Type") {
@@ -50,7 +121,14 @@ pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Point
                 translation.log.approximated(file, note);
             }
         }
-        return Ok(Points::Mesh(value));
+        let blocks = if is_key(name, "Abaqus") {
+            MeshBlocks::Sets(blocks_of_abaqus(translation, &path, conditions))
+        } else if is_key(name, "Gmsh") {
+            MeshBlocks::NumbersOrAll
+        } else {
+            MeshBlocks::Numbers
+        };
+        return Ok(Points::Mesh(value, blocks));
     }
     let message = format!(
         "the discretization {} is not read; known are Text File, Exodus, Abaqus and Gmsh",

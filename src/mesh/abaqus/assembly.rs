@@ -58,6 +58,9 @@ pub(super) struct Placed {
 
 /// Position of an instance in the assembly: a translation, then a rotation.
 pub(super) struct Instance {
+    /// Name of the part of the instance, if the file has no such part.
+    pub(super) missing_part: Option<String>,
+    pub(super) place: Place,
     pub(super) translation: Vector3<f64>,
     pub(super) rotation: Rotation3<f64>,
     /// A point on the axis of rotation.

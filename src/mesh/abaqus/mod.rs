@@ -234,16 +234,17 @@ impl Reader {
             }
             "INSTANCE" => {
                 let wanted = keyword.get("PART").unwrap_or_default();
-                let Some(part) = self.parts.get(&wanted.to_ascii_uppercase()) else {
-                    let message = format!("*INSTANCE: there is no part {}", excerpt(wanted));
-                    return Err(self.fault(message));
-                };
+                // An instance without a part, or of a part without a mesh, has nodes and elements of its own.
+                let part = self.parts.get(&wanted.to_ascii_uppercase()).cloned();
+                let missing_part = part.is_none().then(|| wanted.to_owned());
                 let part = Part {
                     name: keyword.get("NAME").unwrap_or(wanted).to_owned(),
-                    ..part.clone()
+                    ..part.unwrap_or_default()
                 };
                 self.begin(part, name)?;
                 self.instance = Some(Instance {
+                    missing_part,
+                    place: self.place.clone(),
                     translation: Vector3::zeros(),
                     rotation: Rotation3::identity(),
                     pivot: Vector3::zeros(),
@@ -256,6 +257,17 @@ impl Reader {
                 else {
                     return Err(self.fault("*END INSTANCE without *INSTANCE"));
                 };
+                if let Some(wanted) = instance
+                    .missing_part
+                    .as_ref()
+                    .filter(|_| part.nodes.is_empty())
+                {
+                    let message = format!(
+                        "*INSTANCE: there is no part {}, and the instance has no nodes of its own",
+                        excerpt(wanted)
+                    );
+                    return Err(instance.place.fault(message));
+                }
                 self.place_instance(part, &instance)?;
             }
             _ => {}
