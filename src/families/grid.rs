@@ -9,7 +9,6 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 use crate::lanes::WIDTH;
 use crate::partition::Domain;
@@ -70,6 +69,7 @@ pub(super) struct Line {
 pub struct Grid {
     /// Origin, spacing and blocks of the grid.
     pub frame: GridFrame,
+    /// The lines by band, then z, then y.
     pub(super) lines: Vec<Line>,
     /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
@@ -77,7 +77,6 @@ pub struct Grid {
     runs: [(Vec<Run>, Vec<u32>); 2],
     /// The runs of the owned points, by local index.
     by_point: Vec<Run>,
-    by_line: FxHashMap<[i64; 3], u32>,
 }
 
 impl Grid {
@@ -150,7 +149,6 @@ impl Grid {
                 blocks[slot] = domain.points[*index as usize].block as u16;
             }
         }
-        let by_line = lines.iter().map(|line| line.at).zip(0..).collect();
         let runs = [true, false].map(|owned| {
             let selected = |slot: usize| {
                 blocks[slot] != HOLE && ((points[slot] as usize) < domain.owned) == owned
@@ -164,7 +162,6 @@ impl Grid {
             blocks,
             runs,
             by_point,
-            by_line,
         })
     }
 
@@ -192,10 +189,29 @@ impl Grid {
         }
     }
 
-    /// The line with a given band, y and z.
-    pub(super) fn line(&self, at: [i64; 3]) -> Option<&Line> {
-        let index = self.by_line.get(&at)?;
-        Some(&self.lines[*index as usize])
+    /// Return the line in the band of line `index` that is displaced by these numbers of cells in y and z;
+    /// `None` if there is no such line.
+    ///
+    /// The line is close to `index` in memory, so the search begins there.
+    pub(super) fn line_beside(&self, index: usize, [y, z]: [i64; 2]) -> Option<&Line> {
+        let rank = |line: &Line| [line.at[0], line.at[2], line.at[1]];
+        let [band, own_z, own_y] = rank(&self.lines[index]);
+        let wanted = [band, own_z + z, own_y + y];
+        let mut step = 1;
+        let range = if [z, y] >= [0, 0] {
+            while (self.lines.get(index + step)).is_some_and(|line| rank(line) < wanted) {
+                step *= 2;
+            }
+            index + step / 2..self.lines.len().min(index + step + 1)
+        } else {
+            while step <= index && rank(&self.lines[index - step]) > wanted {
+                step *= 2;
+            }
+            index.saturating_sub(step)..index - step / 2 + 1
+        };
+        let lines = &self.lines[range];
+        let found = lines.binary_search_by_key(&wanted, rank).ok()?;
+        Some(&lines[found])
     }
 
     /// Copy the values of the selected local points to their slots.
@@ -237,10 +253,7 @@ impl Grid {
     pub fn bytes(&self) -> usize {
         let by_slot: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
         let runs = by_slot + self.by_point.len();
-        self.blocks.len() * 2
-            + size_of_val(&self.lines[..])
-            + runs * size_of::<Run>()
-            + self.by_line.capacity() * 24
+        self.blocks.len() * 2 + size_of_val(&self.lines[..]) + runs * size_of::<Run>()
     }
 }
 
@@ -351,8 +364,8 @@ mod tests {
     use crate::partition::distribute;
     use crate::points::Point;
 
-    #[test]
-    fn slots_of_any_range_are_those_of_its_points() {
+    /// Return a grid with two bands and holes, and the number of its points.
+    fn grid() -> (Grid, usize) {
         let position = |k: u64| [k % 9, k / 9 % 9, k / 81].map(|x| x as f64);
         // A gap in x creates two bands, and a plane of missing points creates holes.
         let occupied = |at: &[f64; 3]| (at[0] - 4.0).abs() > 1.0 && at.iter().sum::<f64>() != 7.0;
@@ -366,7 +379,25 @@ mod tests {
             spacing: [1.0; 3],
             blocks: vec![true],
         };
-        let grid = Grid::new(frame, &domain, 1.5).unwrap();
+        (Grid::new(frame, &domain, 1.5).unwrap(), count)
+    }
+
+    #[test]
+    fn a_line_beside_another_is_found() {
+        let (grid, _) = grid();
+        for (index, line) in grid.lines.iter().enumerate() {
+            for offset in (0..19 * 19).map(|k| [k % 19 - 9, k / 19 - 9]) {
+                let at = [line.at[0], line.at[1] + offset[0], line.at[2] + offset[1]];
+                let found = grid.line_beside(index, offset).map(|line| line.at);
+                let is_there = grid.lines.iter().any(|line| line.at == at);
+                assert_eq!(found, is_there.then_some(at), "{:?} {offset:?}", line.at);
+            }
+        }
+    }
+
+    #[test]
+    fn slots_of_any_range_are_those_of_its_points() {
+        let (grid, count) = grid();
         let mut expected = vec![0; count];
         grid.owned()
             .for_each(|(slot, point)| expected[point as usize] = slot);

@@ -71,14 +71,11 @@ impl BondLattice {
         check_room(bytes).map_err(|shortage| Fault::TooLittleMemory { blocks, shortage })?;
         let mut shifts = vec![0; grid.lines.len() * line_offsets.len()];
         let origin = |line: &super::grid::Line| line.start as i64 - line.first;
-        for (line, shifts) in grid
-            .lines
-            .iter()
-            .zip(shifts.chunks_mut(line_offsets.len().max(1)))
-        {
-            for ([y, z], shift) in line_offsets.iter().zip(shifts) {
+        let of_lines = shifts.chunks_mut(line_offsets.len().max(1));
+        for (index, (line, shifts)) in grid.lines.iter().zip(of_lines).enumerate() {
+            for (offset, shift) in line_offsets.iter().zip(shifts) {
                 // If there is no line at the offset, no bond uses the shift.
-                if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
+                if let Some(other) = grid.line_beside(index, *offset) {
                     *shift = (origin(other) - origin(line)) as i32;
                 }
             }
@@ -156,8 +153,7 @@ impl BondLattice {
         for (offset, bits) in self.offsets.iter().zip(bits) {
             if offset.line as usize != current {
                 current = offset.line as usize;
-                let [y, z] = self.line_offsets[current];
-                target = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]);
+                target = grid.line_beside(vector.line as usize, self.line_offsets[current]);
             }
             *bits = 0;
             let Some(target) = target else { continue };
