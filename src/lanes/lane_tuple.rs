@@ -61,9 +61,16 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Load each quantity by calling `take` with its column. Quantities without a column are 0.
     #[inline(always)]
     fn load(columns: &Self::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
+        Self::load_first::<Self>(columns, take)
+    }
+
+    /// Same as [`Self::load`], from the first columns of a longer tuple.
+    #[inline(always)]
+    fn load_first<T: LaneTuple>(columns: &T::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
+        const { assert!(Self::COUNT <= T::COUNT) };
         Self::each(|k| {
-            let column = Self::column(columns, k);
-            if Self::PADDED && column.is_empty() {
+            let column = T::column(columns, k);
+            if T::PADDED && column.is_empty() {
                 Lanes::splat(0.0)
             } else {
                 take(column)

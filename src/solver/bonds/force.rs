@@ -68,7 +68,7 @@ impl<L> Force<L> {
     where
         L: Law<D>,
     {
-        let (laws, points) = (&self.laws, group.points());
+        let (laws, points) = (&self.laws, [group.own, &group.far]);
         L::bond_force(simd, laws, &group.bond, points, &group.history, weights)
     }
 
@@ -104,7 +104,7 @@ impl<L> Force<L> {
             };
             return total.work(simd, &group.bond, L::LINEAR, group.rotation_i);
         }
-        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, group.points());
+        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, [group.own, &group.far]);
         let ([history_i, history_j], bond) = (&group.history, &group.bond);
         let i = law_i.end_work(simd, bond, point_i, history_i, group.rotation_i);
         let j = law_j.end_work(simd, bond, point_j, history_j, &group.rotation_j);
@@ -134,7 +134,7 @@ impl<L> Force<L> {
     {
         Ends {
             laws: &self.laws,
-            points: group.points(),
+            points: [group.own, &group.far],
             limits: [group.limits_i, &group.limits_j],
             weights: group.weights,
         }
@@ -145,6 +145,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Sums = [Lanes; D];
     type Broken = ([Lanes; 3], [Lanes; D]);
     type Point = L::Point;
+    type Far = L::Point;
     type BondHistory = L::BondHistory;
     type Rotation = <L::Force as ForceState<D>>::Rotation;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
@@ -176,10 +177,9 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
             && let Some(step) = self.bond_update.history_step()
         {
             let [own, far] = &self.laws;
-            let [here, there] = group.points();
             group.history = [
-                own.bond_history(&group.bond, here, &group.history[0], step),
-                far.bond_history(&group.bond, there, &group.history[1], step),
+                own.bond_history(&group.bond, group.own, &group.history[0], step),
+                far.bond_history(&group.bond, &group.far, &group.history[1], step),
             ];
         }
         let total = self.weighted(simd, group, group.weights);

@@ -264,13 +264,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// Same as for [`Self::numbers`].
     #[inline(always)]
-    unsafe fn far_numbers(&self, place: usize) -> K::Point {
-        if K::READS_FAR {
-            // SAFETY: the caller guarantees the condition of `numbers`.
-            unsafe { self.numbers(place) }
-        } else {
-            K::Point::splat(0.0)
-        }
+    unsafe fn far_numbers(&self, place: usize) -> K::Far {
+        // SAFETY: `new` has checked the length.
+        K::Far::load_first::<K::Point>(&self.numbers, |column| unsafe { eight(column, place) })
     }
 
     /// # Safety

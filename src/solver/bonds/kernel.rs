@@ -24,7 +24,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     /// Point numbers of points i.
     pub own: &'a K::Point,
     /// Point numbers of points j.
-    pub far: K::Point,
+    pub far: K::Far,
     /// Thresholds, truncation factors and stress measures of points i.
     pub limits_i: &'a Limits,
     /// Thresholds, truncation factors and stress measures of points j.
@@ -44,12 +44,6 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
 }
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
-    /// Point numbers of points i and j.
-    #[inline(always)]
-    pub fn points(&self) -> [&K::Point; 2] {
-        [self.own, &self.far]
-    }
-
     /// Bits of the intact bonds within the horizon of point i.
     #[inline(always)]
     pub fn family(&self) -> u8 {
@@ -88,8 +82,11 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// points with such bonds.
     type Broken: LaneTuple;
 
-    /// Point numbers of points i and j that the kernel reads.
+    /// Point numbers of points i that the kernel reads.
     type Point: LaneTuple;
+
+    /// Point numbers of points j that the kernel reads: the first numbers of [`Self::Point`].
+    type Far: LaneTuple;
 
     /// Bond history that the kernel reads.
     type BondHistory: LaneTuple;
@@ -112,9 +109,6 @@ pub trait Kernel<const D: usize>: Copy + Sync {
 
     /// Whether to load the bits of all bonds, broken ones included.
     const READS_BROKEN: bool = false;
-
-    /// Whether to load the point numbers of points j; otherwise they are 0.
-    const READS_FAR: bool = true;
 
     /// Whether the kernel's criterion can read stresses of points i and j.
     const READS_STRESSES: bool = false;

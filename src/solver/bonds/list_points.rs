@@ -124,13 +124,9 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// # Safety
     /// The indices must be below the `reach` of [`Self::new`].
     #[inline(always)]
-    unsafe fn far_numbers(&self, indices: &[u32; 8]) -> K::Point {
-        if K::READS_FAR {
-            // SAFETY: the caller guarantees the condition of `numbers`.
-            unsafe { self.numbers(indices) }
-        } else {
-            K::Point::splat(0.0)
-        }
+    unsafe fn far_numbers(&self, indices: &[u32; 8]) -> K::Far {
+        // SAFETY: `new` has checked the length.
+        K::Far::load_first::<K::Point>(&self.numbers, |column| unsafe { gather(column, indices) })
     }
 
     /// # Safety

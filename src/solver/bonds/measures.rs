@@ -32,6 +32,7 @@ impl<const D: usize> Kernel<D> for Stored {
     type Sums = [Lanes; 4];
     type Broken = [Lanes; 0];
     type Point = AnyPoint;
+    type Far = [Lanes; 0];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;
@@ -74,6 +75,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
+    type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     // AVX2 is enough: this kernel runs only at set-up, after refinements, and for outputs.
@@ -103,6 +105,7 @@ impl<const D: usize> Kernel<D> for Softened {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
+    type Far = [Lanes; 0];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const ISA_SET: IsaSet = IsaSet::Avx2;
@@ -147,6 +150,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
     type Sums = [Lanes; 6];
     type Broken = [Lanes; 0];
     type Point = AnyPoint;
+    type Far = AnyPoint;
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     // AVX2 is enough: this kernel runs only at set-up and after refinements.
@@ -200,6 +204,7 @@ impl<const D: usize> Kernel<D> for Stress {
     type Sums = [Lanes; 6];
     type Broken = [Lanes; 0];
     type Point = AnyPoint;
+    type Far = [Lanes; 0];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const ANY_LAW: bool = true;
@@ -229,6 +234,7 @@ impl<const D: usize> Kernel<D> for StressAcross {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
     type Point = AnyPoint;
+    type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const EXISTS: bool = D == 2;
@@ -258,6 +264,7 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     type Sums = FamilyShare<D>;
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
+    type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const WANTED: Wanted = wanted(true);
@@ -290,6 +297,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
     type Point = ([Lanes; D], AnyPoint);
+    type Far = [Lanes; D];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const ANY_LAW: bool = true;
@@ -301,7 +309,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
-        let [(rate_i, numbers), (rate_j, _)] = group.points();
+        let ((rate_i, numbers), rate_j) = (group.own, &group.far);
         let force: [Lanes; D] = self.law.force(&group.bond, numbers, &group.history[0]);
         let mut power = Lanes::splat(0.0);
         for d in 0..D {
@@ -324,6 +332,7 @@ impl<const D: usize> Kernel<D> for Dilatation {
     type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
+    type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;

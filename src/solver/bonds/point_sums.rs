@@ -30,13 +30,13 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Sums = L::Sum;
     type Broken = [Lanes; 0];
     type Point = L::Point;
+    type Far = [Lanes; 0];
     type BondHistory = L::BondHistory;
     type Rotation = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const ISA_SET: IsaSet = L::ISA_SET;
     const HAS_FAST_PATH: bool =
         L::ISA_SET.is_each() && !L::LINEAR && L::BondHistory::COUNT == 0 && L::SUM_READS_STRETCH;
-    const READS_FAR: bool = false;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::SUM_READS_STRETCH,
@@ -84,6 +84,7 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     type Sums = <AnyLaw as Law<D>>::ReferenceSum;
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
+    type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;
@@ -127,6 +128,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
+    type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;
