@@ -49,7 +49,7 @@ pub fn refinement(
     let rule = rule(scope, refinement, first, finest)?;
     let interface_factor = match (&refinement.interface_factor, &rule) {
         (Some(factor), _) => {
-            let range = 1.0..4.0;
+            let range = 1.0..4.0_f64.next_up();
             scope.within(factor, "[refinement] interface_factor", range, "1 to 4")?
         }
         (None, problem::HorizonRule::Delta) => std::f64::consts::SQRT_2,
@@ -177,7 +177,9 @@ fn rule(
                 );
                 return Err(scope.error(ratios.span(), message));
             }
-            let ratio = |number: &Spanned<_>| scope.within(number, key, 1.0..100.0, "1 to 100");
+            let ratio = |number: &Spanned<_>| {
+                scope.within(number, key, 1.0..100.0_f64.next_up(), "1 to 100")
+            };
             let ratios = given.iter().map(ratio).collect::<Result<_>>()?;
             Ok(problem::HorizonRule::DeltaM(ratios))
         }

@@ -104,7 +104,7 @@ pub const fn angle(name: &'static str) -> Key {
         meaning: "Bunge's Euler angles of the material's axes, degrees: rotation about z, then \
                   x, then z; in the plane only the first",
         kind: Kind::Number {
-            range: -360.0..360.0,
+            range: -360.0..360_f64.next_up(),
             words: "between -360 and 360",
             default: Some(0.0),
         },
