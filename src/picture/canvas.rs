@@ -48,6 +48,22 @@ impl Image {
         Ok(writer.finish()?)
     }
 
+    /// Join pictures side by side; shorter pictures end in white.
+    pub fn row(images: &[Self]) -> Self {
+        let height = images.iter().map(|image| image.height).max().unwrap_or(0);
+        let mut joined = Self::new(images.iter().map(|image| image.width).sum(), height);
+        let mut left = 0;
+        for image in images {
+            let bytes = 3 * image.width as usize;
+            let rows = joined.rgb.chunks_exact_mut(3 * joined.width as usize);
+            for (row, own) in rows.zip(image.rgb.chunks_exact(bytes)) {
+                row[left..left + bytes].copy_from_slice(own);
+            }
+            left += bytes;
+        }
+        joined
+    }
+
     /// Return the colour of the pixel in `column` and `row`.
     ///
     /// # Panics

@@ -33,19 +33,21 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
     value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
 }
 
-/// Return the indices of the outputs to draw.
+/// Return the indices of the outputs to draw; `text` is `all`, or times in s or `last`, separated by commas.
 ///
 /// # Errors
-/// If there is no output, the text is not `last`, `all` or a number, or the time is outside of the result.
+/// If there is no output, the text is wrong, or a time is outside of the result.
 pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
         return Err(Error::input("the result holds no output yet"));
     };
-    match text {
-        "last" => Ok(vec![last]),
-        "all" => Ok((0..=last).collect()),
+    if text == "all" {
+        return Ok((0..=last).collect());
+    }
+    let chosen = text.split(',').map(|text| match text.trim() {
+        "last" => Ok(last),
         text => {
-            let wanted = number(text, "--time must be `last`, `all` or a time in s")?;
+            let wanted = number(text, "--time must be `last`, `all` or times in s")?;
             let distance = |k: &usize| (times[*k] - wanted).abs();
             let nearest = (0..=last)
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
@@ -56,14 +58,15 @@ pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
             };
             let inside = (times[0]..=times[last]).contains(&wanted);
             if inside || distance(&nearest) <= TIME_REACH * interval {
-                return Ok(vec![nearest]);
+                return Ok(nearest);
             }
             Err(Error::input(format!(
                 "--time {text}: the outputs are between {:e} and {:e} s; the nearest one is at --time {:e}",
                 times[0], times[last], times[nearest]
             )))
         }
-    }
+    });
+    chosen.collect()
 }
 
 /// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else the

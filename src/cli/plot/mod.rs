@@ -8,6 +8,7 @@ mod filter;
 pub mod limits;
 mod overlays;
 pub mod painter;
+mod panels;
 mod paths;
 pub mod picture;
 mod quantity;
@@ -31,6 +32,8 @@ Examples, fields:
   fissure plot out/plate --field stress --component xx --time 25e-6
   fissure plot out/plate --field stress --component principal_1 --range 0,50e6
   fissure plot out/plate --time all -o frames.png               frames_0000.png, …
+  fissure plot out/plate --time 1e-5,2e-5,last                  three times side by side
+  fissure plot out/a out/b --field velocity                     two results side by side
   fissure plot out/block --slice z=0.005 --deform 0
   fissure plot out/block --clip 'y>0.002' --camera -70,20
   fissure plot out/plate --field velocity --log --colors turbo --vectors velocity
@@ -40,18 +43,20 @@ Examples, curves:
   fissure plot out/plate/history.csv --y kinetic_energy,strain_energy -o energies.svg
   fissure plot out/a out/b out/c --x probe_u_y --y reaction_top_y")]
 pub struct PlotArguments {
-    /// Result: a .vtkhdf file or its folder. For curves, one or more results or CSV files.
+    /// Result: a .vtkhdf file or its folder; for curves also a CSV file. Fields of several results are drawn
+    /// side by side.
     #[arg(required = true, value_name = "RESULT")]
     results: Vec<PathBuf>,
 
     #[command(flatten)]
     picture: PictureArguments,
 
-    /// Time of the output in s (the nearest output is drawn), `last` or `all`.
+    /// Time of the output in s (the nearest output is drawn), `last` or `all`. Several times, separated by
+    /// commas, are drawn side by side.
     #[arg(
         short,
         long,
-        value_name = "T",
+        value_name = "T,…",
         default_value = "last",
         allow_hyphen_values = true
     )]
@@ -72,7 +77,7 @@ pub struct PlotArguments {
     output: Option<PathBuf>,
 }
 
-/// Draw pictures of a field, or curves.
+/// Draw one picture of a field, several pictures side by side, or curves.
 ///
 /// # Errors
 /// If a file is not a result, an argument is wrong, the field, component or column is missing, or a picture
@@ -88,12 +93,8 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
         return Err(Error::input(message));
     }
     match &arguments.results[..] {
-        [result] => picture::plot(arguments, result, verbosity),
-        results => Err(Error::input(format!(
-            "{} results are given, but a picture of a field is of one; for curves of several, \
-             name columns of the history with --y",
-            results.len()
-        ))),
+        [result] if !arguments.time.contains(',') => picture::plot(arguments, result, verbosity),
+        results => panels::plot(arguments, results, verbosity),
     }
 }
 

@@ -24,7 +24,8 @@ pub struct Painter<'a> {
     pub(super) result: &'a ResultReader,
     pub(super) arguments: &'a PictureArguments,
     pub(super) dimension: usize,
-    title: String,
+    /// Title of the pictures, before the time.
+    pub(super) title: String,
     /// Field and component of the drawn values, with label and unit.
     pub quantity: Quantity,
     has_displacement: bool,
@@ -37,7 +38,7 @@ pub struct Painter<'a> {
     contours: Option<Contours>,
     /// Field of the arrows.
     vectors: Option<StoredField>,
-    factor: f64,
+    pub(super) factor: f64,
     /// Whether the points of a body are scattered, by index of the body.
     scattered: Vec<bool>,
     /// Lines over the picture, by index of the file.

@@ -12,8 +12,11 @@ use super::{PlotArguments, check_ending};
 use crate::cli::format::si;
 use crate::cli::{Verbosity, file_error, outln, result_file};
 
+/// Smallest width of a picture, pixels.
+pub const LEAST_WIDTH: u32 = 200;
+
 /// Options of pictures.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct PictureArguments {
     /// Field to draw [default: damage, or another field if the result has none].
     #[arg(short, long, value_name = "NAME")]
@@ -85,7 +88,7 @@ pub struct PictureArguments {
     pub(super) log: bool,
 
     /// Width of the picture in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(i64::from(LEAST_WIDTH)..=10_000))]
     pub(super) width: u32,
 }
 
@@ -106,8 +109,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
         None => beside(&file, &format!("{}.png", painter.name())),
     };
     painter.check(&chosen)?;
-    let hint = "; `--y` draws curves, and `fissure movie` films";
-    check_ending(&path, &["png"], hint)?;
+    check_png(&path)?;
     for index in &chosen {
         let path = match chosen.len() {
             1 => path.clone(),
@@ -123,6 +125,15 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
         }
     }
     Ok(())
+}
+
+/// Check that the name of a picture ends in .png.
+///
+/// # Errors
+/// If it does not.
+pub fn check_png(path: &Path) -> Result<()> {
+    let hint = "; `--y` draws curves, and `fissure movie` films";
+    check_ending(path, &["png"], hint)
 }
 
 /// Return the path of a file beside a result. For a further result, such as `result_edge.vtkhdf`, the file

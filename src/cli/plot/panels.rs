@@ -1,0 +1,120 @@
+//! Pictures of several outputs or results side by side.
+
+use std::path::PathBuf;
+
+use fissure::error::{Error, Result};
+use fissure::output::ResultReader;
+use fissure::picture::Image;
+
+use super::choice::choose_times;
+use super::limits::Frame;
+use super::painter::Painter;
+use super::picture::{LEAST_WIDTH, PictureArguments, beside, check_png};
+use super::{PlotArguments, Verbosity};
+use crate::cli::format::si;
+use crate::cli::{file_error, outln, result_file};
+
+/// Draw the requested outputs of each result side by side, with the same axes and range of colours.
+///
+/// # Errors
+/// If a file is not a result, an argument is wrong, the results do not have the field or have different
+/// dimensions, or the picture is too narrow or cannot be written.
+pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity) -> Result<()> {
+    if arguments.time == "all" {
+        let message = "--time all: writes a picture of each output of one result; of several results, \
+                       name the times, such as --time 1e-5,last";
+        return Err(Error::input(message));
+    }
+    let files: Vec<PathBuf> = results.iter().map(|result| result_file(result)).collect();
+    let readers: Vec<ResultReader> = (files.iter())
+        .map(|file| ResultReader::open(file))
+        .collect::<Result<_>>()?;
+    let times: Vec<Vec<f64>> = readers
+        .iter()
+        .map(ResultReader::times)
+        .collect::<Result<_>>()?;
+    let chosen: Vec<Vec<usize>> = (times.iter())
+        .map(|times| choose_times(&arguments.time, times))
+        .collect::<Result<_>>()?;
+    let count = chosen.iter().map(Vec::len).sum::<usize>() as u32;
+    let width = arguments.picture.width / count;
+    if width < LEAST_WIDTH {
+        let least = LEAST_WIDTH * count;
+        let message =
+            format!("--width: must be at least {least} for {count} pictures side by side");
+        return Err(Error::input(message));
+    }
+    let panel = PictureArguments {
+        width,
+        ..arguments.picture.clone()
+    };
+    let mut painters = Vec::new();
+    for ((file, reader), chosen) in files.iter().zip(&readers).zip(&chosen) {
+        let reference = chosen.last().copied().unwrap_or(0);
+        let mut painter = Painter::new(&panel, file, reader, reference)?;
+        if files.len() > 1 {
+            painter.title = file.parent().unwrap_or(file).display().to_string();
+        }
+        painter.check(chosen)?;
+        painters.push(painter);
+    }
+    agree(&mut painters)?;
+    let path = match &arguments.output {
+        Some(path) => path.clone(),
+        None => beside(&files[0], &format!("{}_panels.png", painters[0].name())),
+    };
+    check_png(&path)?;
+    let panels = || {
+        let outputs = painters.iter().zip(&chosen).zip(&times);
+        outputs.flat_map(|((painter, chosen), times)| {
+            chosen
+                .iter()
+                .map(move |index| (painter, *index, times[*index]))
+        })
+    };
+    let mut frame: Option<Frame> = None;
+    for (painter, index, _) in panels() {
+        frame = match (frame, painter.frame(index)?) {
+            (Some(frame), Some(own)) => Some(frame.union(own)),
+            (frame, own) => frame.or(own),
+        };
+    }
+    let images =
+        panels().map(|(painter, index, time)| painter.image(index, &si(time, "s"), frame.as_ref()));
+    let images: Vec<Image> = images.collect::<Result<_>>()?;
+    Image::row(&images)
+        .write_png(&path)
+        .map_err(|error| file_error(&path, "write", &error))?;
+    if verbosity > Verbosity::Quiet {
+        let label = &painters[0].quantity.label;
+        outln!("wrote {}: {count} pictures of {label}", path.display());
+    }
+    Ok(())
+}
+
+/// Check that all results have the same dimension and drawn quantity, and draw the same deformation factor.
+fn agree(painters: &mut [Painter]) -> Result<()> {
+    let (label, dimension) = (painters[0].quantity.label.clone(), painters[0].dimension);
+    if let Some(other) = (painters.iter()).find(|painter| painter.quantity.label != label) {
+        let message = format!(
+            "the first result would show {label}, another one {}; name a field that all have with --field",
+            other.quantity.label
+        );
+        return Err(Error::input(message));
+    }
+    if painters
+        .iter()
+        .any(|painter| painter.dimension != dimension)
+    {
+        let message = "pictures side by side need results of the same dimension";
+        return Err(Error::input(message));
+    }
+    let smallest = painters
+        .iter()
+        .map(|painter| painter.factor)
+        .fold(f64::INFINITY, f64::min);
+    painters
+        .iter_mut()
+        .for_each(|painter| painter.factor = smallest);
+    Ok(())
+}
