@@ -2,7 +2,7 @@
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fissure::deck;
@@ -34,6 +34,8 @@ enum Template {
     RefinedGrid,
     /// Slow loading with fracture: a notched beam is bent until it breaks.
     ThreePointBending,
+    /// Slow loading with fracture: a compact tension specimen is opened until a crack runs.
+    CompactTension,
     /// Slow loading without fracture: the strain beside a hole.
     PlateWithHole,
     /// Slow loading without fracture: a beam under a force at its end.
@@ -42,6 +44,8 @@ enum Template {
     PennyCrack,
     /// A solid under impact: edge-on impact on a ceramic tile.
     Impact,
+    /// Points from a file: a rock disc between two plates. Also writes disc.csv.
+    PointsFromFile,
 }
 
 impl Template {
@@ -51,36 +55,63 @@ impl Template {
             Self::CrackBranching => deck::EXAMPLE,
             Self::RefinedGrid => include_str!("../../inputs/crack_branching_adaptive.toml"),
             Self::ThreePointBending => include_str!("../../inputs/three_point_bending.toml"),
+            Self::CompactTension => include_str!("../../inputs/compact_tension.toml"),
             Self::PlateWithHole => include_str!("../../inputs/plate_with_hole.toml"),
             Self::Cantilever => include_str!("../../inputs/cantilever.toml"),
             Self::PennyCrack => include_str!("../../inputs/penny_crack.toml"),
             Self::Impact => include_str!("../../inputs/eoi_alon.toml"),
+            Self::PointsFromFile => include_str!("../../inputs/points_from_file.toml"),
+        }
+    }
+
+    /// Return name and text of the file that the deck reads; `None` if it reads no file.
+    fn data(self) -> Option<(&'static str, &'static str)> {
+        match self {
+            Self::PointsFromFile => Some(("disc.csv", include_str!("../../inputs/disc.csv"))),
+            _ => None,
         }
     }
 }
 
-/// Write a deck to a new file.
+/// Write a deck to a new file, and the file that it reads beside it.
 ///
 /// # Errors
-/// If the file exists or cannot be written.
+/// If a file exists or cannot be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     let mut path = arguments.name.clone();
     if path.extension().is_none() {
         path.set_extension("toml");
     }
-    let mut file = match OpenOptions::new().write(true).create_new(true).open(&path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            let message = format!("{} exists already; choose another name", path.display());
-            return Err(Error::input(message));
+    let data = arguments.template.data();
+    let data = data.map(|(name, text)| (path.with_file_name(name), text));
+    // Check both names before a file is written.
+    for path in data.iter().map(|(path, _)| path).chain([&path]) {
+        if path.exists() {
+            return Err(exists(path));
         }
-        Err(error) => return Err(file_error(&path, "create", &error)),
-    };
-    file.write_all(arguments.template.text().as_bytes())
-        .map_err(|error| file_error(&path, "write", &error))?;
+    }
+    if let Some((path, text)) = &data {
+        write_new(path, text)?;
+    }
+    write_new(&path, arguments.template.text())?;
     if verbosity > Verbosity::Quiet {
         let name = path.display();
         outln!("wrote {name}; next: fissure check {name}, then fissure run {name}");
     }
     Ok(())
+}
+
+fn exists(path: &Path) -> Error {
+    let message = format!("{} exists already; choose another name", path.display());
+    Error::input(message)
+}
+
+fn write_new(path: &Path, text: &str) -> Result<()> {
+    let mut file = match OpenOptions::new().write(true).create_new(true).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(exists(path)),
+        Err(error) => return Err(file_error(path, "create", &error)),
+    };
+    file.write_all(text.as_bytes())
+        .map_err(|error| file_error(path, "write", &error))
 }

@@ -380,7 +380,7 @@ pub(crate) const OUTPUTS: f64 = 50.0;
 
 /// Default number of history rows.
 const ROWS: f64 = 500.0;
-/// Smallest default number of steps between rows: writing a row takes as long as one or two steps.
+/// Smallest default number of steps between rows. Writing a row takes as long as 2 to 9 steps.
 const STEPS_A_ROW: u64 = 20;
 
 /// Default wall-clock time between checkpoints, s.

@@ -139,13 +139,25 @@ fn all_templates_are_decks() {
     ];
     for name in names
         .into_iter()
-        .chain(["cantilever", "penny-crack", "impact"])
+        .chain(["cantilever", "penny-crack", "impact", "compact-tension"])
+        .chain(["points-from-file"])
     {
         assert!(help.contains(&format!("- {name}: ")), "{name}: {help}");
         let deck = folder.join(format!("{name}.toml"));
         succeed(fissure(1).arg("init").arg(&deck).args(["--template", name]));
         succeed(fissure(1).arg("explain").arg(&deck));
     }
+    // The file of points exists already.
+    let deck = folder.join("again.toml");
+    let points = ["--template", "points-from-file"];
+    let output = finish(fissure(1).arg("init").arg(&deck).args(points));
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(
+        text(&output).contains("disc.csv exists already"),
+        "{}",
+        text(&output)
+    );
+    assert!(!deck.exists());
     let deck = folder.join("other.toml");
     let output = finish(
         fissure(1)

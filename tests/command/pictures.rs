@@ -197,6 +197,111 @@ impl Drawings {
 }
 
 #[test]
+fn several_times_and_results_are_drawn_side_by_side() {
+    let folder = Folder::new("panels");
+    let [slow, fast, block] =
+        [("slow", PLATE), ("fast", PLATE), ("block", BLOCK)].map(|(name, deck)| {
+            let pull = if name == "fast" { "pull=3" } else { "pull=1" };
+            let options = if name == "block" {
+                &[][..]
+            } else {
+                &["--set", pull][..]
+            };
+            run(&folder, name, deck, options)
+        });
+    let panels = |results: &[&Path], options: &[&str]| {
+        let path = folder.join("panels.png");
+        let mut all = vec![
+            "--field",
+            "velocity",
+            "--width",
+            "800",
+            "-o",
+            path.to_str().unwrap(),
+        ];
+        all.extend(options);
+        command("plot", results, &all)
+    };
+    let alone = |result: &Path| {
+        let path = folder.join("alone.png");
+        let options = [
+            "--field",
+            "velocity",
+            "--width",
+            "400",
+            "-o",
+            path.to_str().unwrap(),
+        ];
+        expect(&command("plot", &[result], &options), 0, &[]);
+        png(&path)
+    };
+    let height = alone(&slow).1;
+    expect(
+        &panels(&[&slow], &["--time", "0,last"]),
+        0,
+        &["2 pictures of velocity"],
+    );
+    assert_eq!(png(&folder.join("panels.png")), (800, height, 0));
+    // With a common range, the slow plate has only the darker colours of the map.
+    expect(
+        &panels(&[&slow, &fast], &[]),
+        0,
+        &["2 pictures of velocity"],
+    );
+    let (width, _, _) = png(&folder.join("panels.png"));
+    let pixels = pixels(&folder.join("panels.png"));
+    let yellow = |[red, green, blue]: [u8; 3]| red > 200 && green > 200 && blue < 100;
+    // Only the upper two thirds of the columns of a panel are the plate; the rest is the colour bar.
+    let count = |first: u32| {
+        let plate = first..first + 300;
+        let inside = (0..)
+            .zip(&pixels)
+            .filter(|(k, _)| plate.contains(&(k % width)));
+        inside.filter(|(_, pixel)| yellow(**pixel)).count()
+    };
+    assert_eq!(count(0), 0);
+    assert!(count(400) > 0);
+    let beside = slow.join("velocity_panels.png");
+    let options = ["--field", "velocity", "--time", "0,last"];
+    expect(
+        &command("plot", &[&slow], &options),
+        0,
+        &["velocity_panels.png"],
+    );
+    assert!(beside.exists());
+    for (results, options, words) in [
+        (
+            vec![&slow, &fast],
+            vec!["--time", "all"],
+            "--time all: writes a picture of each output of one result",
+        ),
+        (
+            vec![&slow, &fast],
+            vec!["--time", "25"],
+            "--time 25: the outputs are between",
+        ),
+        (
+            vec![&slow],
+            vec!["--time", "0,x"],
+            "`last`, `all` or times in s, is `x`",
+        ),
+        (
+            vec![&slow; 5],
+            vec![],
+            "--width: must be at least 1000 for 5 pictures side by side",
+        ),
+        (
+            vec![&slow, &block],
+            vec![],
+            "pictures side by side need results of the same dimension",
+        ),
+    ] {
+        let results: Vec<&Path> = results.into_iter().map(|path| path.as_path()).collect();
+        expect(&panels(&results, &options), 2, &[words]);
+    }
+}
+
+#[test]
 fn colour_maps_and_logarithmic_scales() {
     let folder = Folder::new("colours");
     let plate = Drawings::new(&folder, "plate", PLATE);

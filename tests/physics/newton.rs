@@ -2,7 +2,7 @@
 //! without an equilibrium; equal bits on any ranks and threads and after restarts.
 
 use crate::support::equilibria::{same_on_ranks, to_the_end, torn_plate};
-use crate::support::history::{column, row};
+use crate::support::history::{column, row, rows_to_the_end};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_input, simulate_on};
 use fissure::comm::{Communicator, threads};
@@ -139,6 +139,28 @@ fn it_takes_a_fifth_of_the_force_evaluations() {
         let [slow, fast] = evaluations(name, parameters);
         assert!(5 * fast <= slow, "{name}: {fast} against {slow}");
     }
+}
+
+#[test]
+fn a_compact_tension_specimen_breaks_at_the_load_of_fracture_mechanics() {
+    let peak = |m: &str| {
+        let parameters = [("dx", "1.25e-3"), ("m", m)];
+        simulate_input(
+            "compact_tension",
+            &parameters,
+            |mut simulation: Simulation<2>| {
+                let mut observer = HistoryObserver::new(&simulation).unwrap();
+                let reaction = column(&observer, "reaction_upper_pin_y");
+                let rows = rows_to_the_end(&mut observer, &mut simulation);
+                rows.iter().map(|row| row[reaction]).fold(0.0, f64::max)
+            },
+        )
+    };
+    // F = K B √W/f(a/W), with f(0.5) = 9.66.
+    let toughness = (72e9 / (1.0 - 0.22_f64.powi(2)) * 10.0).sqrt();
+    let theory = toughness * 0.01 * 0.05_f64.sqrt() / 9.66;
+    let [few, many] = ["3", "5"].map(|m| peak(m) / theory);
+    assert!(many < few && (1.0..1.15).contains(&many), "{few} {many}");
 }
 
 /// Return [`torn_plate`] with Newton's method.
