@@ -72,7 +72,7 @@ pub struct Request<'a> {
 
 /// Steps and cost of a run that is too large for a dry run.
 pub struct TimeEstimate {
-    /// Stable step with the density of the materials, s.
+    /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
     /// First time step (s) and number of steps of each stage.
     pub steps: Vec<(f64, f64)>,

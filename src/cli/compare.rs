@@ -26,6 +26,7 @@ Examples:
   fissure compare out/new out/old --tolerance 1e-9 --tolerance damage=0.02
   fissure compare out/a out/b --tolerance rank=inf         do not compare the field `rank`
   fissure compare -q out/new out/old || echo different     in scripts
+  fissure plot out/new --minus out/old --field damage      a picture of the difference
 
 Exit codes: 0 equal within the tolerance, 1 different, 2 the arguments are wrong or a file cannot be read.")]
 pub struct CompareArguments {

@@ -608,7 +608,8 @@ impl<'a> Cursor<'a> {
             .map_err(|_| self.fault(format!("must be a whole number, is {}", excerpt(word))))
     }
 
-    /// Read a number of entries of version 2, which is text, and the end of its line.
+    /// Read a number of entries of version 2. The number is text even in binary files; there, the rest of its
+    /// line is skipped too.
     fn count_line(&mut self) -> Result<i64> {
         let count = self.text_number()?;
         if matches!(self.encoding, Encoding::Binary { .. }) {

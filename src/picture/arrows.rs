@@ -19,8 +19,8 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Length of the vectors that have the longest arrow, in the picture; longer arrows are cut. `None` to
-    /// choose it from the drawn points.
+    /// Vector length, measured in the picture, that the longest arrow stands for; the arrows of longer vectors
+    /// are cut. `None` to choose it from the drawn points.
     pub longest: Option<f64>,
 }
 

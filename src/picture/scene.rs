@@ -303,7 +303,7 @@ impl Marks<'_> {
         all.filter(|(_, vector)| vector.iter().all(|component| component.is_finite()))
     }
 
-    /// Return the length of the vectors that have the longest arrow; 0 without vectors.
+    /// Return the vector length that the longest arrow stands for; 0 without vectors.
     ///
     /// It is the largest length in the picture. If few vectors are much longer than all others, such as the
     /// velocities of splinters, it is a percentile of the lengths, and longer arrows are cut.

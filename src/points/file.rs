@@ -101,7 +101,8 @@ pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     Some((points, pieces as f64 / SAMPLED as f64))
 }
 
-/// Read the points of part `part` of `parts` equal parts of a file's bytes.
+/// Split the bytes of a file into equal parts, and read the points of one part. `part_of_parts` is the index
+/// of this part and the number of parts.
 fn read_share(
     path: &Path,
     layout: &Layout,

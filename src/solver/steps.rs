@@ -179,8 +179,8 @@ fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64
     }
 }
 
-/// Number of steps in a duration `length` (s). The step grows from the first to the largest step (s) after
-/// each round of `rule.steps` steps.
+/// Number of steps in a duration `length` (s). The step starts at the first step (s) and is multiplied by
+/// `rule.raise` after each round of `rule.steps` steps, up to the largest step (s).
 fn raised(rule: &Adaptive, [first, largest]: [f64; 2], length: f64) -> f64 {
     let round = rule.steps as f64;
     let growth = rule.raise - 1.0;

@@ -486,7 +486,7 @@ fn several_decks_are_looked_at_one_after_the_other() {
     let folder = Folder::new("several");
     let right = folder.write("right.toml", fissure::deck::EXAMPLE);
     let wrong = |name: &str, horizon: &str| {
-        let deck = fissure::deck::EXAMPLE.replace("\"3*dx\"", horizon);
+        let deck = fissure::deck::EXAMPLE.replace("\"m*dx\"", horizon);
         folder.write(name, &deck)
     };
     let (first, second) = (wrong("first.toml", "-1"), wrong("second.toml", "'none'"));

@@ -302,6 +302,53 @@ fn several_times_and_results_are_drawn_side_by_side() {
 }
 
 #[test]
+fn the_difference_of_two_results_is_drawn() {
+    let folder = Folder::new("difference");
+    let [slow, fast] = [("slow", "pull=1"), ("fast", "pull=3")]
+        .map(|(name, pull)| run(&folder, name, PLATE, &["--set", pull]));
+    let other = run(&folder, "other", PLATE, &["--set", "time.end=1e-6"]);
+    let coarse = PLATE.replace("spacing = 1e-3", "spacing = 2e-3");
+    let coarse = run(
+        &folder,
+        "coarse",
+        &coarse.replace("horizon = 2e-3", "horizon = 4e-3"),
+        &[],
+    );
+    let minus = |subtrahend: &Path, options: &[&str]| {
+        let all = [
+            "--field",
+            "velocity",
+            "--minus",
+            subtrahend.to_str().unwrap(),
+        ];
+        command("plot", &[&slow], &[&all[..], options].concat())
+    };
+    expect(
+        &minus(&fast, &["--component", "x"]),
+        0,
+        &["velocity_x_difference.png: difference of velocity x"],
+    );
+    // All points are faster in the other result, so all are blue.
+    let picture = slow.join("velocity_x_difference.png");
+    let is_blue = |[red, _, blue]: [u8; 3]| blue > red.saturating_add(40);
+    let is_red = |[red, _, blue]: [u8; 3]| red > blue.saturating_add(40);
+    assert!(fraction(&picture, is_blue) > 3.0 * fraction(&picture, is_red));
+    // A result minus itself is 0.
+    expect(&minus(&slow, &["--component", "y"]), 0, &[]);
+    let picture = slow.join("velocity_y_difference.png");
+    let is_end = |[red, green, blue]: [u8; 3]| red.abs_diff(blue) > 120 && green < 100;
+    assert!(fraction(&picture, is_end) < 0.02);
+    for (subtrahend, options, words) in [
+        (&other, &[][..], "has no output at t = 2e-6 s"),
+        (&coarse, &[], "has other points at t = 2e-6 s"),
+        (&fast, &["--log"], "cannot be used with"),
+        (&folder.join("none"), &[], "none"),
+    ] {
+        expect(&minus(subtrahend, options), 2, &[words]);
+    }
+}
+
+#[test]
 fn colour_maps_and_logarithmic_scales() {
     let folder = Folder::new("colours");
     let plate = Drawings::new(&folder, "plate", PLATE);

@@ -11,8 +11,14 @@ impl Painter<'_> {
     /// must be above 0.
     ///
     /// # Errors
-    /// If no points are drawn although the outputs have points, or all drawn values are 0 or less.
+    /// If no points are drawn although the outputs have points, if all drawn values are 0 or less, or if the
+    /// result to subtract lacks an output.
     pub fn check(&self, indices: &[usize]) -> Result<()> {
+        if let Some(minus) = &self.minus {
+            for index in indices {
+                minus.find(self.result, *index, self.times[*index])?;
+            }
+        }
         if !self.is_partial() && !self.arguments.log {
             return Ok(());
         }
@@ -56,8 +62,7 @@ impl Painter<'_> {
         let mut nearest: Option<f64> = None;
         let power = 1.0 / self.dimension as f64;
         for points in blocks(self.result.points(index)) {
-            let drawn = (self.result).field_of(&self.quantity.field, index, points.clone())?;
-            let drawn = self.quantity.of(drawn);
+            let drawn = self.drawn_values(index, points.clone())?;
             let thresholds = self.threshold_values(index, points.clone())?;
             let thresholds = thresholds.unwrap_or(drawn);
             let volumes = self.result.field_of("volume", index, points.clone())?;

@@ -136,6 +136,16 @@ impl Limits {
         self.cut != Cut::Nothing
     }
 
+    /// Return limits whose shown range has 0 in its middle.
+    pub fn symmetric(self) -> Self {
+        let [low, high] = self.shown;
+        let reach = low.abs().max(high.abs());
+        Self {
+            shown: [-reach, reach],
+            ..self
+        }
+    }
+
     /// Return limits that enclose those of `self` and `other`.
     pub fn union(self, other: Self) -> Self {
         let union = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
@@ -170,7 +180,7 @@ pub struct Frame {
     pub bounds: Bounds,
     /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
-    /// Length of the vectors that have the longest arrow; 0 without vectors.
+    /// Vector length that the longest arrow stands for; 0 without vectors.
     pub longest_vector: f64,
 }
 

@@ -4,6 +4,7 @@ mod absence;
 mod blocks;
 mod choice;
 pub mod curves;
+mod difference;
 mod filter;
 pub mod limits;
 mod overlays;
@@ -34,6 +35,7 @@ Examples, fields:
   fissure plot out/plate --time all -o frames.png               frames_0000.png, …
   fissure plot out/plate --time 1e-5,2e-5,last                  three times side by side
   fissure plot out/a out/b --field velocity                     two results side by side
+  fissure plot out/a --minus out/b --field velocity             difference of two results
   fissure plot out/block --slice z=0.005 --deform 0
   fissure plot out/block --clip 'y>0.002' --camera -70,20
   fissure plot out/plate --field velocity --log --colors turbo --vectors velocity
@@ -64,7 +66,7 @@ pub struct PlotArguments {
 
     /// Columns of the history to draw as curves.
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
-    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time", "colors", "log", "threshold", "threshold_field", "clip", "camera", "contours", "vectors"])]
+    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time", "colors", "log", "threshold", "threshold_field", "clip", "camera", "contours", "vectors", "minus"])]
     y: Vec<String>,
 
     /// Column of the horizontal axis of curves [default: time].

@@ -9,6 +9,7 @@ use fissure::picture::{ColourMap, Image, Scene, Vectors, View, is_damage, is_in_
 
 use super::blocks::{blocks, is_zero, scattered_bodies};
 use super::choice::{choose_field, colour_map, number, view};
+use super::difference::Subtrahend;
 use super::filter::{Clip, Threshold};
 use super::limits::{Frame, Limits, Range, range_of};
 use super::overlays::{Contours, vector_field};
@@ -28,6 +29,10 @@ pub struct Painter<'a> {
     pub(super) title: String,
     /// Field and component of the drawn values, with label and unit.
     pub quantity: Quantity,
+    /// Result that is subtracted.
+    pub(super) minus: Option<Subtrahend>,
+    /// Times of the outputs, s.
+    pub(super) times: Vec<f64>,
     has_displacement: bool,
     pub(super) section: f64,
     range: Range,
@@ -126,13 +131,26 @@ impl<'a> Painter<'a> {
             return Err(Error::input(message));
         }
         let paths = arguments.path.iter().map(|path| paths::read(path));
+        let mut quantity = Quantity::new(field, arguments.component.as_deref())?;
+        let minus = arguments.minus.as_deref();
+        let minus = minus
+            .map(|path| Subtrahend::open(path, &quantity))
+            .transpose()?;
+        if minus.is_some() {
+            quantity.label = format!("difference of {}", quantity.label);
+        }
         let mut painter = Self {
             title: attribute("title"),
-            quantity: Quantity::new(field, arguments.component.as_deref())?,
+            times: result.times()?,
+            colours: match colours.transpose()? {
+                None if minus.is_some() => Some(ColourMap::Coolwarm),
+                colours => colours,
+            },
+            quantity,
+            minus,
             has_displacement: fields.iter().any(|field| field.name == "displacement"),
             section,
             range,
-            colours: colours.transpose()?,
             clips: clips.collect::<Result<_>>()?,
             threshold: threshold.transpose()?,
             contours: contours.transpose()?,
@@ -159,10 +177,30 @@ impl<'a> Painter<'a> {
     /// Return the name of the drawn quantity, for file names.
     pub fn name(&self) -> String {
         let field = &self.quantity.field;
-        match &self.arguments.component {
+        let mut name = match &self.arguments.component {
             Some(component) => format!("{field}_{component}"),
             None => field.clone(),
+        };
+        if self.minus.is_some() {
+            name += "_difference";
         }
+        name
+    }
+
+    /// Return the drawn values of consecutive points.
+    pub(super) fn drawn_values(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<f64>> {
+        let values = (self.result).field_of(&self.quantity.field, index, points.clone())?;
+        let mut values = self.quantity.of(values);
+        if let Some(minus) = &self.minus {
+            let output = (self.result, index, self.times[index]);
+            minus.subtract(output, points, &self.quantity, &mut values)?;
+        }
+        Ok(values)
+    }
+
+    /// Return whether the colour bar starts at 0: damage is never negative, but its difference can be.
+    fn starts_at_zero(&self) -> bool {
+        self.minus.is_none() && is_damage(&self.quantity.field)
     }
 
     pub(super) fn displacements(
@@ -249,10 +287,7 @@ impl<'a> Painter<'a> {
         let mut paths = NearestPoints::new(&self.paths);
         let power = 1.0 / self.dimension as f64;
         for points in blocks(count) {
-            let values = self
-                .result
-                .field_of(&self.quantity.field, index, points.clone())?;
-            let values = self.quantity.of(values);
+            let values = self.drawn_values(index, points.clone())?;
             let volumes = self.result.field_of("volume", index, points.clone())?;
             let thresholds = self.threshold_values(index, points.clone())?;
             let scattered = self.are_scattered(index, points.clone())?;
@@ -348,10 +383,15 @@ impl<'a> Painter<'a> {
     /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no
     /// outliers.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
-        match self.range {
+        let limits = match self.range {
             range if self.arguments.log => Limits::logarithmic(values, range),
-            Range::Automatic if is_damage(&self.quantity.field) => Limits::of(values, Range::All),
+            Range::Automatic if self.starts_at_zero() => Limits::of(values, Range::All),
             range => Limits::of(values, range),
+        };
+        if self.minus.is_some() {
+            limits.map(Limits::symmetric)
+        } else {
+            limits
         }
     }
 
@@ -396,9 +436,9 @@ impl<'a> Painter<'a> {
             range: match (self.range, limits) {
                 (Range::Values(range), _) => Some(range),
                 // The colour bar of damage starts at 0 in all pictures.
-                (_, Some(limits)) if frame.is_some() || limits.is_cut() => {
+                (_, Some(limits)) if frame.is_some() || limits.is_cut() || self.minus.is_some() => {
                     let [low, high] = limits.shown;
-                    let from_zero = is_damage(&self.quantity.field) && !self.arguments.log;
+                    let from_zero = self.starts_at_zero() && !self.arguments.log;
                     let low = if from_zero { low.min(0.0) } else { low };
                     (low < high).then_some((low, high))
                 }

@@ -71,6 +71,10 @@ pub struct PictureArguments {
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(super) range: Option<String>,
 
+    /// Draw the difference to another result with the same points, at the same time.
+    #[arg(long, value_name = "RESULT", conflicts_with = "log")]
+    pub(super) minus: Option<PathBuf>,
+
     /// Draw lines of equal value in plane pictures and slices: a number of lines, or values such as 1e6,2e6.
     #[arg(long, value_name = "N|VALUE,…", allow_hyphen_values = true)]
     pub(super) contours: Option<String>,

@@ -14,7 +14,8 @@ pub struct Quantity {
     pub label: String,
     /// Unit of the quantity; empty if dimensionless.
     pub unit: String,
-    components: usize,
+    /// Number of components of the field.
+    pub components: usize,
     kind: Component,
 }
 
