@@ -1,6 +1,6 @@
 //! `fissure init`: commented example decks.
 
-use std::fs::OpenOptions;
+use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -83,11 +83,27 @@ pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
         path.set_extension("toml");
     }
     let data = arguments.template.data();
-    let data = data.map(|(name, text)| (path.with_file_name(name), text));
+    let mut data = data.map(|(name, text)| (path.with_file_name(name), text));
     // Check both names before a file is written.
-    for path in data.iter().map(|(path, _)| path).chain([&path]) {
-        if path.exists() {
-            return Err(exists(path));
+    if path.symlink_metadata().is_ok() {
+        return Err(exists(&path));
+    }
+    if let Some((beside, text)) = &data {
+        if *beside == path {
+            let message = format!(
+                "{}: the template writes another file of this name; choose another name",
+                path.display()
+            );
+            return Err(Error::input(message));
+        }
+        if fs::read(beside).is_ok_and(|known| known == text.as_bytes()) {
+            data = None;
+        } else if beside.symlink_metadata().is_ok() {
+            let message = format!(
+                "{} exists already with other content, and the template writes this file; choose another folder",
+                beside.display()
+            );
+            return Err(Error::input(message));
         }
     }
     if let Some((path, text)) = &data {
@@ -96,7 +112,10 @@ pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     write_new(&path, arguments.template.text())?;
     if verbosity > Verbosity::Quiet {
         let name = path.display();
-        outln!("wrote {name}; next: fissure check {name}, then fissure run {name}");
+        let beside = data.map_or(String::new(), |(path, _)| {
+            format!(" and {}", path.display())
+        });
+        outln!("wrote {name}{beside}; next: fissure check {name}, then fissure run {name}");
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use fissure::picture::film::Film;
 use super::plot::check_ending;
 use super::plot::limits::Frame;
 use super::plot::painter::Painter;
-use super::plot::picture::{PictureArguments, beside};
+use super::plot::picture::{PictureArguments, beside, nothing_to_draw};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 
@@ -78,19 +78,12 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     // Each output is read twice: first for the range of colours of all frames, then to draw a frame.
     let count = chosen.len() as u64;
     let mut progress = Progress::new(verbosity > Verbosity::Quiet, "frame", 0, 2 * count);
-    let mut frame: Option<Frame> = None;
-    for (number, index) in chosen.iter().enumerate() {
-        let own = painter.frame(*index)?;
-        frame = match (frame, own) {
-            (Some(frame), Some(own)) => Some(frame.union(own)),
-            (frame, own) => frame.or(own),
-        };
-        progress.update(number as u64 + 1, 2 * count, times[*index]);
-    }
-    let Some(frame) = frame else {
-        let message = format!("{}: no output has points to draw", file.display());
-        return Err(Error::input(message));
-    };
+    let frames = (1..).zip(&chosen).map(|(number, index)| {
+        let frame = painter.frame(*index);
+        progress.update(number, 2 * count, times[*index]);
+        frame
+    });
+    let frame = Frame::of_all(frames)?.ok_or_else(|| nothing_to_draw(&file))?;
     let clock = Clock::new(times[last]);
     let draw = |index: usize| -> Result<Image> {
         let image = painter.image(index, &clock.time(times[index]), Some(&frame))?;

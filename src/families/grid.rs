@@ -194,23 +194,23 @@ impl Grid {
     ///
     /// The line is close to `index` in memory, so the search begins there.
     pub(super) fn line_beside(&self, index: usize, [y, z]: [i64; 2]) -> Option<&Line> {
-        let rank = |line: &Line| [line.at[0], line.at[2], line.at[1]];
-        let [band, own_z, own_y] = rank(&self.lines[index]);
+        let key = |line: &Line| [line.at[0], line.at[2], line.at[1]];
+        let [band, own_z, own_y] = key(&self.lines[index]);
         let wanted = [band, own_z + z, own_y + y];
         let mut step = 1;
         let range = if [z, y] >= [0, 0] {
-            while (self.lines.get(index + step)).is_some_and(|line| rank(line) < wanted) {
+            while (self.lines.get(index + step)).is_some_and(|line| key(line) < wanted) {
                 step *= 2;
             }
             index + step / 2..self.lines.len().min(index + step + 1)
         } else {
-            while step <= index && rank(&self.lines[index - step]) > wanted {
+            while step <= index && key(&self.lines[index - step]) > wanted {
                 step *= 2;
             }
             index.saturating_sub(step)..index - step / 2 + 1
         };
         let lines = &self.lines[range];
-        let found = lines.binary_search_by_key(&wanted, rank).ok()?;
+        let found = lines.binary_search_by_key(&wanted, key).ok()?;
         Some(&lines[found])
     }
 

@@ -64,7 +64,7 @@ pub trait LaneTuple: Copy + Send + Sync {
         Self::load_first::<Self>(columns, take)
     }
 
-    /// Same as [`Self::load`], from the first columns of a longer tuple.
+    /// Same as [`Self::load`], from the first columns of a tuple that is at least as long.
     #[inline(always)]
     fn load_first<T: LaneTuple>(columns: &T::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
         const { assert!(Self::COUNT <= T::COUNT) };

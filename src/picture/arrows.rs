@@ -21,7 +21,7 @@ pub struct Vectors<'a> {
     pub unit: &'a str,
     /// Vector length, measured in the picture, that the longest arrow stands for; the arrows of longer vectors
     /// are cut. `None` to choose it from the drawn points.
-    pub longest: Option<f64>,
+    pub longest_arrow: Option<f64>,
 }
 
 /// Length of the longest arrow, in text sizes. The middles of arrows are at least this far apart.

@@ -18,7 +18,7 @@ const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 /// Edge of a cube above which each of its faces has one brightness, pixels.
 const SMALL_CUBE: f64 = 10.0;
 
-/// Largest difference in depth between neighbouring pixels of one surface, in edges of a cube.
+/// Largest difference in depth between pixels whose brightness is averaged, in edges of a cube.
 const SAME_SURFACE: f32 = 2.0;
 
 /// Cosine of the angle between the view and the normal of a face below which the larger cube grows less along
@@ -184,7 +184,8 @@ impl<'a> Cubes<'a> {
     /// Shade all pixels, after all cubes have been painted.
     ///
     /// Small cubes on a deformed surface form steps, whose sides show as specks of other brightness. A pixel
-    /// of a small cube therefore has the mean brightness of the surface within half a cube.
+    /// of a small cube therefore has the mean brightness of the surface in a square window, half a
+    /// cube to each side.
     pub fn shade(self) {
         let [width, height] = [self.image.width, self.image.height].map(i64::from);
         for row in 0..height {

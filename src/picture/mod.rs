@@ -115,7 +115,9 @@ pub fn render(scene: &Scene) -> Result<Image> {
             Projection::Orthographic(camera) => box_rulers(&mut pen, &layout, &bounds, camera),
         }
         if let Some(vectors) = &scene.vectors {
-            let longest = vectors.longest.unwrap_or_else(|| marks.longest_vector());
+            let longest = vectors
+                .longest_arrow
+                .unwrap_or_else(|| marks.longest_arrow());
             let arrows = marks.with_vectors(vectors);
             arrows::draw(&mut pen, arrows, vectors, longest, &layout, projection);
         }

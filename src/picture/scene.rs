@@ -268,9 +268,11 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// If the largest length of a vector exceeds `LONG_ARROWS` times the length up to which this fraction of the
-/// vectors reaches, longer arrows are cut.
+/// Fraction of the vectors whose arrows are never cut.
 const WHOLE_ARROWS: f64 = 0.995;
+
+/// Ratio of the largest length of all vectors to the largest length of these above which longer arrows are
+/// cut.
 const LONG_ARROWS: f64 = 4.0;
 
 /// The points of a scene to draw, in painting order.
@@ -307,7 +309,7 @@ impl Marks<'_> {
     ///
     /// It is the largest length in the picture. If few vectors are much longer than all others, such as the
     /// velocities of splinters, it is a percentile of the lengths, and longer arrows are cut.
-    pub fn longest_vector(&self) -> f64 {
+    pub fn longest_arrow(&self) -> f64 {
         let Some(vectors) = &self.scene.vectors else {
             return 0.0;
         };
@@ -449,14 +451,14 @@ mod tests {
     }
 
     #[test]
-    fn longest_vector_is_measured_in_the_picture() {
+    fn longest_arrow_is_measured_in_the_picture() {
         let positions = [[0.0; 3], [0.0, 0.0, 9.0], [1.0, 0.0, 0.0]];
         let values = [[3.0, 4.0, 9.0], [90.0; 3], [f64::NAN, 0.0, 0.0]];
         let vectors = Vectors {
             values: &values,
             field: "velocity",
             unit: "m/s",
-            longest: None,
+            longest_arrow: None,
         };
         let view = View::Slice {
             axis: Axis::Z,
@@ -467,7 +469,7 @@ mod tests {
             ..scene(&positions, &[0.0; 3], view)
         };
         // The second point is not in the slice, and z is along the view.
-        assert_eq!(scene.marks().unwrap().longest_vector(), 5.0);
+        assert_eq!(scene.marks().unwrap().longest_arrow(), 5.0);
     }
 
     #[test]
@@ -481,14 +483,14 @@ mod tests {
                 values: &values,
                 field: "velocity",
                 unit: "m/s",
-                longest: None,
+                longest_arrow: None,
             };
             let zeros = vec![0.0; 1000];
             let scene = Scene {
                 vectors: Some(vectors),
                 ..scene(&positions, &zeros, View::Plane)
             };
-            scene.marks().unwrap().longest_vector()
+            scene.marks().unwrap().longest_arrow()
         };
         assert_eq!(longest(2.0, 900.0), 2.0);
         assert_eq!(longest(2.0, 7.0), 7.0);

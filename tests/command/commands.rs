@@ -147,17 +147,29 @@ fn all_templates_are_decks() {
         succeed(fissure(1).arg("init").arg(&deck).args(["--template", name]));
         succeed(fissure(1).arg("explain").arg(&deck));
     }
-    // The file of points exists already.
-    let deck = folder.join("again.toml");
+    // The file of points exists already, with the same content and with other content.
     let points = ["--template", "points-from-file"];
-    let output = finish(fissure(1).arg("init").arg(&deck).args(points));
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
-    assert!(
-        text(&output).contains("disc.csv exists already"),
-        "{}",
-        text(&output)
+    succeed(
+        fissure(1)
+            .arg("init")
+            .arg(folder.join("again.toml"))
+            .args(points),
     );
-    assert!(!deck.exists());
+    folder.write("disc.csv", "x y volume\n");
+    for (name, words) in [
+        ("third.toml", "disc.csv exists already with other content"),
+        ("disc.csv", "disc.csv exists already; choose another name"),
+        (
+            "new/disc.csv",
+            "the template writes another file of this name",
+        ),
+    ] {
+        std::fs::create_dir_all(folder.join("new")).unwrap();
+        let output = finish(fissure(1).arg("init").arg(folder.join(name)).args(points));
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(words), "{words}: {}", text(&output));
+    }
+    assert!(!folder.join("third.toml").exists() && !folder.join("new/disc.csv").exists());
     let deck = folder.join("other.toml");
     let output = finish(
         fissure(1)

@@ -251,7 +251,7 @@ fn several_times_and_results_are_drawn_side_by_side() {
     let (width, _, _) = png(&folder.join("panels.png"));
     let pixels = pixels(&folder.join("panels.png"));
     let yellow = |[red, green, blue]: [u8; 3]| red > 200 && green > 200 && blue < 100;
-    // Only the upper two thirds of the columns of a panel are the plate; the rest is the colour bar.
+    // The left three quarters of a panel contain the plate; the rest is the colour bar.
     let count = |first: u32| {
         let plate = first..first + 300;
         let inside = (0..)

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use fissure::comm::threads;
 use fissure::deck::{self, Deck, Source};
 use fissure::error::{ErrorKind, Result};
+use fissure::problem::{Body, PointSource};
 use fissure::solver::Simulation;
 use fissure::solver::calibration::calibrated;
 use fissure::survey::dry_run;
@@ -122,7 +123,7 @@ fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
 #[test]
 fn a_deck_with_its_defaults_written_out_has_the_same_grid() {
     // Cells from 0 do not fill the first body, so the origins of the grids are in its corner.
-    let lower = |corner: &str, fine: &str| {
+    let count = |corner: &str, fine: &str| {
         let text = format!(
             "dimension = 'plane-stress'
             grid = {{ spacing = 1, horizon = 3 }}
@@ -135,13 +136,21 @@ fn a_deck_with_its_defaults_written_out_has_the_same_grid() {
         let source = Source::new("tests/decks/good/deck.toml", text);
         let full = deck::explain(&source).unwrap();
         let full = Source::new("tests/decks/good/full.toml", full);
-        let points = |source: &Source| prepare(source).unwrap().0;
-        assert_eq!(points(&source), points(&full));
-        points(&full)
+        let origins = |source: &Source| {
+            let problem = Deck::new(Source::new(source.path.clone(), source.text.clone()));
+            let problem = problem.unwrap().problem().unwrap();
+            let origin = |body: &Body| match &body.points {
+                PointSource::Lattice { origin, .. } => *origin,
+                _ => unreachable!("the body is a box"),
+            };
+            problem.bodies.iter().map(origin).collect::<Vec<_>>()
+        };
+        assert_eq!(origins(&source), origins(&full));
+        prepare(&full).unwrap().0
     };
-    assert_eq!(lower("[0.5, 0.5]", "1"), 25 + 8);
-    assert_eq!(lower("[0.5, 0.5]", "0.5"), 25 + 32);
-    assert_eq!(lower("[0, 0.5]", "1"), 25 + 8);
+    assert_eq!(count("[0.5, 0.5]", "1"), 25 + 8);
+    assert_eq!(count("[0.5, 0.5]", "0.5"), 25 + 32);
+    assert_eq!(count("[0, 0.5]", "1"), 25 + 8);
 }
 
 #[test]

@@ -46,8 +46,11 @@ pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     }
     let chosen = text.split(',').map(|text| match text.trim() {
         "last" => Ok(last),
+        "all" => Err(Error::input(
+            "--time: `all` draws every output, so give no other time with it",
+        )),
         text => {
-            let wanted = number(text, "--time must be `last`, `all` or times in s")?;
+            let wanted = number(text, "--time must be `all`, or times in s and `last`")?;
             let distance = |k: &usize| (times[*k] - wanted).abs();
             let nearest = (0..=last)
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
@@ -202,6 +205,10 @@ mod tests {
     fn times_outside_of_the_result_are_rejected() {
         let times = [0.0, 1e-5, 2e-5];
         let chosen = |text| choose_times(text, &times).unwrap();
+        assert_eq!(chosen("0, last"), [0, times.len() - 1]);
+        for wrong in ["0,", "all,last", ","] {
+            assert!(choose_times(wrong, &times).is_err(), "{wrong}");
+        }
         assert_eq!(chosen("last"), [2]);
         assert_eq!(chosen("all"), [0, 1, 2]);
         assert_eq!(chosen("1.2e-5"), [1]);

@@ -181,10 +181,25 @@ pub struct Frame {
     /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
     /// Vector length that the longest arrow stands for; 0 without vectors.
-    pub longest_vector: f64,
+    pub longest_arrow: f64,
 }
 
 impl Frame {
+    /// Return a frame that encloses the frames of several outputs; `None` if no output has points.
+    ///
+    /// # Errors
+    /// If an output is damaged.
+    pub fn of_all(frames: impl Iterator<Item = Result<Option<Self>>>) -> Result<Option<Self>> {
+        let mut all: Option<Self> = None;
+        for frame in frames {
+            all = match (all, frame?) {
+                (Some(all), Some(own)) => Some(all.union(own)),
+                (all, own) => all.or(own),
+            };
+        }
+        Ok(all)
+    }
+
     /// Return a frame that encloses `self` and `other`.
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -193,7 +208,7 @@ impl Frame {
                 (Some(a), Some(b)) => Some(a.union(b)),
                 (a, b) => a.or(b),
             },
-            longest_vector: self.longest_vector.max(other.longest_vector),
+            longest_arrow: self.longest_arrow.max(other.longest_arrow),
         }
     }
 }

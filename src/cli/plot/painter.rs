@@ -44,6 +44,8 @@ pub struct Painter<'a> {
     /// Field of the arrows.
     vectors: Option<StoredField>,
     pub(super) factor: f64,
+    /// Whether `--deform auto` found displacements; true with a given factor.
+    pub(super) is_displaced: bool,
     /// Whether the points of a body are scattered, by index of the body.
     scattered: Vec<bool>,
     /// Lines over the picture, by index of the file.
@@ -161,6 +163,7 @@ impl<'a> Painter<'a> {
                 dimension,
             )?,
             factor: 0.0,
+            is_displaced: true,
             scattered: scattered_bodies(result, reference, dimension)?,
             paths: paths.collect::<Result<_>>()?,
             result,
@@ -168,7 +171,11 @@ impl<'a> Painter<'a> {
             dimension,
         };
         painter.factor = match arguments.deform.as_str() {
-            "auto" => painter.automatic_factor(reference)?,
+            "auto" => {
+                let factor = painter.automatic_factor(reference)?;
+                painter.is_displaced = factor.is_some();
+                factor.unwrap_or(1.0)
+            }
             text => number(text, "--deform must be `auto` or a number")?,
         };
         Ok(painter)
@@ -215,8 +222,9 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible.
-    fn automatic_factor(&self, index: usize) -> Result<f64> {
+    /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible; `None` without
+    /// displacements.
+    fn automatic_factor(&self, index: usize) -> Result<Option<f64>> {
         let mut largest = 0.0_f64;
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         for points in blocks(self.result.points(index)) {
@@ -230,16 +238,19 @@ impl<'a> Painter<'a> {
                 }
             }
         }
+        if largest == 0.0 {
+            return Ok(None);
+        }
         let extent = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
         let wanted = AUTOMATIC_DISPLACEMENT * extent / largest;
         if !wanted.is_finite() || wanted <= 1.0 {
-            return Ok(1.0);
+            return Ok(Some(1.0));
         }
         let power = 10_f64.powf(wanted.log10().floor());
         let step = [5.0, 2.0, 1.0]
             .into_iter()
             .find(|step| step * power <= wanted);
-        Ok(step.unwrap_or(1.0) * power)
+        Ok(Some(step.unwrap_or(1.0) * power))
     }
 
     /// Return whether the slice shows a position; true without a slice. `size` is the edge of the cell, m.
@@ -359,7 +370,7 @@ impl<'a> Painter<'a> {
                     "1" => "",
                     unit => unit,
                 },
-                longest: None,
+                longest_arrow: None,
             }),
             note: "",
             bounds: None,
@@ -410,7 +421,7 @@ impl<'a> Painter<'a> {
         Ok(Some(Frame {
             bounds: marks.extent(),
             limits: self.limits(marks.values()),
-            longest_vector: marks.longest_vector(),
+            longest_arrow: marks.longest_arrow(),
         }))
     }
 
@@ -447,7 +458,7 @@ impl<'a> Painter<'a> {
             note: &note,
             bounds: frame.map(|frame| frame.bounds),
             vectors: scene.vectors.map(|vectors| Vectors {
-                longest: frame.map(|frame| frame.longest_vector),
+                longest_arrow: frame.map(|frame| frame.longest_arrow),
                 ..vectors
             }),
             ..scene

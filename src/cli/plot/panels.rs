@@ -9,7 +9,7 @@ use fissure::picture::Image;
 use super::choice::choose_times;
 use super::limits::Frame;
 use super::painter::Painter;
-use super::picture::{LEAST_WIDTH, PictureArguments, beside, check_png};
+use super::picture::{LEAST_WIDTH, PictureArguments, beside, check_png, nothing_to_draw};
 use super::{PlotArguments, Verbosity};
 use crate::cli::format::si;
 use crate::cli::{file_error, outln, result_file};
@@ -49,16 +49,18 @@ pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity
         ..arguments.picture.clone()
     };
     let mut painters = Vec::new();
-    for ((file, reader), chosen) in files.iter().zip(&readers).zip(&chosen) {
-        let reference = chosen.last().copied().unwrap_or(0);
+    let inputs = results.iter().zip(&files).zip(&readers).zip(&chosen);
+    for (((name, file), reader), chosen) in inputs {
+        let reference = chosen.iter().copied().max().unwrap_or(0);
         let mut painter = Painter::new(&panel, file, reader, reference)?;
         if files.len() > 1 {
-            painter.title = file.parent().unwrap_or(file).display().to_string();
+            painter.title = name.display().to_string();
         }
         painter.check(chosen)?;
         painters.push(painter);
     }
-    agree(&mut painters)?;
+    check_alike(&painters)?;
+    share_factor(&mut painters);
     let path = match &arguments.output {
         Some(path) => path.clone(),
         None => beside(&files[0], &format!("{}_panels.png", painters[0].name())),
@@ -72,15 +74,10 @@ pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity
                 .map(move |index| (painter, *index, times[*index]))
         })
     };
-    let mut frame: Option<Frame> = None;
-    for (painter, index, _) in panels() {
-        frame = match (frame, painter.frame(index)?) {
-            (Some(frame), Some(own)) => Some(frame.union(own)),
-            (frame, own) => frame.or(own),
-        };
-    }
+    let frames = panels().map(|(painter, index, _)| painter.frame(index));
+    let frame = Frame::of_all(frames)?.ok_or_else(|| nothing_to_draw(&files[0]))?;
     let images =
-        panels().map(|(painter, index, time)| painter.image(index, &si(time, "s"), frame.as_ref()));
+        panels().map(|(painter, index, time)| painter.image(index, &si(time, "s"), Some(&frame)));
     let images: Vec<Image> = images.collect::<Result<_>>()?;
     Image::row(&images)
         .write_png(&path)
@@ -92,8 +89,8 @@ pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity
     Ok(())
 }
 
-/// Check that all results have the same dimension and drawn quantity, and draw the same deformation factor.
-fn agree(painters: &mut [Painter]) -> Result<()> {
+/// Check that all results have the same dimension and drawn quantity.
+fn check_alike(painters: &[Painter]) -> Result<()> {
     let (label, dimension) = (painters[0].quantity.label.clone(), painters[0].dimension);
     if let Some(other) = (painters.iter()).find(|painter| painter.quantity.label != label) {
         let message = format!(
@@ -109,12 +106,16 @@ fn agree(painters: &mut [Painter]) -> Result<()> {
         let message = "pictures side by side need results of the same dimension";
         return Err(Error::input(message));
     }
-    let smallest = painters
-        .iter()
-        .map(|painter| painter.factor)
-        .fold(f64::INFINITY, f64::min);
-    painters
-        .iter_mut()
-        .for_each(|painter| painter.factor = smallest);
     Ok(())
+}
+
+/// Draw all displacements with the smallest factor of the results that are displaced.
+fn share_factor(painters: &mut [Painter]) {
+    let displaced = painters.iter().filter(|painter| painter.is_displaced);
+    let factors = displaced.map(|painter| painter.factor);
+    if let Some(smallest) = factors.min_by(f64::total_cmp) {
+        painters
+            .iter_mut()
+            .for_each(|painter| painter.factor = smallest);
+    }
 }

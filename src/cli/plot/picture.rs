@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use fissure::error::Result;
+use fissure::error::{Error, Result};
 use fissure::output::ResultReader;
 
 use super::choice::choose_times;
@@ -138,6 +138,12 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
 pub fn check_png(path: &Path) -> Result<()> {
     let hint = "; `--y` draws curves, and `fissure movie` films";
     check_ending(path, &["png"], hint)
+}
+
+/// Return the error for a result without points in any output.
+pub fn nothing_to_draw(file: &Path) -> Error {
+    let message = format!("{}: no output has points to draw", file.display());
+    Error::input(message)
 }
 
 /// Return the path of a file beside a result. For a further result, such as `result_edge.vtkhdf`, the file

@@ -68,7 +68,7 @@ impl<L> Force<L> {
     where
         L: Law<D>,
     {
-        let (laws, points) = (&self.laws, [group.own, &group.far]);
+        let (laws, points) = (&self.laws, group.points());
         L::bond_force(simd, laws, &group.bond, points, &group.history, weights)
     }
 
@@ -104,7 +104,7 @@ impl<L> Force<L> {
             };
             return total.work(simd, &group.bond, L::LINEAR, group.rotation_i);
         }
-        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, [group.own, &group.far]);
+        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, group.points());
         let ([history_i, history_j], bond) = (&group.history, &group.bond);
         let i = law_i.end_work(simd, bond, point_i, history_i, group.rotation_i);
         let j = law_j.end_work(simd, bond, point_j, history_j, &group.rotation_j);
@@ -134,7 +134,7 @@ impl<L> Force<L> {
     {
         Ends {
             laws: &self.laws,
-            points: [group.own, &group.far],
+            points: group.points(),
             limits: [group.limits_i, &group.limits_j],
             weights: group.weights,
         }

@@ -43,6 +43,17 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub breakable: u8,
 }
 
+impl<K, const D: usize> Group<'_, K, D>
+where
+    K: Kernel<D, Far = <K as Kernel<D>>::Point>,
+{
+    /// Point numbers of points i and j.
+    #[inline(always)]
+    pub fn points(&self) -> [&K::Point; 2] {
+        [self.own, &self.far]
+    }
+}
+
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     /// Bits of the intact bonds within the horizon of point i.
     #[inline(always)]
