@@ -173,7 +173,7 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
-/// Validate decks and print their numbers (mass, bonds, step, memory, time), without running them.
+/// Validate decks and print their mass, bonds, memory and run time.
 ///
 /// Creates the points and finds the bonds on this machine. If a deck is too large for that, the numbers of
 /// points and bonds are estimated.

@@ -288,7 +288,7 @@ mod tests {
             let view = Projection::Orthographic(camera);
             let mut image = Image::new(400, 400);
             let mut cubes = Cubes::new(&mut image, camera);
-            let edge = 9.3;
+            let edge = 10.3;
             let pixel = |place: [f64; 3]| {
                 let [across, up] = view.project(place);
                 [200.0 + across, 200.0 - up]
@@ -338,18 +338,18 @@ mod tests {
 
     #[test]
     fn neighbouring_cubes_show_no_hairlines() {
-        let mut image = Image::new(200, 200);
+        let mut image = Image::new(300, 300);
         let mut cubes = Cubes::new(&mut image, Camera::isometric());
         for index in 0..20 {
             // The distances of the cubes are stretched by a tenth.
-            let y = 1.1 * 7.3 * f64::from(index);
+            let y = 1.1 * 10.3 * f64::from(index);
             let [across, up] = isometric().project([0.0, y, 0.0]);
             let depth = Camera::isometric().depth([0.0, y, 0.0]);
-            cubes.paint(([20.0 + across, 120.0 - up], depth), 7.3, RED);
+            cubes.paint(([20.0 + across, 120.0 - up], depth), 10.3, RED);
         }
         cubes.shade();
         for index in 1..19 {
-            let place = [0.0, 1.1 * 7.3 * (f64::from(index) + 0.5), 0.0];
+            let place = [0.0, 1.1 * 10.3 * (f64::from(index) + 0.5), 0.0];
             let [across, up] = isometric().project(place);
             let (column, row) = ((20.0 + across) as u32, (120.0 - up) as u32 - 2);
             assert_eq!(image.pixel(column, row), RED);

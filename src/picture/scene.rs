@@ -485,10 +485,11 @@ mod tests {
                 unit: "m/s",
                 longest_arrow: None,
             };
-            let zeros = vec![0.0; 1000];
+            let numbers = vec![1.0; 1000];
             let scene = Scene {
+                sizes: &numbers,
                 vectors: Some(vectors),
-                ..scene(&positions, &zeros, View::Plane)
+                ..scene(&positions, &numbers, View::Plane)
             };
             scene.marks().unwrap().longest_arrow()
         };

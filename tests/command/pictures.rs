@@ -637,11 +637,6 @@ fn curves_of_histories() {
     ] {
         expect(&command("plot", &[result], options), 2, &[words]);
     }
-    expect(
-        &command("plot", &[&one, &two], &[]),
-        2,
-        &["2 results are given"],
-    );
 }
 
 #[test]
