@@ -84,16 +84,30 @@ pub fn parse(text: &str) -> Result<Script, Mistake> {
 
 /// Return a line without its comment, which begins with `#` outside quotes.
 fn without_comment(row: &str) -> &str {
-    let mut quote = None;
-    for (index, c) in row.char_indices() {
-        match (c, quote) {
-            ('#', None) => return &row[..index],
-            ('"' | '\'', None) => quote = Some(c),
-            (c, Some(open)) if c == open => quote = None,
-            _ => {}
+    let mut rest = row;
+    while let Some(at) = rest.find(['#', '"', '\'']) {
+        rest = &rest[at..];
+        if rest.starts_with('#') {
+            return &row[..row.len() - rest.len()];
         }
+        let Some((_, after)) = quoted(rest) else {
+            break;
+        };
+        rest = after;
     }
     row
+}
+
+/// Split a text that begins with a quote, `'`, `"` or `"""`, into the quoted text and the text after the
+/// closing quote; `None` without a closing quote.
+fn quoted(text: &str) -> Option<(&str, &str)> {
+    let triple = "\"\"\"";
+    let mark = if text.starts_with(triple) {
+        triple
+    } else {
+        &text[..1]
+    };
+    text[mark.len()..].split_once(mark)
 }
 
 /// Split a line into words; a quoted text is one word.
@@ -102,9 +116,9 @@ fn words(text: &str) -> Result<Vec<String>, String> {
     let mut rest = text.trim_start();
     while let Some(first) = rest.chars().next() {
         if first == '"' || first == '\'' {
-            let end = rest[1..].find(first).ok_or("a quote is not closed")?;
-            words.push(rest[1..1 + end].to_owned());
-            rest = rest[end + 2..].trim_start();
+            let (word, after) = quoted(rest).ok_or("a quote is not closed")?;
+            words.push(word.to_owned());
+            rest = after.trim_start();
         } else {
             let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
             words.push(rest[..end].to_owned());
@@ -176,10 +190,11 @@ impl Variables {
         let mut result = String::new();
         let mut rest = text;
         while let Some(at) = rest.find(['$', '"', '\'']) {
-            if let Some(quote) = rest[at..].chars().next().filter(|c| *c != '$') {
-                let end = rest[at + 1..].find(quote).ok_or("a quote is not closed")?;
-                let (quoted, after) = rest.split_at(at + end + 2);
-                result.push_str(quoted);
+            if !rest[at..].starts_with('$') {
+                // The quote may be an apostrophe within a word. As in LAMMPS, nothing after it is replaced.
+                let after = quoted(&rest[at..]).map_or("", |(_, after)| after);
+                let (kept, after) = rest.split_at(rest.len() - after.len());
+                result.push_str(kept);
                 rest = after;
                 continue;
             }
@@ -352,12 +367,28 @@ mod tests {
     }
 
     #[test]
+    fn quotes_may_be_apostrophes_or_triple() {
+        for (text, expected) in [
+            ("print it's $x", &["print", "it's", "$x"][..]),
+            (
+                "print \"\"\"a \"b # $x\" it's\"\"\" c # d",
+                &["print", "a \"b # $x\" it's", "c"],
+            ),
+            ("print \"\" 'a # b' # c", &["print", "", "a # b"]),
+        ] {
+            let script = parse(text).unwrap();
+            assert_eq!(script.commands[0].words, expected, "{text}");
+        }
+    }
+
+    #[test]
     fn mistakes_have_a_line() {
         for (text, line, message) in [
             ("units si\nrun ${n}\n", 2, "the variable `n` is not defined"),
             ("fix 1 all print \"a\nrun 1\n", 1, "a quote is not closed"),
             ("run ${n\n", 1, "`${` is not closed"),
             ("timestep x\n", 1, "must be a number, is `x`"),
+            ("print \"\"\"a\" b\"\n", 1, "a quote is not closed"),
         ] {
             assert_eq!(
                 parse(text).unwrap_err(),

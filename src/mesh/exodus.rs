@@ -5,7 +5,7 @@ use std::path::Path;
 use super::Fault;
 use super::kind::{Between, Form, Kind};
 use super::netcdf::Netcdf;
-use super::{Group, Members, Mesh, Runs, SIDE_SET, fault, position};
+use super::{BLOCK, Group, Members, Mesh, Runs, SIDE_SET, fault, position};
 use crate::error::{Result, excerpt};
 
 /// Node orders of Exodus that differ from those of [`super::kind`]: for each node after the corners, the
@@ -123,7 +123,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         }
         let written = file.attribute(&variable, "elem_type")?;
         let shape = file.shape(&variable)?;
-        let [_, each] = shape[..] else {
+        let [count, each] = shape[..] else {
             return Err(format!(
                 "{variable}: must have an entry for each element and node"
             ));
@@ -139,7 +139,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         let connectivity = file.integers(&variable)?;
         let first = mesh.elements.len();
         if kind.form == Form::Point {
-            let volumes = sphere_volumes(file, block, &name)?;
+            let volumes = sphere_volumes(file, block, &name, count)?;
             mesh.volumes.resize(first, 0.0);
             mesh.volumes.extend(volumes);
         }
@@ -158,7 +158,8 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         mesh.groups.push(Group {
             name: Some(name),
             number: Some(id),
-            kind: "block",
+            kind: BLOCK,
+            is_entity: false,
             members: Members::Elements(Runs::union([(&[all][..], 0)].into_iter())),
         });
     }
@@ -182,6 +183,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
                 name: Some(name),
                 number: Some(id),
                 kind: if of_nodes { "node set" } else { SIDE_SET },
+                is_entity: false,
                 members: if of_nodes {
                     Members::Nodes(members)
                 } else {
@@ -193,20 +195,25 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
     Ok(())
 }
 
-/// Return the volumes of a block of sphere elements; empty if the block has no volumes.
+/// Return the volumes of a block of `count` sphere elements; empty if the block has no volumes.
 ///
 /// The volume is the attribute whose name ends with `volume`. In a block without names of attributes, the
 /// volume is the second attribute, as in the files of Peridigm, whose first attribute is a radius.
-fn sphere_volumes(file: &Netcdf, block: usize, name: &str) -> Fault<Vec<f64>> {
+fn sphere_volumes(file: &Netcdf, block: usize, name: &str, count: usize) -> Fault<Vec<f64>> {
     let [variable, names] = ["attrib", "attrib_name"].map(|prefix| format!("{prefix}{block}"));
     if !file.has(&variable) {
         return Ok(Vec::new());
     }
     let shape = file.shape(&variable)?;
-    let [_, each] = shape[..] else {
+    let [rows, each] = shape[..] else {
         let message = format!("{variable}: must have an entry for each element and attribute");
         return Err(message);
     };
+    if rows != count {
+        return Err(format!(
+            "{variable}: has {rows} rows, the block has {count} elements"
+        ));
+    }
     let names = if file.has(&names) {
         file.texts(&names)?
     } else {

@@ -466,13 +466,19 @@ impl File<'_> {
     fn finish(mut self) -> Result<Mesh> {
         // Entities are the groups of the dimensions that have no physical group.
         let physical = self.groups.groups;
-        let has_groups = |dimension| physical.iter().any(|(key, _)| key.0 == dimension);
-        let mut groups = self.entities.groups;
-        groups.retain(|(key, _)| !has_groups(key.0));
-        groups.extend(physical);
-        for (key, elements) in groups {
+        let mut has_groups = [false; 4];
+        for ((dimension, _), _) in &physical {
+            has_groups[*dimension as usize] = true;
+        }
+        let mut entities = self.entities.groups;
+        entities.retain(|((dimension, _), _)| !has_groups[*dimension as usize]);
+        let entities = entities.into_iter().map(|group| (true, group));
+        let physical = physical.into_iter().map(|group| (false, group));
+        for (is_entity, (key, elements)) in entities.chain(physical) {
+            // The names of the file belong to physical groups.
+            let name = self.names.get(&key).filter(|_| !is_entity);
             self.mesh.groups.push(Group {
-                name: self.names.get(&key).cloned(),
+                name: name.cloned(),
                 number: Some(key.1),
                 kind: match key.0 {
                     0 => "point",
@@ -480,6 +486,7 @@ impl File<'_> {
                     2 => "surface",
                     _ => "volume",
                 },
+                is_entity,
                 members: Members::Elements(elements),
             });
         }

@@ -25,6 +25,9 @@ use crate::error::{Error, Result, excerpt};
 use crate::message::nearest;
 use kind::KINDS;
 
+/// Kind of a group of elements in a file of Exodus; all elements of a block have the same type.
+pub const BLOCK: &str = "block";
+
 /// Kind of a group of faces of elements. The group holds the elements, not the faces.
 pub const SIDE_SET: &str = "side set";
 
@@ -185,6 +188,9 @@ pub struct Group {
     pub number: Option<i64>,
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
+    /// The group is a geometrical entity. A number without a kind stands for an entity only if no other group
+    /// has this number.
+    pub is_entity: bool,
     /// Members of the group.
     pub members: Members,
 }
@@ -222,7 +228,7 @@ impl Mesh {
         self.volumes
             .get(element)
             .copied()
-            .filter(|volume| *volume > 0.0)
+            .filter(|volume| *volume > 0.0 && self.elements.kind(element).form == Form::Point)
     }
 
     /// Test whether an element becomes a point of a problem with this number of dimensions.
@@ -245,7 +251,8 @@ impl Mesh {
 
     /// Find the group of a key among the groups that `is_wanted` accepts.
     ///
-    /// A key is a name or a number. The kind of the group may come before it, such as in `side set 1`.
+    /// A key is a name or a number. The kind of the group may come before it, such as in `side set 1`. For a
+    /// number without a kind, geometrical entities come after all other groups.
     ///
     /// # Errors
     /// If the key refers to groups of different kinds; the message lists these groups.
@@ -276,7 +283,13 @@ impl Mesh {
                 .collect()
         };
         let candidates = match key {
-            GroupKey::Number(number) => all(&|group| group.number == Some(*number)),
+            GroupKey::Number(number) => {
+                let mut found = all(&|group| group.number == Some(*number));
+                if found.iter().any(|group| !group.is_entity) {
+                    found.retain(|group| !group.is_entity);
+                }
+                found
+            }
             GroupKey::Name(name) => {
                 let exact = all(&|group| has_name(group, name, false));
                 let exact = if exact.is_empty() && self.ignores_case {

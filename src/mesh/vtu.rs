@@ -117,6 +117,7 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
             name: Some(format!("{array}={value}")),
             number: Some(*value).filter(|_| is_single && !of_nodes),
             kind: if *of_nodes { "points" } else { "cells" },
+            is_entity: false,
             members: if *of_nodes {
                 Members::Nodes(members.clone())
             } else {

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::comm::{Communicator, agree};
 use crate::dimension::Dimension;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, excerpt};
 use crate::mesh::{self, Format, Group, GroupKey, Members, Mesh, Runs};
 use crate::problem::{PointSource, Problem, Selector};
 
@@ -247,14 +247,42 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
                 *body = rest.body as u16;
             }
         }
-        let is_single = |element| mesh.elements.kind(element).dimension() == 0;
-        if (0..mesh.elements.len()).all(is_single) && !bodies.contains(&(rest.body as u16)) {
+        if let Some(what) = without_volume(mesh, &bodies, rest.body as u16) {
             let body = &problem.bodies[rest.body].name;
-            let message = format!("[body.{body}] points mesh: the mesh has {NO_VOLUME}");
+            let message = format!("[body.{body}] points mesh: {what} has {NO_VOLUME}");
             return Err(Error::input(message).at(rest.block_span));
         }
     }
     Ok(bodies)
+}
+
+/// Return the name of the part of the mesh that should belong to `rest`, the body without a block, but has
+/// only single-node elements without a volume.
+///
+/// In files of Exodus, this is a block of spheres that no other body selects. In other files, single-node
+/// elements may also define sets, so this is only the whole rest of the mesh.
+fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {
+    let is_left = |element: usize| bodies[element] == NO_BODY;
+    let is_single = |element: usize| mesh.elements.kind(element).dimension() == 0;
+    let mut left = (0..bodies.len())
+        .filter(|element| is_left(*element))
+        .peekable();
+    if !bodies.contains(&rest) && left.peek().is_some() && left.all(is_single) {
+        let is_shared = bodies.iter().any(|body| *body != NO_BODY);
+        let what = if is_shared {
+            "the rest of the mesh"
+        } else {
+            "the mesh"
+        };
+        return Some(what.to_owned());
+    }
+    let is_lost = |element: u64| is_left(element as usize) && is_single(element as usize);
+    let block = mesh.groups.iter().find(|group| match &group.members {
+        Members::Elements(elements) => group.kind == mesh::BLOCK && elements.iter().any(is_lost),
+        Members::Nodes(_) => false,
+    })?;
+    let name = block.name.as_deref().unwrap_or_default();
+    Some(format!("block {}", excerpt(name)))
 }
 
 /// Test whether all elements of a block are single nodes.
@@ -302,6 +330,16 @@ fn points(
             Some(volume) => (volume * scale.powi(3), nodes[0]),
             None => solid(mesh, element, &nodes, problem.dimension)?,
         };
+        if !(volume > 0.0 && volume.is_finite()) {
+            let message = if volume < 0.0 {
+                format!(
+                    "has the volume {volume:e} m³; its nodes are in the order of a mirrored element"
+                )
+            } else {
+                format!("has the volume {volume:e} m³, must be above 0")
+            };
+            return Err(mesh.elements.fault(element, message));
+        }
         let mut position = [0.0; 3];
         position[..dimension].copy_from_slice(&centroid[..dimension]);
         point_of[element] = points.len() as u32;
@@ -315,7 +353,8 @@ fn points(
     Ok((points, point_of))
 }
 
-/// Return volume and centroid of an element. `nodes` are the positions of its nodes, m.
+/// Return volume and centroid of an element. `nodes` are the positions of its nodes, m. The volume is negative
+/// if the nodes of a solid element have the order of a mirrored element.
 fn solid(
     mesh: &Mesh,
     element: usize,
@@ -328,25 +367,13 @@ fn solid(
                        element may be inverted";
         return Err(mesh.elements.fault(element, message));
     }
-    let is_solid = dimension.count() == 3;
     // A face or a line may have either orientation.
-    let size = if is_solid {
+    let size = if dimension.count() == 3 {
         measure.size
     } else {
         measure.size.abs()
     };
-    let volume = size * dimension.out_of_plane_measure();
-    if !(volume > 0.0 && volume.is_finite()) {
-        let message = if is_solid && size < 0.0 {
-            format!(
-                "has the volume {volume:e} m³; its nodes are in the order of a mirrored element"
-            )
-        } else {
-            format!("has the volume {volume:e} m³, must be above 0")
-        };
-        return Err(mesh.elements.fault(element, message));
-    }
-    Ok((volume, measure.centroid))
+    Ok((size * dimension.out_of_plane_measure(), measure.centroid))
 }
 
 /// Check that an element lies in the line or plane of the problem. The line or plane contains the first node

@@ -857,12 +857,41 @@ fn blocks_of_perilab_are_element_sets_of_abaqus() {
     let set = problem.sets.iter().find(|set| set.name == "first").unwrap();
     let is_first = |id: &u64| set::contains(set, 1.0, *id, [0.0; 3], 0);
     assert_eq!((0..3).filter(is_first).collect::<Vec<_>>(), [0]);
-    // The only block of a mesh has all elements.
+    // The only block of a deck has all elements, also those of other sets.
     let imported = folder
         .import("bar.yaml", &perilab_mesh("Abaqus", "bar.inp", &[1]))
         .unwrap();
+    assert_eq!(fate(&imported, &key(1)).0, Fate::Approximated);
     let found = dry_run(&folder.problem(&imported), 1, false).unwrap();
     assert_eq!(found.points, 3);
+    let imported = folder
+        .import("bar.yaml", &perilab_mesh("Abaqus", "bar.inp", &[2, 3]))
+        .unwrap();
+    let note = "the number of element sets of the mesh that are blocks is 2; name the element set";
+    assert_eq!(fate(&imported, &key(3)), (Fate::Approximated, note));
+    let imported = folder
+        .import("bar.yaml", &perilab_mesh("Abaqus", "later.inp", &[1, 2]))
+        .unwrap();
+    let note = "the mesh cannot be read yet; name the element sets";
+    for block in [1, 2] {
+        assert_eq!(fate(&imported, &key(block)), (Fate::Approximated, note));
+    }
+    // A mesh with one set has no other elements.
+    let single = mesh.replacen(
+        "*Elset, elset=First\n1\n*Elset, elset=Rest, generate\n2, 3\n",
+        "",
+        1,
+    );
+    assert_ne!(single, mesh);
+    folder.write("bar.inp", &single);
+    let imported = folder
+        .import("bar.yaml", &perilab_mesh("Abaqus", "bar.inp", &[1]))
+        .unwrap();
+    assert_eq!(fate(&imported, &key(1)).0, Fate::Taken);
+    let imported = folder
+        .import("bar.yaml", &perilab_mesh("Gmsh", "bar.msh", &[1]))
+        .unwrap();
+    assert_eq!(fate(&imported, &key(1)).0, Fate::Approximated);
 }
 
 /// Steps of PeriLab: conditions of two steps, and settings that only one step has.

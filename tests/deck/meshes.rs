@@ -714,6 +714,37 @@ fn entities_are_the_groups_of_a_mesh_without_physical_groups() {
     }
 }
 
+/// A geometrical entity never replaces a physical group: it has no name, and a number alone stands for the
+/// group.
+#[test]
+fn physical_groups_precede_entities() {
+    let mut written = two_cubes();
+    // No line and no corner has a physical group. The line is the curve 1 and the corner is the point 1.
+    written.elements[0].1 = 1;
+    written.elements[2].1 = 0;
+    written.elements[3].1 = 0;
+    written.names = vec![(1, 1, "a curve"), (2, 1, "face")];
+    for (encoding, bytes) in written.all() {
+        let mesh = parse("two.msh", &bytes).unwrap();
+        let find = |name: &str| {
+            let found = mesh.find(&GroupKey::Name(name.to_owned()), |_| true);
+            found.unwrap().map(|group| group.kind)
+        };
+        assert_eq!(find("a curve"), None, "{encoding}");
+        assert_eq!(find("face"), Some("surface"), "{encoding}");
+        assert_eq!(find("curve 1"), Some("curve"), "{encoding}");
+        let number = |number: i64, dimension: usize| {
+            let found = mesh.find(&GroupKey::Number(number), |group| {
+                mesh.dimension(group) <= dimension
+            });
+            found.map(|group| group.unwrap().kind)
+        };
+        assert_eq!(number(1, 2), Ok("surface"), "{encoding}");
+        // Two entities of one number remain ambiguous.
+        assert!(number(1, 1).is_err(), "{encoding}");
+    }
+}
+
 #[test]
 fn version_2_repeats_an_element_for_each_of_its_groups() {
     let folder = Folder::new("mesh-repeated");
@@ -1008,6 +1039,10 @@ fn damaged_lines_of_abaqus_have_their_message() {
         (
             "*INSTANCE, PART=p\n*END INSTANCE\n",
             "a.inp:1: *INSTANCE: there is no part `p`, and the instance has no nodes of its own",
+        ),
+        (
+            "*INSTANCE, NAME=i\n*END INSTANCE\n",
+            "a.inp:1: *INSTANCE: has neither `PART=` nor nodes of its own",
         ),
         (
             "*PART, NAME=p\n*PART, NAME=q\n",
@@ -1737,6 +1772,70 @@ fn spheres_without_a_volume_are_an_error() {
         assert_eq!(
             error,
             format!("[body.a] points block: `block_1` has {need}")
+        );
+    }
+    // The spheres of a block without volumes are not lost beside other elements.
+    let mut mixed = spheres();
+    mixed.reals.truncate(4);
+    let path = folder.write("mixed.e", &mixed.classic(1));
+    let error = generate(&solid(&path, &[]), &comm).unwrap_err().message;
+    assert_eq!(
+        error,
+        format!("[body.a] points mesh: block `block_2` has {need}")
+    );
+    let deck = |path: &Path, rest: &str, scale: f64| {
+        problem(&format!(
+            "dimension = '3d'\ngrid.horizon = 2\nmaterial.a.pmb = {{ density = 1, youngs_modulus = 1 }}\n\
+             time.end = 1\n[body.a]\nmaterial = 'a'\n\
+             points = {{ mesh = '{0}', block = 'block_1', scale = {scale:e} }}\n{rest}",
+            path.display()
+        ))
+    };
+    assert_eq!(points(&deck(&path, "", 1.0)).len(), 2);
+    let rest = format!(
+        "[body.b]\nmaterial = 'a'\npoints.mesh = '{}'\n",
+        path.display()
+    );
+    let error = generate(&deck(&path, &rest, 1.0), &comm).unwrap_err();
+    assert_eq!(
+        error.message,
+        format!("[body.b] points mesh: the rest of the mesh has {need}")
+    );
+    // A body without elements has another message if all spheres have volumes.
+    let mut single = spheres();
+    single.reals.truncate(4);
+    single.integers.truncate(2);
+    single.integers[0] = ("eb_prop1", vec![1], vec![1]);
+    single.reals[..3]
+        .iter_mut()
+        .for_each(|(_, lengths, values)| {
+            *lengths = vec![2];
+            values.truncate(2);
+        });
+    let path = folder.write("single.e", &single.classic(1));
+    let rest = format!(
+        "[body.b]\nmaterial = 'a'\npoints.mesh = '{}'\n",
+        path.display()
+    );
+    let error = generate(&deck(&path, &rest, 1.0), &comm).unwrap_err();
+    assert!(
+        error.message.starts_with("[body.b]: has no points"),
+        "{error}"
+    );
+    // The scale makes the volume too small or too large for a number.
+    for (written, scale, volume) in [(1e-300, 1e-10, "0e0"), (1e300, 1e10, "inf")] {
+        single.reals[3].2[1] = written;
+        let path = folder.write("extreme.e", &single.classic(1));
+        let error = generate(&deck(&path, "", scale), &comm).unwrap_err();
+        let expected = format!("element 1 (point): has the volume {volume} m³, must be above 0");
+        assert!(error.message.ends_with(&expected), "{error}");
+    }
+    for rows in [1, 3] {
+        let mut odd = spheres();
+        odd.reals[3] = ("attrib1", vec![rows, 2], vec![0.5; 2 * rows]);
+        assert_eq!(
+            parse("a.exo", odd.classic(1)).unwrap_err(),
+            format!("a.exo: attrib1: has {rows} rows, the block has 2 elements")
         );
     }
     let mut flat = spheres();

@@ -21,30 +21,42 @@ fn block_of_points(
         translation.log.taken(id_node, "block of the points");
         return Some(number);
     };
-    let set = match blocks {
-        MeshBlocks::Numbers => None,
-        _ if is_only && id == 1 => {
-            let note = "the only block has all elements of the mesh";
-            translation.log.taken(id_node, note);
-            return None;
+    if is_only && id == 1 && !matches!(blocks, MeshBlocks::Numbers) {
+        match blocks {
+            MeshBlocks::Sets(Some(sets)) if sets.len() < 2 => {
+                let note = "the only block has all elements of the mesh";
+                translation.log.taken(id_node, note);
+            }
+            _ => {
+                let note = "the only block of the deck has all elements of the mesh, also those of other groups";
+                translation.log.approximated(id_node, note);
+            }
         }
-        MeshBlocks::NumbersOrAll => None,
-        MeshBlocks::Sets(sets) => sets.get((id as usize).wrapping_sub(1)),
-    };
-    match set {
-        Some(set) => {
-            let note = format!(
-                "block of the points: the element set {}; PeriLab numbers the sets in no fixed order",
-                excerpt(set)
-            );
-            translation.log.approximated(id_node, note);
-            Some(Value::text(set))
-        }
-        None => {
-            translation.log.taken(id_node, "block of the points");
-            Some(number)
-        }
+        return None;
     }
+    let MeshBlocks::Sets(sets) = blocks else {
+        translation.log.taken(id_node, "block of the points");
+        return Some(number);
+    };
+    let Some(sets) = sets else {
+        let note = "the mesh cannot be read yet; name the element sets";
+        translation.log.approximated(id_node, note);
+        return Some(number);
+    };
+    let Some(set) = sets.get((id as usize).wrapping_sub(1)) else {
+        let note = format!(
+            "the number of element sets of the mesh that are blocks is {}; name the element set",
+            sets.len()
+        );
+        translation.log.approximated(id_node, note);
+        return Some(number);
+    };
+    let note = format!(
+        "block of the points: the element set {}; PeriLab numbers the sets in no fixed order",
+        excerpt(set)
+    );
+    translation.log.approximated(id_node, note);
+    Some(Value::text(set))
 }
 
 /// Write the materials and bodies. Return name, number and body of each block.

@@ -17,10 +17,12 @@ pub(super) enum Points {
 pub(super) enum MeshBlocks {
     /// The numbers of groups of the mesh.
     Numbers,
-    /// The numbers of groups of the mesh, but a mesh without groups is the block 1.
+    /// The numbers of groups of the mesh, but the only block of a deck has all elements if its number is 1: a
+    /// mesh without groups is the block 1.
     NumbersOrAll,
-    /// Positions, from 1, in this list of element sets.
-    Sets(Vec<String>),
+    /// Positions, from 1, in this list of element sets; `None` if the mesh cannot be read. The only block of a
+    /// deck has all elements if its number is 1.
+    Sets(Option<Vec<String>>),
 }
 
 impl MeshBlocks {
@@ -33,7 +35,8 @@ impl MeshBlocks {
     }
 }
 
-/// Return the element sets of an Abaqus file that are blocks in PeriLab, in the order of their numbers.
+/// Return the element sets of an Abaqus file that are blocks in PeriLab, in the order of their numbers; `None`
+/// if the file cannot be read.
 ///
 /// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
 /// last. PeriLab has no fixed order for the other sets, so the order is that of the file.
@@ -41,14 +44,10 @@ fn blocks_of_abaqus(
     translation: &Translation,
     path: &str,
     conditions: Option<&Node>,
-) -> Vec<String> {
+) -> Option<Vec<String>> {
     let path = translation.path(path);
-    let mesh = mesh::load(&path)
-        .ok()
-        .and_then(|bytes| mesh::parse(Format::Abaqus, &path, &bytes).ok());
-    let Some(mesh) = mesh else {
-        return Vec::new();
-    };
+    let bytes = mesh::load(&path).ok()?;
+    let mesh = mesh::parse(Format::Abaqus, &path, &bytes).ok()?;
     let used: Vec<&str> = conditions
         .into_iter()
         .flat_map(Node::tables)
@@ -77,7 +76,7 @@ fn blocks_of_abaqus(
             names.push(name.clone());
         }
     }
-    names
+    Some(names)
 }
 
 /// Read the source of the points.

@@ -153,6 +153,7 @@ impl Reader {
             name: Some(name.to_owned()),
             number: None,
             kind,
+            is_entity: false,
             members,
         });
     }

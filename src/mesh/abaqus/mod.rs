@@ -262,10 +262,14 @@ impl Reader {
                     .as_ref()
                     .filter(|_| part.nodes.is_empty())
                 {
-                    let message = format!(
-                        "*INSTANCE: there is no part {}, and the instance has no nodes of its own",
-                        excerpt(wanted)
-                    );
+                    let message = if wanted.is_empty() {
+                        "*INSTANCE: has neither `PART=` nor nodes of its own".to_owned()
+                    } else {
+                        format!(
+                            "*INSTANCE: there is no part {}, and the instance has no nodes of its own",
+                            excerpt(wanted)
+                        )
+                    };
                     return Err(instance.place.fault(message));
                 }
                 self.place_instance(part, &instance)?;
