@@ -283,7 +283,7 @@ fn several_times_and_results_are_drawn_side_by_side() {
         (
             vec![&slow],
             vec!["--time", "0,x"],
-            "`last`, `all` or times in s, is `x`",
+            "`all`, or times in s and `last`, is `x`",
         ),
         (
             vec![&slow; 5],
