@@ -80,7 +80,7 @@ impl Moments {
 
     /// Gradient of a function that is 1 at the neighbours with a broken bond and 0 at the other neighbours,
     /// 1/m. The result is the gradient of the linear function that fits best, by least squares with the
-    /// weights ω Ṽ. The result is 0 if the matrix C, see [`LAYER`], is not invertible.
+    /// weights ω Ṽ. The result is 0 if the matrix C, see `LAYER`, is not invertible.
     pub fn gradient(&self) -> Vector {
         let mean = self.mean();
         let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);
