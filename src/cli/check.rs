@@ -136,8 +136,15 @@ fn simulate(problem: &Problem, request: &Request) -> Result<String> {
     section::cost(&mut report, &run.cost, request.ranks, run.ghosts);
     section::time(&mut report, problem, run.stable_step);
     section::steps(&mut report, problem, &run.steps);
-    if let Some(seconds) = run.seconds {
-        section::run_time(&mut report, problem, &run.steps, seconds, request.ranks);
+    if let Some(seconds) = &run.seconds {
+        let steps = &run.steps;
+        section::run_time(
+            &mut report,
+            problem,
+            steps,
+            (seconds, &run.cost),
+            request.ranks,
+        );
     }
     section::warnings(&mut report, request.deck, &survey.warnings);
     Ok(report.text)

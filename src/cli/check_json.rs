@@ -52,9 +52,11 @@ pub fn simulated(
     add("sets", Value::Object(counts(sets, &survey.sets)));
     report.append(&mut costs(&run.cost, request, run.ghosts));
     report.append(&mut times(problem, run.stable_step, &run.steps));
-    if let Some(seconds) = run.seconds {
-        let name = "seconds_per_step_on_one_rank".to_owned();
-        report.insert(name, json!(seconds));
+    if let Some(seconds) = &run.seconds {
+        let mut add = |name: &str, value: Value| report.insert(name.to_owned(), value);
+        add("seconds_per_step_on_one_rank", json!(seconds.step));
+        add("seconds_per_row_on_one_rank", json!(seconds.row));
+        add("seconds_per_output_on_one_rank", json!(seconds.outputs));
     }
     report.insert(
         "warnings".to_owned(),

@@ -14,7 +14,7 @@ use fissure::problem::{
 };
 use fissure::solver::assign::{block_laws, pair_damage_laws};
 use fissure::solver::calibration::separation_energy_ratio;
-use fissure::survey::{BodyFigures, Cost, Interior, Survey};
+use fissure::survey::{BodyFigures, Cost, Interior, Seconds, Survey};
 
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
@@ -447,30 +447,37 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Append the estimated run time of the steps, or of one iteration of a load step. `seconds` is the measured
-/// time per step, s.
+/// Append the estimated run times of the steps, history rows and outputs, and of one force evaluation of a load
+/// step, on `ranks` ranks.
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,
     steps: &[(f64, f64)],
-    seconds: f64,
+    (seconds, cost): (&Seconds, &Cost),
     ranks: u32,
 ) {
     let threads = rayon::current_num_threads();
     let on = format!("{ranks} rank(s) × {threads} thread(s) of this machine");
-    let seconds = seconds / f64::from(ranks);
+    let parts = f64::from(ranks);
     let stages = problem.all_stages();
     let explicit = stages.iter().zip(steps);
     let explicit = explicit.filter(|(stage, _)| !stage.time.is_quasi_static());
     let explicit: f64 = explicit.map(|(_, (_, steps))| steps).sum();
     if explicit > 0.0 {
-        let whole = duration(seconds * explicit);
+        let whole = duration(seconds.step * explicit / parts);
+        let rows = duration(seconds.row * cost.rows / parts);
+        let outputs = cost.results.iter().zip(&seconds.outputs);
+        let outputs = outputs.map(|(result, seconds)| seconds * result.outputs as f64);
+        let outputs = duration(outputs.sum::<f64>() / parts);
         report.line(
             "run time",
-            format_args!("about {whole} for the steps, {on}"),
+            format_args!(
+                "about {whole} for the steps, {rows} for {} history rows, {outputs} for outputs without the disk, {on}",
+                cost.rows
+            ),
         );
     }
-    let evaluation = duration(seconds);
+    let evaluation = duration(seconds.step / parts);
     if problem.has_relaxation() {
         report.line(
             "run time",

@@ -64,6 +64,8 @@ pub struct Cost {
     pub results: Vec<ResultCost>,
     /// Size of one checkpoint, bytes; there are two.
     pub checkpoint: f64,
+    /// Number of history rows.
+    pub rows: f64,
 }
 
 /// Disk space of a result.
@@ -268,6 +270,7 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
         }),
         results,
         checkpoint: OVERHEAD + counts.points * saved + bonds,
+        rows,
     }
 }
 

@@ -6,9 +6,9 @@ use super::memory;
 use super::{Cost, Measured, Survey, ghost_share};
 use crate::comm::threads;
 use crate::error::Result;
-use crate::problem::Problem;
+use crate::problem::{Field, Problem};
 use crate::solver::conditions::output_members;
-use crate::solver::observers::HistoryObserver;
+use crate::solver::observers::{HistoryObserver, Snapshot};
 use crate::solver::steps::choose_steps;
 use crate::solver::{Simulation, Stepper};
 
@@ -37,12 +37,23 @@ pub struct DryRun {
     pub stable_step: f64,
     /// For each stage: first step (s) and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,
-    /// Wall-clock time per step on one rank, s; `None` if it was not measured.
-    pub seconds: Option<f64>,
+    /// Measured times; `None` if they were not measured.
+    pub seconds: Option<Seconds>,
+}
+
+/// Measured wall-clock times on one rank, s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seconds {
+    /// A time step or, with load steps, a force evaluation.
+    pub step: f64,
+    /// A row of the history.
+    pub row: f64,
+    /// The fields of an output, without writing them to the disk, for each of [`Problem::outputs`].
+    pub outputs: Vec<f64>,
 }
 
 /// Set up a problem on one rank, and compute its figures for `ranks` ranks. With `measure`, also measure the
-/// time per step.
+/// times of a step, a history row and the outputs.
 ///
 /// # Errors
 /// Same as for a run before its first step.
@@ -82,7 +93,9 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
         cost: Cost::of(&simulation, columns, &output_points, measured),
         stable_step: simulation.scaled_stable_step(),
         steps: choose_steps(problem, simulation.stable_step)?,
-        seconds: measure.then(|| seconds_per_step(simulation)),
+        seconds: measure
+            .then(|| measured_times(problem, simulation))
+            .transpose()?,
     })
 }
 
@@ -98,8 +111,11 @@ fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
     })
 }
 
-/// Measure the wall-clock time per step, s.
-fn seconds_per_step<const D: usize>(simulation: Simulation<'_, D>) -> f64 {
+/// Measure the wall-clock times of a step, a history row and the outputs.
+fn measured_times<const D: usize>(
+    problem: &Problem,
+    simulation: Simulation<'_, D>,
+) -> Result<Seconds> {
     let mut stepper = Stepper::new(simulation);
     // The first step warms the caches.
     stepper.advance();
@@ -108,5 +124,25 @@ fn seconds_per_step<const D: usize>(simulation: Simulation<'_, D>) -> f64 {
         stepper.advance();
         steps += 1;
     }
-    start.elapsed().as_secs_f64() / f64::from(steps)
+    let step = start.elapsed().as_secs_f64() / f64::from(steps);
+    let simulation = stepper.at_full_step();
+    let mut observer = HistoryObserver::new(simulation)?;
+    let start = Instant::now();
+    let snapshot = Snapshot::new(simulation);
+    observer.row(simulation, &snapshot);
+    let row = start.elapsed().as_secs_f64();
+    let outputs = problem.outputs().map(|output| {
+        let start = Instant::now();
+        let snapshot = if output.fields.contains(&Field::StrainEnergyDensity) {
+            Snapshot::new(simulation)
+        } else {
+            Snapshot::without_energies(simulation)
+        };
+        for field in &output.fields {
+            snapshot.field(simulation, *field);
+        }
+        start.elapsed().as_secs_f64()
+    });
+    let outputs = outputs.collect();
+    Ok(Seconds { step, row, outputs })
 }

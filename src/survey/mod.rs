@@ -12,7 +12,7 @@ mod speed;
 
 pub use bodies::BodyFigures;
 pub use cost::{Cost, Measured, ResultCost, ghost_share};
-pub use dry_run::{DryRun, dry_run};
+pub use dry_run::{DryRun, Seconds, dry_run};
 pub use interior::{Interior, interior};
 pub use size::{Size, size};
 pub use speed::{Speed, speed};
