@@ -465,15 +465,15 @@ pub fn run_time(
     let explicit: f64 = explicit.map(|(_, (_, steps))| steps).sum();
     if explicit > 0.0 {
         let whole = duration(seconds.step * explicit / parts);
-        let rows = duration(seconds.row * cost.rows / parts);
+        let rows = duration(seconds.row * cost.rows as f64 / parts);
         let outputs = cost.results.iter().zip(&seconds.outputs);
         let outputs = outputs.map(|(result, seconds)| seconds * result.outputs as f64);
         let outputs = duration(outputs.sum::<f64>() / parts);
         report.line(
             "run time",
             format_args!(
-                "about {whole} for the steps, {rows} for {} history rows, {outputs} for outputs without the disk, {on}",
-                cost.rows
+                "about {whole} for the steps, {rows} for {} history row(s), {outputs} for the fields of the outputs, {on}",
+                count(cost.rows)
             ),
         );
     }

@@ -185,13 +185,13 @@ impl Variables {
         Ok(())
     }
 
-    /// Replace `$x`, `${name}` and `$(formula)` outside quotes, as LAMMPS does.
+    /// Replace `$x`, `${name}` and `$(formula)` outside quotes.
     fn substitute(&self, text: &str) -> Result<String, String> {
         let mut result = String::new();
         let mut rest = text;
         while let Some(at) = rest.find(['$', '"', '\'']) {
             if !rest[at..].starts_with('$') {
-                // The quote may be an apostrophe within a word. As in LAMMPS, nothing after it is replaced.
+                // After an apostrophe within a word, nothing is replaced.
                 let after = quoted(&rest[at..]).map_or("", |(_, after)| after);
                 let (kept, after) = rest.split_at(rest.len() - after.len());
                 result.push_str(kept);

@@ -225,11 +225,7 @@ impl<const D: usize> RunState for Stepper<'_, D> {
 
     fn field(&mut self, field: Field) -> Vec<f64> {
         let simulation = self.at_full_step();
-        let snapshot = match field {
-            Field::StrainEnergyDensity => Snapshot::new(simulation),
-            _ => Snapshot::without_energies(simulation),
-        };
-        snapshot.field(simulation, field)
+        Snapshot::for_fields(simulation, [field]).field(simulation, field)
     }
 
     fn energies(&mut self) -> StateEnergies {

@@ -107,9 +107,9 @@ impl<'a> OutputFile<'a> {
         Ok(())
     }
 
-    /// Test whether the output contains a field that needs the energies of the bonds.
-    pub fn has_energies(&self) -> bool {
-        self.output.fields.contains(&Field::StrainEnergyDensity)
+    /// Return the fields of the output.
+    pub fn fields(&self) -> &[Field] {
+        &self.output.fields
     }
 
     /// Append an output. Collective.

@@ -199,12 +199,11 @@ impl<'a> Recorder<'a> {
             return Ok(());
         }
         let start = Instant::now();
-        let mut chosen = self.files.iter().filter(|file| is_chosen(file));
-        let energies = row || chosen.any(OutputFile::has_energies);
-        let snapshot = if energies {
+        let chosen = self.files.iter().filter(|file| is_chosen(file));
+        let snapshot = if row {
             Snapshot::new(simulation)
         } else {
-            Snapshot::without_energies(simulation)
+            Snapshot::for_fields(simulation, chosen.flat_map(OutputFile::fields).copied())
         };
         // If an output and a row share a snapshot, the time of the snapshot counts as output.
         let rows_start = if output { Instant::now() } else { start };

@@ -65,7 +65,7 @@ pub struct Cost {
     /// Size of one checkpoint, bytes; there are two.
     pub checkpoint: f64,
     /// Number of history rows.
-    pub rows: f64,
+    pub rows: u64,
 }
 
 /// Disk space of a result.
@@ -225,14 +225,14 @@ fn saved_width(problem: &Problem) -> usize {
 }
 
 fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
-    let rows = Schedule::every(problem.row_interval()).count(clock) as f64;
+    let rows = Schedule::every(problem.row_interval()).count(clock);
     let result = |(output, points): (&Output, &f64)| {
         let outputs = Schedule::of_outputs(output).count(clock);
         let components = output.fields.iter().map(|field| field.components());
         let components = components.sum::<usize>() as f64;
         let number = if output.single { 4.0 } else { 8.0 };
         let history = if output.name.is_none() {
-            8.0 * rows * counts.columns
+            8.0 * rows as f64 * counts.columns
         } else {
             0.0
         };

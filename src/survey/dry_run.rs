@@ -6,7 +6,7 @@ use super::memory;
 use super::{Cost, Measured, Survey, ghost_share};
 use crate::comm::threads;
 use crate::error::Result;
-use crate::problem::{Field, Problem};
+use crate::problem::Problem;
 use crate::solver::conditions::output_members;
 use crate::solver::observers::{HistoryObserver, Snapshot};
 use crate::solver::steps::choose_steps;
@@ -133,11 +133,7 @@ fn measured_times<const D: usize>(
     let row = start.elapsed().as_secs_f64();
     let outputs = problem.outputs().map(|output| {
         let start = Instant::now();
-        let snapshot = if output.fields.contains(&Field::StrainEnergyDensity) {
-            Snapshot::new(simulation)
-        } else {
-            Snapshot::without_energies(simulation)
-        };
+        let snapshot = Snapshot::for_fields(simulation, output.fields.iter().copied());
         for field in &output.fields {
             snapshot.field(simulation, *field);
         }

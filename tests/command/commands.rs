@@ -544,6 +544,7 @@ fn stages_are_reported_one_by_one() {
         "  stage 2                 100 steps of 100.0 ms\n",
         "  stage 3                 200 steps of 50.00 ms, more if bonds break\n",
         " for the steps, ",
+        " history row(s), ",
         " for an iteration, ",
     ] {
         assert!(printed.contains(line), "{line}{printed}");

@@ -16,7 +16,7 @@ impl Painter<'_> {
     pub fn check(&self, indices: &[usize]) -> Result<()> {
         if let Some(minus) = &self.minus {
             for index in indices {
-                minus.find(self.result, *index, self.times[*index])?;
+                minus.find(self.result, *index)?;
             }
         }
         if !self.is_partial() && !self.arguments.log {

@@ -16,15 +16,16 @@ const SAME_TIME: f64 = 1e-9;
 pub struct Subtrahend {
     path: PathBuf,
     result: ResultReader,
-    times: Vec<f64>,
+    /// For each output of the minuend, its time (s) and the index of the output of this result at this time.
+    outputs: Vec<(f64, Option<usize>)>,
 }
 
 impl Subtrahend {
-    /// Open the result.
+    /// Open the result that is subtracted from `minuend`.
     ///
     /// # Errors
     /// If the file is not a result, or does not have the field of the quantity with the same components.
-    pub fn open(path: &Path, quantity: &Quantity) -> Result<Self> {
+    pub fn open(path: &Path, minuend: &ResultReader, quantity: &Quantity) -> Result<Self> {
         let path = result_file(path);
         let result = ResultReader::open(&path)?;
         let fields = result.fields()?;
@@ -39,44 +40,45 @@ impl Subtrahend {
             return Err(Error::input(message));
         }
         let times = result.times()?;
+        let at = |time: f64| {
+            let is_same = |own: &f64| (own - time).abs() <= SAME_TIME * time.abs().max(own.abs());
+            (time, times.iter().position(is_same))
+        };
+        let outputs = minuend.times()?.into_iter().map(at).collect();
         Ok(Self {
             path,
             result,
-            times,
+            outputs,
         })
     }
 
-    /// Return the index of the output that belongs to an output of `minuend`; `time` is the time of this
-    /// output, s.
+    /// Return the index of the output that belongs to output `index` of `minuend`.
     ///
     /// # Errors
-    /// If this result has no output at this time, or another number of points.
-    pub fn find(&self, minuend: &ResultReader, index: usize, time: f64) -> Result<usize> {
-        let is_same = |other: &f64| (other - time).abs() <= SAME_TIME * time.abs().max(other.abs());
-        let Some(own) = self.times.iter().position(is_same) else {
-            return Err(self.wrong(&format!("has no output at t = {time:e} s")));
-        };
+    /// If this result has no output at the same time, or another number of points.
+    pub fn find(&self, minuend: &ResultReader, index: usize) -> Result<usize> {
+        let (_, own) = self.outputs[index];
+        let own = own.ok_or_else(|| self.wrong("has no output", index))?;
         if self.result.points(own) != minuend.points(index) {
-            return Err(self.wrong(&format!("has other points at t = {time:e} s")));
+            return Err(self.wrong("has other points", index));
         }
         Ok(own)
     }
 
-    /// Subtract the values of this result from those of consecutive points of an output of `minuend`; `time`
-    /// is the time of the output, s.
+    /// Subtract the values of this result from those of consecutive points of output `index` of `minuend`.
     ///
     /// # Errors
-    /// If this result has no output at this time, or other points, or is damaged.
+    /// If this result has no output at the same time, or other points, or is damaged.
     pub fn subtract(
         &self,
-        (minuend, index, time): (&ResultReader, usize, f64),
+        (minuend, index): (&ResultReader, usize),
         points: Range<usize>,
         quantity: &Quantity,
         values: &mut [f64],
     ) -> Result<()> {
-        let own = self.find(minuend, index, time)?;
+        let own = self.find(minuend, index)?;
         if self.result.ids_of(own, points.clone())? != minuend.ids_of(index, points.clone())? {
-            return Err(self.wrong(&format!("has other points at t = {time:e} s")));
+            return Err(self.wrong("has other points", index));
         }
         let subtracted = self.result.field_of(&quantity.field, own, points)?;
         for (value, subtracted) in values.iter_mut().zip(quantity.of(subtracted)) {
@@ -85,7 +87,8 @@ impl Subtrahend {
         Ok(())
     }
 
-    fn wrong(&self, what: &str) -> Error {
-        Error::input(format!("--minus {}: {what}", self.path.display()))
+    fn wrong(&self, what: &str, index: usize) -> Error {
+        let (path, (time, _)) = (self.path.display(), self.outputs[index]);
+        Error::input(format!("--minus {path}: {what} at t = {time:e} s"))
     }
 }

@@ -201,7 +201,7 @@ impl Frame {
     }
 
     /// Return a frame that encloses `self` and `other`.
-    pub fn union(self, other: Self) -> Self {
+    fn union(self, other: Self) -> Self {
         Self {
             bounds: self.bounds.union(other.bounds),
             limits: match (self.limits, other.limits) {

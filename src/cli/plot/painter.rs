@@ -31,8 +31,6 @@ pub struct Painter<'a> {
     pub quantity: Quantity,
     /// Result that is subtracted.
     pub(super) minus: Option<Subtrahend>,
-    /// Times of the outputs, s.
-    pub(super) times: Vec<f64>,
     has_displacement: bool,
     pub(super) section: f64,
     range: Range,
@@ -136,14 +134,13 @@ impl<'a> Painter<'a> {
         let mut quantity = Quantity::new(field, arguments.component.as_deref())?;
         let minus = arguments.minus.as_deref();
         let minus = minus
-            .map(|path| Subtrahend::open(path, &quantity))
+            .map(|path| Subtrahend::open(path, result, &quantity))
             .transpose()?;
         if minus.is_some() {
             quantity.label = format!("difference of {}", quantity.label);
         }
         let mut painter = Self {
             title: attribute("title"),
-            times: result.times()?,
             colours: match colours.transpose()? {
                 None if minus.is_some() => Some(ColourMap::Coolwarm),
                 colours => colours,
@@ -199,8 +196,7 @@ impl<'a> Painter<'a> {
         let values = (self.result).field_of(&self.quantity.field, index, points.clone())?;
         let mut values = self.quantity.of(values);
         if let Some(minus) = &self.minus {
-            let output = (self.result, index, self.times[index]);
-            minus.subtract(output, points, &self.quantity, &mut values)?;
+            minus.subtract((self.result, index), points, &self.quantity, &mut values)?;
         }
         Ok(values)
     }

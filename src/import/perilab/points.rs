@@ -17,8 +17,8 @@ pub(super) enum Points {
 pub(super) enum MeshBlocks {
     /// The numbers of groups of the mesh.
     Numbers,
-    /// The numbers of groups of the mesh, but the only block of a deck has all elements if its number is 1: a
-    /// mesh without groups is the block 1.
+    /// The numbers of groups of the mesh. The only block of a deck has all elements if its number is 1, because
+    /// the mesh may have no groups; the import does not read it.
     NumbersOrAll,
     /// Positions, from 1, in this list of element sets; `None` if the mesh cannot be read. The only block of a
     /// deck has all elements if its number is 1.

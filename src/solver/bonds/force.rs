@@ -177,9 +177,10 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
             && let Some(step) = self.bond_update.history_step()
         {
             let [own, far] = &self.laws;
+            let [here, there] = group.points();
             group.history = [
-                own.bond_history(&group.bond, group.own, &group.history[0], step),
-                far.bond_history(&group.bond, &group.far, &group.history[1], step),
+                own.bond_history(&group.bond, here, &group.history[0], step),
+                far.bond_history(&group.bond, there, &group.history[1], step),
             ];
         }
         let total = self.weighted(simd, group, group.weights);

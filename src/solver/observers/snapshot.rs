@@ -32,8 +32,21 @@ impl Snapshot {
         Self { stored }
     }
 
-    /// Take a snapshot without energies. Rows of the history and [`Field::StrainEnergyDensity`] need a
-    /// snapshot with energies.
+    /// Take a snapshot from which these fields can be computed. Energies are summed only if a field needs them;
+    /// rows of the history always need them, see [`Self::new`].
+    pub fn for_fields<const D: usize>(
+        simulation: &mut Simulation<'_, D>,
+        fields: impl IntoIterator<Item = Field>,
+    ) -> Self {
+        let mut fields = fields.into_iter();
+        if fields.any(|field| field == Field::StrainEnergyDensity) {
+            Self::new(simulation)
+        } else {
+            Self::without_energies(simulation)
+        }
+    }
+
+    /// Take a snapshot without energies.
     pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.intact_families(&simulation.model);
         stored.softened = simulation.forces.softened(&simulation.model);
