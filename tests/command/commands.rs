@@ -351,8 +351,10 @@ fn the_benchmark_counts_what_it_does() {
     let json = succeed(command.args(["--no-limits", "--contact", "0.25"]));
     assert_eq!(figure(&json, "touching_share"), 0.25, "{json}");
     let ratio = figure(&json, "contact_seconds") / figure(&json, "bonds_seconds");
-    assert_eq!(figure(&json, "contact_over_bonds"), ratio, "{json}");
     assert!(ratio > 0.0);
+    // Printed times are read back within a few units in the last place.
+    let printed = figure(&json, "contact_over_bonds");
+    assert!((printed / ratio - 1.0).abs() < 1e-14, "{json}");
     let wrong = finish(fissure(1).args(["bench", "--contact", "0.9"]));
     assert_eq!(wrong.status.code(), Some(2));
     let wrong = finish(fissure(1).args(["bench", "--points", "5,4"]));
