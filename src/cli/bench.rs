@@ -21,7 +21,7 @@ pub enum Law {
     Pmb,
     /// Linear peridynamic solid, the deck's `ordinary`: state-based, two passes.
     Lps,
-    /// Correspondence with the control of Wan et al., two passes; bonds break by their energy.
+    /// Correspondence with the zero-energy control of Wan et al.: two passes; bonds break by energy.
     Correspondence,
 }
 

@@ -15,8 +15,8 @@ use super::{CommandLine, Verbosity, file_error, outln, print};
 Example:
   fissure schema > fissure.schema.json
 
-A first line `#:schema ./fissure.schema.json` in a deck makes editors with taplo (VS Code: Even Better
-TOML) use it.")]
+Editors with taplo (in VS Code: the extension Even Better TOML) use this schema for a deck whose first
+line is `#:schema ./fissure.schema.json`.")]
 pub struct SchemaArguments {}
 
 /// Print the completion script of a shell.
@@ -44,7 +44,7 @@ pub struct ManArguments {
 
 /// Print a job script for Slurm.
 ///
-/// Before use, edit the lines between the marks `edit`: partition, account, modules.
+/// Before use, edit the lines between the marks `>>> edit` and `<<<`: partition, account, modules.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -59,11 +59,11 @@ pub struct SlurmArguments {
 /// A job script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Script {
-    /// One run on nodes × ranks × cores per rank.
+    /// One run on several nodes, with several ranks per node and several cores per rank.
     Hybrid,
     /// A run longer than the time limit: the job requeues itself and continues.
     Chain,
-    /// Runs of one deck with a table of parameters, one row per task.
+    /// Several runs of one deck: each task of a job array takes one row of a table of parameters.
     Array,
 }
 

@@ -23,14 +23,14 @@ Examples:
   fissure import in.peri                        writes in.peri.toml
   fissure import model.yaml --from peridigm     skip the detection")]
 pub struct ImportArguments {
-    /// Deck to translate: YAML, XML or an input script.
+    /// Deck to translate: YAML, XML, or an input script of LAMMPS.
     deck: PathBuf,
 
-    /// Path of the new deck [default: the name of the deck with the ending .toml].
+    /// Path of the new deck [default: the path of the source deck with the ending .toml].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 
-    /// Code that the deck was written for [default: detected].
+    /// Code for which the source deck was written [default: detected from the deck].
     #[arg(long, value_enum, value_name = "CODE")]
     from: Option<From>,
 

@@ -67,10 +67,10 @@ Examples:
   fissure plot out/plate --y kinetic_energy     a curve of the history
   fissure movie out/plate                       the damage over time
   fissure compare out/plate out/before          the differences between two results
-  fissure sweep plate.toml --set dx=2e-3,1e-3   the deck for several values
-  fissure import disk_impact.yaml               a deck of Peridigm, PeriLab or LAMMPS
+  fissure sweep plate.toml --set dx=2e-3,1e-3   run the deck for several values
+  fissure import disk_impact.yaml               translate a deck of another code
   fissure bench                                 measure the speed of this machine
-  fissure slurm hybrid > job.sbatch             a job script
+  fissure slurm hybrid > job.sbatch             print a job script
 
 Exit codes: 0 done, 1 the run failed or the compared results differ, 2 the deck or the arguments are
 wrong, 75 the run was stopped by a signal or the wall-clock limit and can be continued with --restart.")]
@@ -82,7 +82,7 @@ struct CommandLine {
     #[arg(short, long, global = true)]
     quiet: bool,
 
-    /// Print more: partition, storage of bonds, vector instructions, time step.
+    /// Print more; only `run` and `compare` have more to print.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     verbose: bool,
 }
@@ -115,24 +115,25 @@ Examples:
   fissure run plate.toml
   fissure run plate.toml --threads 8 --output /scratch/plate
   mpirun -n 2 --bind-to none fissure run plate.toml --threads 4
-  srun fissure run plate.toml                   in a Slurm job, see slurm/
+  srun fissure run plate.toml                   in a Slurm job, see `fissure slurm`
   fissure run plate.toml --restart              continue from the last checkpoint
   fissure run plate.toml --set tension=20e6     another value of a parameter of the deck
-  fissure run plate.toml --set time.safety=0.4  another value of any key, also one that the deck lacks
-  fissure run plate.toml --with slow.toml       the keys of another deck over those of this one
+  fissure run plate.toml --set time.safety=0.4  a value of any key, even if the deck lacks it
+  fissure run plate.toml --with slow.toml       keys of slow.toml replace those of plate.toml
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
-The loops use the largest vector instruction set that all ranks have; AVX-512 and AVX2 give the same bits.
-FISSURE_INSTRUCTIONS (avx2, avx512) limits it.
+The loops use the largest vector instruction set that all ranks have. The environment variable
+FISSURE_INSTRUCTIONS (avx2 or avx512) limits this set. Results with AVX2 and AVX-512 are bit-identical.
 
-SIGTERM, SIGINT or SIGUSR1 to any rank: within a few steps, the run writes a checkpoint and ends with exit
-code 75. Another signal more than a second later ends the rank at once. SIGUSR2: write a checkpoint and continue.")]
+SIGTERM, SIGINT or SIGUSR1 to any rank: within a few steps, the run writes a checkpoint and ends with
+exit code 75. If a rank receives another of these signals more than a second later, it exits at once
+with code 130. SIGUSR2 to any rank: the run writes a checkpoint and continues.")]
 struct RunArguments {
     /// Deck to run.
     deck: PathBuf,
 
-    /// Folder of the result [default: out/ and the deck's name].
+    /// Folder of the result [default: out/NAME for a deck NAME.toml].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 
@@ -148,7 +149,8 @@ struct RunArguments {
     #[arg(long, conflicts_with = "overwrite")]
     restart: bool,
 
-    /// Write a checkpoint and stop before this limit [default: the end of the Slurm job].
+    /// Write a checkpoint and stop before the run has lasted this long [default: the time limit of the Slurm
+    /// job].
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
@@ -156,7 +158,8 @@ struct RunArguments {
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter or any key of the deck; give a key with its section; may be repeated.
+    /// Override a parameter or any key of the deck; give a key with its section, such as time.safety=0.4;
+    /// may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
@@ -182,8 +185,8 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 Examples:
   fissure check plate.toml
   fissure check plate.toml --ranks 256          memory estimated for 256 ranks
-  fissure check -q *.toml                       whether decks are right
-  fissure check --json plate.toml | jq .points  figures for scripts")]
+  fissure check -q *.toml                       print only the errors of invalid decks
+  fissure check --json plate.toml | jq .points  numbers for scripts")]
 struct CheckArguments {
     /// Decks to check.
     #[arg(required = true, value_name = "DECK")]
@@ -201,7 +204,8 @@ struct CheckArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
 
-    /// Print the figures in SI units as JSON, one line per deck; for an invalid deck, print its error.
+    /// Print the numbers in SI units as JSON, one line per deck; for an invalid deck, print the error message
+    /// as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -229,14 +233,15 @@ struct DeckArguments {
 ///
 /// The problem is a cubic lattice with 122 neighbours within the horizon, a fixed time step and no output.
 /// Prints the bond updates per second and core, the time by phase, the memory of the whole process and the
-/// halo. Measures the memory bandwidth and the arithmetic rate of the same threads, and prints the fraction
-/// of each that the time loop reaches. docs/src/developers/performance.md explains the figures.
+/// halo traffic. Also measures the memory bandwidth and the arithmetic rate that the same threads can
+/// reach, and prints which fractions of these limits the time loop reaches.
+/// docs/src/developers/performance.md explains the numbers.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   fissure bench                                 262 144 points, PMB, bonds can break
   fissure bench --law lps --no-failure --threads 1
-  fissure bench --points 128,128,64             edges of a block
+  fissure bench --points 128,128,64             a block of 128 × 128 × 64 points
   mpirun -n 2 --bind-to none fissure bench --threads 1
   fissure bench --json                          one line for scripts
 
@@ -254,16 +259,16 @@ struct BenchArguments {
     #[arg(long)]
     no_failure: bool,
 
-    /// Add contact. SHARE, from 0 to 0.25, is the fraction of the points that touch other points, on the
-    /// faces of closed cracks.
+    /// Add contact. SHARE, from 0 to 0.25, is the fraction of the points that touch other points; these
+    /// points lie on the faces of closed cracks. Without SHARE, no points touch.
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Number of points, rounded to a cube, or edges X,Y,Z of a block in points.
+    /// Number of points, rounded to a cube number, or numbers of points X,Y,Z along the edges of a block.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 
-    /// Number of measured time steps, after 10 % warm-up steps.
+    /// Number of measured time steps; a tenth as many warm-up steps precede them.
     #[arg(short, long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
 
@@ -271,11 +276,12 @@ struct BenchArguments {
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Skip the measurement of the machine's limits, which needs some 100 MiB and several seconds.
+    /// Do not measure the memory bandwidth and the arithmetic rate, which needs some 100 MiB and several
+    /// seconds.
     #[arg(long)]
     no_limits: bool,
 
-    /// Print the figures as one line of JSON in SI units.
+    /// Print the numbers as one line of JSON in SI units.
     #[arg(long)]
     json: bool,
 }

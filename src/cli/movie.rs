@@ -33,7 +33,7 @@ pub struct MovieArguments {
     #[command(flatten)]
     picture: PictureArguments,
 
-    /// Draw each N-th output.
+    /// Draw only every N-th output.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
 
@@ -41,8 +41,8 @@ pub struct MovieArguments {
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     rate: u16,
 
-    /// Path of the film, .png or .apng [default: beside the result, named after field and component with
-    /// `_movie.png`].
+    /// Path of the film, .png or .apng [default: in the folder of the result, named after the field and
+    /// component, such as stress_xx_movie.png].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 

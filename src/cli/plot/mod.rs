@@ -24,8 +24,8 @@ use picture::PictureArguments;
 
 /// Draw a field of a result, or curves of a history.
 ///
-/// Plane problems are drawn in their plane, solids in a view from a camera or as a slice. With `--y`, or if a
-/// RESULT is a CSV file, columns are drawn as curves.
+/// Plane bodies are drawn in their plane, solids as seen from a camera or as a slice. With `--y`, columns of
+/// histories or of CSV files are drawn as curves.
 #[derive(Args)]
 #[command(after_help = "\
 Examples, fields:
@@ -53,8 +53,8 @@ pub struct PlotArguments {
     #[command(flatten)]
     picture: PictureArguments,
 
-    /// Time of the output in s (the nearest output is drawn), `last` or `all`. Several times, separated by
-    /// commas, are drawn side by side.
+    /// Draw the output that is nearest to the time T (s), the `last` output, or `all` outputs as one picture
+    /// each. The outputs at several times, separated by commas, are drawn side by side.
     #[arg(
         short,
         long,
@@ -73,8 +73,8 @@ pub struct PlotArguments {
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
 
-    /// Path of the picture: .png, or .svg for curves [default: beside the result, named after the field and
-    /// component, or the columns].
+    /// Path of the picture: .png, for curves also .svg [default: in the folder of the result, named after the
+    /// field and component, or after the columns].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }

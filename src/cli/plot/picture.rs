@@ -35,12 +35,12 @@ pub struct PictureArguments {
     )]
     pub(super) deform: String,
 
-    /// Draw only the points of a solid that are nearest to this plane, such as z=0.005.
+    /// Draw only the layer of points of a solid that is nearest to this plane, such as z=0.005 (m).
     #[arg(long, value_name = "AXIS=POSITION")]
     pub(super) slice: Option<String>,
 
-    /// Direction of the view of a solid: angle of the camera from +x towards +y, and above the x-y plane, in
-    /// degrees [default: -45,35.26].
+    /// Direction of the camera that looks at a solid: its angle from +x towards +y, and its angle above the
+    /// x-y plane, in degrees [default: -45,35.26].
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION",
@@ -49,20 +49,22 @@ pub struct PictureArguments {
     )]
     pub(super) camera: Option<String>,
 
-    /// Draw only the points in a half space, such as 'x<0.01' or 'z>0'. May be repeated.
+    /// Draw only the points in a half space, such as 'x<0.01' or 'z>0' (m). May be repeated.
     #[arg(long, value_name = "AXIS<POSITION")]
     pub(super) clip: Vec<String>,
 
-    /// Draw only the points whose value is in this range. An end may be left out: `0.3:`.
+    /// Draw only the points whose value is in this range. LOW or HIGH may be left out: `0.3:` means 0.3 and
+    /// above.
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     pub(super) threshold: Option<String>,
 
-    /// Field of `--threshold`; a component or invariant follows a colon: stress:xx [default: the drawn values].
+    /// Field whose values `--threshold` compares; a component or invariant may follow a colon, such as
+    /// stress:xx [default: the drawn field and component].
     #[arg(long, value_name = "NAME[:COMPONENT]", requires = "threshold")]
     pub(super) threshold_field: Option<String>,
 
-    /// Draw the lines of a CSV file, such as crack_NAME.csv, over a plane picture. The columns are x and y
-    /// (m), and branch if there are several lines. May be repeated.
+    /// Draw the lines of a CSV file, such as crack_NAME.csv, over the picture of a plane body. The columns of
+    /// the file are x and y (m); a column branch separates several lines. May be repeated.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) path: Vec<PathBuf>,
 
@@ -71,11 +73,12 @@ pub struct PictureArguments {
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(super) range: Option<String>,
 
-    /// Draw the difference to another result with the same points, at the same time.
+    /// Subtract another result, which must have the same points, and outputs at the same times.
     #[arg(long, value_name = "RESULT", conflicts_with = "log")]
     pub(super) minus: Option<PathBuf>,
 
-    /// Draw lines of equal value in plane pictures and slices: a number of lines, or values such as 1e6,2e6.
+    /// Draw lines of equal value in plane pictures and slices: N lines, or lines at given values such as
+    /// 1e6,2e6.
     #[arg(long, value_name = "N|VALUE,…", allow_hyphen_values = true)]
     pub(super) contours: Option<String>,
 
@@ -87,7 +90,7 @@ pub struct PictureArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
-    /// Logarithmic scale of the colours. Points with values up to 0 are grey.
+    /// Logarithmic scale of the colours. Points with values of 0 or below are grey.
     #[arg(long)]
     pub(super) log: bool,
 

@@ -23,7 +23,7 @@ use value::{Column, Reference};
 ///
 /// Each combination of values is a separate run in a separate process. Complete runs are not repeated, and
 /// interrupted runs continue from their checkpoints. Writes sweep.csv, a table of values picked from the
-/// histories, and a picture of each value over a parameter to the output folder.
+/// histories, to the output folder. Also draws each picked value over a parameter.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,13 +36,14 @@ Examples:
 
 A value with commas, such as [1, 2] or max(a, b), is one value.
 
-With a reference, the error of a value f is (f - reference)/|reference|, and its rate p over a
-parameter h is that of |f - reference| ~ h^p, from each run and the one before it. Without one, the
-rate is that of f - f0 ~ h^p from three successive runs, where f0 is unknown; it is printed only if h
-changes a spacing, a horizon or a time step, or is named by --x.
+With a reference r, the error of a value f is (f - r)/|r|. The convergence rate over a parameter h is
+the exponent p in |f - r| ~ h^p, computed from each run and the run before it.
+Without a reference, the rate is the exponent p in f - f0 ~ h^p, computed from three successive runs,
+because f0 is also unknown. This rate is printed only if h changes a spacing, a horizon or a time
+step, or if --x names h.
 
-Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 stopped by a signal; the same
-command continues.")]
+Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 a signal stopped the
+sweep; the same command continues it.")]
 pub struct SweepArguments {
     /// Deck to run.
     deck: PathBuf,
@@ -55,25 +56,26 @@ pub struct SweepArguments {
     #[arg(long, required = true, value_name = "NAME=VALUE,…", value_parser = design::axis)]
     set: Vec<Axis>,
 
-    /// Combine the k-th values of all lists instead of using all combinations.
+    /// Combine the k-th values of all --set options into run k, instead of running all combinations.
     #[arg(long)]
     zip: bool,
 
-    /// Folder of the runs and of the table [default: out/ and the deck's name with _sweep].
+    /// Folder of the runs and of the table [default: out/NAME_sweep for a deck NAME.toml].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 
-    /// Value to pick from a column of each history. PICK is last (default), first, max or min. May be
-    /// repeated.
+    /// Value to pick from the column COLUMN of each history. PICK is last (default), first, max or min. May
+    /// be repeated.
     #[arg(long, value_name = "[PICK:]COLUMN", value_parser = value::column)]
     value: Vec<Column>,
 
-    /// Expected number for a value; with several values, give the value as in --value.
+    /// Expected number for a --value; with several of them, write the one that is meant as VALUE, such as
+    /// max:kinetic_energy=2.5. May be repeated.
     #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
     reference: Vec<Reference>,
 
-    /// Parameter for rates and for the horizontal axis of pictures [default: the first one with several
-    /// values, all numbers].
+    /// Parameter on the horizontal axis of pictures, over which rates are computed [default: the first one
+    /// with several values that are all numbers].
     #[arg(long, value_name = "NAME")]
     x: Option<String>,
 
@@ -89,11 +91,11 @@ pub struct SweepArguments {
     #[arg(long, value_name = "WORDS")]
     launcher: Option<String>,
 
-    /// Run only these combinations, counted from 1, such as 1-4,7.
+    /// Run only the combinations with these numbers, counted from 1, such as 1-4,7.
     #[arg(long, value_name = "LIST")]
     rows: Option<String>,
 
-    /// Replace complete runs, and runs of another deck.
+    /// Replace complete runs, and runs of another deck in the same folder.
     #[arg(long)]
     overwrite: bool,
 }
