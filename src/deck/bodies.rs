@@ -211,7 +211,7 @@ fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<
         });
         if let Some(taker) = taker {
             let message = format!(
-                "[body.{}] points {key}: [body.{}] takes these {what} already; give each body its own \
+                "[body.{}] points {key}: [body.{}] already uses these {what}; give each body its own \
                  `block`",
                 body.name, taker.name
             );

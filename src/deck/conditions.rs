@@ -36,7 +36,8 @@ pub fn initials(
             }
             let vector = initial.displacement.as_ref().or(initial.velocity.as_ref());
             if let (Some(file), Some(_)) = (&initial.file, vector) {
-                let message = format!("{key} file: has all values; remove `displacement` and `velocity`");
+                let message =
+                    format!("{key} file: the file gives all initial values; remove `displacement` and `velocity`");
                 return Err(scope.error(file.span(), message));
             }
             let by_file = file.as_ref().filter(|file| file.columns.has_velocity());

@@ -64,7 +64,7 @@ pub fn contact(
             other_model.filter(|model| inherits && *model.get_ref() != ContactName::None)
         {
             let message = format!(
-                "{key} model: differs from that of [contact], whose `stiffness` means something else; give the pair its own"
+                "{key} model: differs from that of [contact], whose `stiffness` means something else; give the pair its own `stiffness`"
             );
             return Err(scope.error(model.span(), message));
         }
@@ -87,7 +87,7 @@ pub fn contact(
             .find(|pair| pair.is_of(names.each_ref()))
         {
             let message = format!(
-                "{key} bodies: [contact.pair.{}] has `{}` and `{}` already",
+                "{key} bodies: [contact.pair.{}] already describes the contact of `{}` and `{}`",
                 earlier.name, names[0], names[1]
             );
             return Err(scope.error(table.bodies.span(), message));

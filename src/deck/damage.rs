@@ -72,11 +72,10 @@ pub fn damage(
             };
             if !calibration.is_for(scope.dimension) {
                 let message = format!(
-                    "{key} calibration: its formula is known in {} only; `energy`, `opening` and `willberg2022` \
-                     are for every dimension",
+                    "{key} calibration: this formula is known only for {}; use `energy`, `opening` or `willberg2022`",
                     match calibration {
-                        Calibration::Peridigm2021 => "the plane",
-                        _ => "the plane and in space",
+                        Calibration::Peridigm2021 => "plane problems",
+                        _ => "plane problems and 3-D",
                     }
                 );
                 return Err(scope.error(law.calibration.span(), message));

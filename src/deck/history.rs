@@ -42,7 +42,7 @@ pub fn history(
         support_force(scope, name, table, sets)
     })?;
     if *history.angular_momentum.get_ref() && scope.dimension == 1 {
-        let message = "[history] angular_momentum: a bar has none";
+        let message = "[history] angular_momentum: is not available in 1-D, because a bar has no angular momentum";
         return Err(scope.error(history.angular_momentum.span(), message));
     }
     let statistics = resolve_each(&history.field, |name, table| {
@@ -192,7 +192,7 @@ fn component(
         }
         Some(component) if components == 1 => {
             let message = format!(
-                "{key} component: `{}` is a single number and has none",
+                "{key} component: `{}` is a single number and has no components",
                 field.name()
             );
             Err(scope.error(component.span(), message))

@@ -54,8 +54,9 @@ pub fn interface(
         let pair = pair(scope, &key, table, bodies)?;
         if let Some((earlier, ..)) = pairs.iter().find(|(_, other, _)| *other == pair) {
             let [a, b] = pair.map(|body| &bodies[body].name);
-            let message =
-                format!("{key} bodies: {earlier} has the bonds between `{a}` and `{b}` already");
+            let message = format!(
+                "{key} bodies: {earlier} already describes the bonds between `{a}` and `{b}`"
+            );
             return Err(scope.error(table.bodies.span(), message));
         }
         let own_rule = table.rule.as_ref().unwrap_or(all);
@@ -184,8 +185,8 @@ impl Damages<'_> {
         let ratio = (a / b).max(b / a);
         if ratio > MAX_STIFFNESS_RATIO {
             return error(format!(
-                "is for bodies whose stiffnesses differ by a factor of {MAX_STIFFNESS_RATIO} at most, and these differ by \
-                 {}; give `damage` with a `critical_stretch`",
+                "is for bodies whose stiffnesses differ by a factor of {MAX_STIFFNESS_RATIO} at most, and these stiffnesses differ by a \
+                 factor of {}; give `damage` with a `critical_stretch`",
                 format_number((10.0 * ratio).round() / 10.0)
             ));
         }
@@ -224,7 +225,8 @@ fn pair(
     let b = find(scope.source, second, names, &key)?;
     if a == b {
         let message = format!(
-            "{key}: `{}` is named twice; bonds within a body have its own constants",
+            "{key}: `{}` is named twice; name two different bodies, because bonds within a body have the constants of \
+             this body",
             bodies[a].name
         );
         return Err(scope.error(second.span(), message));
@@ -271,8 +273,8 @@ fn one_micromodulus(
         key.map_or(String::new(), |key| format!(" with a `{key}`"))
     };
     let message = format!(
-        "{key}: one micromodulus for both ends needs the same bond-based law in both bodies (a state-based law has none), but \
-         [body.{}] is `{first}`{} and [body.{}] is `{second}`{}; take `own`",
+        "{key}: this rule uses one micromodulus for both ends of a bond, so both bodies need the same bond-based law (a \
+         state-based law has no micromodulus), but [body.{}] is `{first}`{} and [body.{}] is `{second}`{}; use `own`",
         pair[0].name,
         with_key(pair[0]),
         pair[1].name,

@@ -163,7 +163,7 @@ impl Section<'_> {
                 None => Ok(own),
                 Some((name, _)) => Err(self.error(
                     Some(name),
-                    "the law has elastic constants of its own here; leave this out",
+                    "the material already has the constants of an anisotropic solid; remove this key",
                 )),
             };
         }
@@ -214,13 +214,13 @@ impl Section<'_> {
             let other = match others.clone().count() {
                 0 => String::new(),
                 _ => format!(
-                    ", or take the law {}, which has any",
+                    ", or use the law {}, which allows any Poisson's ratio",
                     law::names(others, "or")
                 ),
             };
             return Err(error(format!(
-                "Poisson's ratio is {:.4}, but a bond-based law in {} always has {:.4}; leave the \
-                 second constant out to accept that{other}",
+                "Poisson's ratio is {:.4}, but a bond-based law in {} always has {:.4}; remove the \
+                 second constant to accept this value{other}",
                 found.poisson_ratio,
                 dimension.name(),
                 own,
@@ -249,8 +249,8 @@ impl Section<'_> {
             format!("{}: give two of {names}", self.key)
         } else {
             format!(
-                "{}: give one or two of {names}; with one (not the last), Poisson's ratio is the \
-                 law's own",
+                "{}: give one or two of {names}; if you give only one (not `poisson_ratio`), the law \
+                 determines Poisson's ratio",
                 self.key
             )
         };

@@ -44,7 +44,7 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
 pub fn suits_a_column<T>(scope: &Scope, key: &str, name: &str, place: &Spanned<T>) -> Result<()> {
     if name.contains(['/', '.', ',']) {
         let message = format!(
-            "{key}: the name becomes that of columns, so it must not contain `/`, `.` or `,`"
+            "{key}: the name becomes part of column names, so it must not contain `/`, `.` or `,`"
         );
         return Err(scope.error(place.span(), message));
     }

@@ -39,7 +39,7 @@ pub fn further_outputs(
     let mut found: Vec<problem::Output> = Vec::new();
     for (name, table) in tables {
         let wrong = |words: String| {
-            let message = format!("[output.{name}]: the name becomes that of a file, {words}");
+            let message = format!("[output.{name}]: the name becomes part of a file name, {words}");
             scope.error(table.span(), message)
         };
         if !name
@@ -53,7 +53,7 @@ pub fn further_outputs(
         }
         if name.contains(SET_ASIDE) {
             let words =
-                format!("so it must not contain `{SET_ASIDE}`, as those of older results do");
+                format!("so it must not contain `{SET_ASIDE}`, which marks files of older results");
             return Err(wrong(words));
         }
         let mut names = found.iter().filter_map(|output| output.name.as_ref());

@@ -32,7 +32,7 @@ pub fn refinement(
     };
     let refinement = table.get_ref();
     if bodies.iter().any(problem::Body::has_gauss_points) {
-        let message = "[refinement]: needs `quadrature = \"midpoint\"`, one point a cell";
+        let message = "[refinement]: needs `quadrature = \"midpoint\"`, one point per cell";
         return Err(scope.error(table.span(), message));
     }
     let lattice = |body: &&problem::Body| matches!(body.points, PointSource::Lattice { .. });
@@ -62,7 +62,10 @@ pub fn refinement(
             None => finest,
             Some(level) if (1..=levels).contains(level.get_ref()) => *level.get_ref() as u32,
             Some(level) => {
-                let message = format!("{key} level: must be 1 to {levels}, the `levels`");
+                let message = format!(
+                    "{key} level: must be 1 to `levels`, which is {levels}, is {}",
+                    level.get_ref()
+                );
                 return Err(scope.error(level.span(), message));
             }
         };
@@ -155,7 +158,9 @@ fn rule(
     match (refinement.rule, &refinement.m) {
         (HorizonRule::Delta, None) => Ok(problem::HorizonRule::Delta),
         (HorizonRule::Delta, Some(ratios)) => {
-            let message = format!("{key}: goes with `rule = \"delta-m\"`; \"delta\" keeps m");
+            let message = format!(
+                "{key}: is only for `rule = \"delta-m\"`; with \"delta\", m is the same on all levels"
+            );
             Err(scope.error(ratios.span(), message))
         }
         (HorizonRule::DeltaM, None) => {

@@ -137,7 +137,9 @@ fn motion(
         return Ok(RigidMotion::Driven(motion.transpose()?.unwrap_or_default()));
     };
     if let Some(motion) = &table.motion {
-        let message = format!("{key} motion: a body with a `mass` moves freely; give one of them");
+        let message = format!(
+            "{key} motion: a body with a `mass` moves freely; give either `motion` or `mass`"
+        );
         return Err(scope.error(motion.span(), message));
     }
     if matches!(shape, RigidShape::HalfSpace { .. }) {

@@ -64,7 +64,7 @@ fn selector(
     ];
     scope.exactly_one(table.span(), &key, &given)?;
     if let (Some(first), None) = (&set.first_id, &set.file) {
-        let message = format!("{key} first_id: is the number of the first point in a `file`");
+        let message = format!("{key} first_id: is only for a set with `file`");
         return Err(scope.error(first.span(), message));
     }
     if let Some(condition) = &set.condition {

@@ -117,7 +117,7 @@ fn inline(
     }
     if written.len() != count {
         let message = format!(
-            "{key} times: must be as many as `values`, {count}, are {}",
+            "{key} times: must have as many entries as `values`, {count}, has {}",
             written.len()
         );
         return Err(scope.error(times.span(), message));
@@ -225,7 +225,7 @@ fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usi
         }
         None => {
             return Err(format!(
-                "has {} columns; name the one of the values by `column`: {}",
+                "has {} columns, {}; name the column of the values with the key `column`",
                 names.len(),
                 excerpt(&names.join(" "))
             ));

@@ -164,7 +164,7 @@ fn stage_end(
         )
     } else if is_last && !about(whole) {
         let whole = format_number(whole);
-        format!("the last stage ends with the run, [time] end = {whole} s; leave it out here")
+        format!("must be left out in the last stage, or be the end of the run, {whole} s")
     } else if !is_last && (end >= whole || about(whole)) {
         format!(
             "must be before the end of the run, {} s",
@@ -257,7 +257,10 @@ impl TimeSegment<'_> {
     ) -> Result<problem::Adaptive> {
         let key = format!("{} adaptive", self.key);
         if self.method.is_quasi_static() {
-            let message = format!("{key}: {} has no time steps", self.method.name());
+            let message = format!(
+                "{key}: is not available with `method = \"{}\"`, which has no time steps",
+                self.method.name()
+            );
             return Err(scope.error(table.span(), message));
         }
         let rule = table.get_ref();

@@ -101,8 +101,8 @@ fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
         return Err(scope.error(section.span(), message));
     }
     if let (Some(constraint), false) = (&deck.constraint, name == DimensionName::Line) {
-        let message = "constraint: only 1d has a constraint; in the plane the dimension is \"plane-stress\" or \
-                       \"plane-strain\"";
+        let message = "constraint: is only for the dimension \"1d\"; in plane problems, use the dimension \
+                       \"plane-stress\" or \"plane-strain\"";
         return Err(scope.error(constraint.span(), message));
     }
     let positive_or_one = |number: &Option<Number>, key| match number {
@@ -210,7 +210,7 @@ fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option
     };
     let error = |message: &str| Err(scope.error(share.span(), format!("[grid] jitter: {message}")));
     if bodies.iter().any(problem::Body::has_gauss_points) {
-        return error("needs `quadrature = \"midpoint\"`, one point a cell");
+        return error("needs `quadrature = \"midpoint\"`, one point per cell");
     }
     if deck.refinement.is_some() {
         return error("is not available with [refinement], whose points lie on grids");

@@ -122,7 +122,7 @@ impl Scope<'_> {
                 Ok(Instruction::Table(number))
             } else {
                 Err(format!(
-                    "`{name}` cannot be used here: a table is a value by time, and this expression may not use `t`"
+                    "`{name}` cannot be used here: the values of a table depend on time, and this expression may not use `t`"
                 ))
             };
         }

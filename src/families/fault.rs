@@ -142,10 +142,11 @@ fn too_many_neighbours(
         None => format!("more than {MOST_NEIGHBOURS}"),
     };
     let message = format!(
-        "{key}: {} m{is}, so a point of [body.{}] would have {count} neighbours there \
-         ({MOST_NEIGHBOURS} at most); check that the horizon is in metres",
+        "{key}: {} m{is}, so a point of [body.{}] would have {count} neighbours in [body.{}] \
+         (at most {MOST_NEIGHBOURS} are allowed); check that the horizon is in metres",
         format_number(near.horizon),
-        body.name
+        body.name,
+        other.name
     );
     Error::input(message).at(&body.horizon_place)
 }

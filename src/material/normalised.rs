@@ -37,7 +37,7 @@ const FORM: Key = Key {
         Word::new("energy"),
         Word {
             word: "diehl2016",
-            no_line: Some("the paper has no constant for 1-D; use \"energy\""),
+            no_line: Some("Diehl & Schweitzer (2016) give no constant for 1-D; use \"energy\""),
         },
     ]),
 };

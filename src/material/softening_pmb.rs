@@ -182,7 +182,10 @@ fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     ] {
         let (key, message) = match [first, second].map(|key| number(values, key).is_some()) {
             [true, true] => {
-                let message = format!("`{}` is given already; give one of them", first.name);
+                let message = format!(
+                    "`{}` is given already; give either `{}` or `{}`",
+                    first.name, first.name, second.name
+                );
                 (Some(second.name), message)
             }
             [false, false] => {
@@ -306,8 +309,8 @@ fn horizon_fault(given: &Given) -> Option<String> {
             let elastic = bond_based_critical_stretch(given, energy);
             let held = (strength / elastic).powi(2);
             format!(
-                "`fracture_energy`, {} J/m², must be above the {} J/m² that bonds of a horizon of {} m hold where \
-                 they begin to soften; take a horizon below {} m",
+                "`fracture_energy`, {} J/m², must be above {} J/m², the energy per area at which bonds begin to soften \
+                 with a horizon of {} m; use a horizon below {} m",
                 format_number(energy),
                 rounded(energy * held),
                 format_number(given.horizon),

@@ -351,7 +351,8 @@ impl File<'_> {
     /// Return the index of a node of an element.
     fn node(&self, element: u64, tag: u64) -> Result<u32> {
         self.indices.get(&tag).copied().ok_or_else(|| {
-            let message = format!("element {element}: there is no node {tag} before it");
+            let message =
+                format!("element {element}: node {tag} is not defined before this element");
             self.cursor.fault(message)
         })
     }

@@ -70,7 +70,7 @@ impl Columns {
                     names => excerpt(&names.join(" ")),
                 };
                 format!(
-                    "has no column `{}`; the columns are {has}, the known names {} volume block",
+                    "has no column `{}`; the columns are {has}, the known names are {} volume block",
                     known[0],
                     COORDINATES[..dimension].join(" ")
                 )

@@ -169,7 +169,7 @@ fn point(
     let Some((body, _)) = body else {
         return Err(format!(
             "block {block} belongs to no body; add a body with `points = {{ file = …, block = \
-             {block} }}`, or remove its rows"
+             {block} }}`, or remove the rows of this block"
         ));
     };
     Ok(Point::new(0, position, volume, *body))
@@ -308,7 +308,7 @@ mod tests {
         for (text, message) in [
             (
                 "# volumes\nx y block\n0 0 1\n",
-                "2: has no column `volume`; the columns are `x y block`, the known names x y volume block",
+                "2: has no column `volume`; the columns are `x y block`, the known names are x y volume block",
             ),
             ("x x y volume\n0 0 0 1\n", "1: has two columns `x`"),
             (

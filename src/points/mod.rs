@@ -243,7 +243,7 @@ fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Poi
                     let default = Columns::default_order(problem.dimension.count());
                     file = format!(
                         "no row of its file belongs to it; the file has no header, so its columns are `{}`; \
-                         `points.columns` names others",
+                         use `points.columns` to name other columns",
                         default.names.join(" ")
                     );
                     &file

@@ -110,8 +110,8 @@ impl Law {
                 let wanted = wanted.into_iter().find_map(|(is, key)| is.then_some(key));
                 if let Some(key) = wanted.filter(|_| !self.declaration.any_poisson_ratio) {
                     return Some(format!(
-                        "`{}` has a critical stretch of the same fracture energy; `{key}` is only for laws with any \
-                         Poisson's ratio",
+                        "bonds of `{}` break by the critical stretch that corresponds to the fracture energy; `{key}` is \
+                         only for laws that are not bond-based",
                         self.declaration.name
                     ));
                 }

@@ -163,9 +163,9 @@ impl EnergyWatch {
             )
         } else if is_quasi_static {
             format!(
-                "load steps have lost {size:.3e} J, {percent:.0} % of the largest energy, in jumps between equilibria: loads \
-                 that act in full in the first load step, or end at once, bodies that are stopped, unstable cracks, \
-                 snap-through or pieces that turn"
+                "load steps have lost {size:.3e} J, {percent:.0} % of the largest energy, in jumps between equilibria; \
+                 possible causes are loads that act in full in the first load step or end at once, bodies that are \
+                 stopped, unstable cracks, snap-through and pieces that turn"
             )
         } else {
             format!(

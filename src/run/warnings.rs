@@ -61,7 +61,7 @@ impl<'a> Job<'a> {
         let (step, stable) = (simulation.clock.step(), simulation.scaled_stable_step());
         if step > stable && step <= before {
             let text = format!(
-                "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s, since the grid has \
+                "[time] step: {step:.4e} s is larger than the stable step, {stable:.4e} s, since the grid has \
                  been refined after step {}; an automatic step follows the grid",
                 simulation.clock.number()
             );
@@ -106,8 +106,8 @@ impl<'a> Job<'a> {
         }
         if fracture < 0.0 {
             let text = format!(
-                "bonds passed their criterion within one step, before they carried a load, so the fracture energy is \
-                 not resolved ({fracture:.3e} J); check the units of the toughness and of the velocities, and repeat with \
+                "bonds that carried no load passed their criterion within one step, so the fracture energy, \
+                 {fracture:.3e} J, is not resolved; check the units of the toughness and of the velocities, and repeat with \
                  a shorter time step",
             );
             self.observer.message(&Message::Warning(text));

@@ -90,7 +90,7 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
 fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(
-            "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",
+            "[time] end: {} s take {steps:.1e} steps of {step:.1e} s; at most {MOST_STEPS:.0e} steps are allowed",
             format_number(length)
         );
         return Err(Error::input(message).at(&problem.places.step));
@@ -109,7 +109,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));
     if length / smallest > MOST_STEPS {
         return error(format!(
-            "[time] adaptive smallest: {} s take {:.1e} steps of {smallest:.1e} s, {MOST_STEPS:.0e} at most",
+            "[time] adaptive smallest: {} s take {:.1e} steps of {smallest:.1e} s; at most {MOST_STEPS:.0e} steps are allowed",
             format_number(length),
             length / smallest,
         ));
@@ -118,8 +118,9 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     let repeats = (libm::log(smallest / largest) / libm::log(rule.reduce)).ceil();
     if repeats > MOST_REPEATS {
         return error(format!(
-            "[time] adaptive reduce: with {} a step may be repeated {repeats:.0} times until {largest:.3e} s become \
-             `smallest`, {smallest:.3e} s; {MOST_REPEATS} at most: take a smaller `reduce` or a larger `smallest`",
+            "[time] adaptive reduce: with {}, a step of {largest:.3e} s may be repeated {repeats:.0} times before its size \
+             is `smallest`, {smallest:.3e} s; at most {MOST_REPEATS} repeats are allowed; use a smaller `reduce` or a larger \
+             `smallest`",
             format_number(rule.reduce),
         ));
     }
@@ -160,7 +161,7 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
     }
     let message = format!(
         "[time] {key}: {} s is too long for the largest `damping`, {} 1/s: it must be at most {SIGN_CHANGES}/damping = \
-         {:.3e} s, or velocities change their sign in each step",
+         {:.3e} s, because velocities change their sign in each longer step",
         format_number(step),
         format_number(rate),
         SIGN_CHANGES / rate,

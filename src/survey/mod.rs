@@ -205,7 +205,10 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
             warn(units.to_owned());
         }
         if critical >= LARGEST_STRETCH {
-            warn(format!(", at {:.3} times their length", 1.0 + critical));
+            warn(format!(
+                ", that is, at {:.3} times their initial length",
+                1.0 + critical
+            ));
         }
         let slower = stretched_stiffness(critical, problem.dimension.count()).sqrt();
         let unstable = safeties(problem)
@@ -214,7 +217,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
         if let Some(safety) = unstable {
             let largest = (100.0 / slower).floor() / 100.0;
             warn(format!(
-                "; bonds of this stretch need `safety = {largest:.2}` or less, it is {safety}"
+                "; bonds of this stretch need `safety = {largest:.2}` or less, but `safety` is {safety}"
             ));
         }
     }
@@ -264,8 +267,8 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
         let points = total(simulation.comm, found as u64);
         if points > D as u64 {
             let message = format!(
-                "[crack.{}]: passes through {points} points, which count to one side of it, so the cut lies beside them; \
-                 move the crack or the grid by half a spacing, or choose another spacing",
+                "[crack.{}]: passes through {points} points; they count as points on one side, so the actual cut lies \
+                 beside them; move the crack or the grid by half a spacing, or choose another spacing",
                 crack.name
             );
             warnings.push(Warning::new(message).at(&crack.span));
@@ -345,7 +348,7 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
     let (step, stable) = (clock.step(), simulation.scaled_stable_step());
     if step > stable && !simulation.is_quasi_static() {
         let message =
-            format!("[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s");
+            format!("[time] step: {step:.4e} s is larger than the stable step, {stable:.4e} s");
         warn(&places.step, message);
     }
     let rule = simulation.time_rule().adaptive;
@@ -353,7 +356,7 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
         && largest > stable
     {
         let message = format!(
-            "[time] adaptive largest: {largest:.4e} s is larger than the stable one, {stable:.4e} s"
+            "[time] adaptive largest: {largest:.4e} s is larger than the stable step, {stable:.4e} s"
         );
         warn(&places.step, message);
     }

@@ -1018,7 +1018,7 @@ fn damaged_lines_of_abaqus_have_their_message() {
         ),
         (
             "NODES*ELEMENT, TYPE=CPS3\n1, 1, 2, 4\n",
-            "a.inp:6: element 1: there is no node 4 before it",
+            "a.inp:6: element 1: node 4 is not defined before this element",
         ),
         (
             "NODES*ELEMENT, TYPE=CPS3\n1, 1, 2, 3\n1, 1, 2, 3\n",

@@ -57,7 +57,7 @@ impl Declared for BondAssociated {
         keys: KEYS,
         any_poisson_ratio: true,
         no_line: Some(
-            "`bond_associated_correspondence` has no 1-D form; `pmb` is the same there for ν = 0.25",
+            "`bond_associated_correspondence` has no 1-D form; use `pmb`, which is the same law in 1-D for ν = 0.25",
         ),
         breaks_by_energy: true,
         examples: &[

@@ -176,11 +176,14 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
                 .filter(|key| values.number(key) != 0.0),
         )
     {
-        return fault_at(key, "in the plane the axes turn by `angle_1` alone");
+        return fault_at(key, "in plane problems, only `angle_1` is available");
     }
     let axes = ANGLES.into_iter().find(|key| values.number(key) != 0.0);
     if let (Some(key), None) = (axes, full.or(orthotropic)) {
-        return fault_at(key, "an isotropic solid has no axes");
+        return fault_at(
+            key,
+            "angles are only for anisotropic solids; an isotropic solid has no axes",
+        );
     }
     if let (Some(key), "neo-hooke") = (full.or(orthotropic), values.word(super::STRESS.name)) {
         return fault_at(
@@ -195,7 +198,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
         };
         let outside = given_of(values, full_entries().enumerate().filter_map(across));
         if let (false, Some(key)) = (space, outside) {
-            let message = "in the plane Hooke's matrix has c11, c12, c16, c22, c26 and c66";
+            let message = "in plane problems, Hooke's matrix has only the entries c11, c12, c16, c22, c26 and c66";
             return fault_at(key, message);
         }
         // A diagonal entry of 0 or below is an error by itself, so the message points at this entry.

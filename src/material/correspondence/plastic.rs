@@ -98,7 +98,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     if is_logarithmic && matches!(dimension, Dimension::PlaneStress { .. }) {
         return fault(
             &STRAIN_MEASURE,
-            "`\"logarithmic\"` is for plane strain and space, not for plane stress",
+            "`\"logarithmic\"` is for plane strain and 3-D, not for plane stress",
         );
     }
     if let Some(constant) = hooke::own_constants(values) {

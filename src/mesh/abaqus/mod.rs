@@ -434,7 +434,7 @@ impl Reader {
         let nodes: std::result::Result<Vec<u32>, u64> = numbers[1..].iter().map(node).collect();
         let nodes = nodes.map_err(|node| {
             place.fault(format!(
-                "element {number}: there is no node {node} before it"
+                "element {number}: node {node} is not defined before this element"
             ))
         })?;
         if part.element_indices.insert(number, index).is_some() {

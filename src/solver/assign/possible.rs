@@ -70,7 +70,7 @@ fn pair_damage_is_possible(
     ];
     if let Some((_, key)) = of_points.into_iter().find(|(is, _)| *is) {
         return error(format!(
-            "`{key}` belongs to the points of a body and not to the bonds of a pair; give the pair damage without it"
+            "`{key}` belongs to the points of a body and not to the bonds of a pair; give the pair a damage without `{key}`"
         ));
     }
     if damage.rule.is_unmeasured() {
@@ -92,8 +92,8 @@ fn pair_damage_is_possible(
     {
         let [work, stretch] = if first { [a, b] } else { [b, a] };
         return error(format!(
-            "bonds break by their work in `{work}` and by their stretch in the bond-based law of `{stretch}`; take \
-             `critical_stretch` damage, or the same kind of law in both bodies"
+            "with this damage, bonds break by their work in `{work}`, but by their stretch in `{stretch}`, whose law is \
+             bond-based; use `critical_stretch` damage, or a bond-based law in both bodies or in none"
         ));
     }
     Ok(())
@@ -179,9 +179,9 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     });
     if let Some(other) = of_other_kind {
         return error(format!(
-            "its bonds break by another rule than those of body `{}`, to which it may be bonded (by work, as \
-             `energy` has it for laws that are not bond-based, by stretch, or by a measure of stress); give both the \
-             same rule, or set `[interface] rule = \"none\"`",
+            "bonds may join this body and body `{}`, but the bonds of the two bodies break by different quantities \
+             (stretch, work or a measure of stress; with `energy`, bonds break by stretch if their law is bond-based, \
+             otherwise by work); give both bodies damage by the same quantity, or set `[interface] rule = \"none\"`",
             other.name
         ));
     }

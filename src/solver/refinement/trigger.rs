@@ -54,8 +54,8 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
         if places.product::<f64>() > MOST_PLACES {
             let spacings = block.horizon / edges[0];
             let message = format!(
-                "[grid] horizon: {spacings:.4e} spacings of level {} are too many for a refined grid; check that it \
-                 is in metres",
+                "[grid] horizon: is {spacings:.4e} spacings of level {}, too many for a refined grid; check that the \
+                 horizon is in metres",
                 block.level
             );
             return Err(Error::input(message).at(&problem.places.horizon));
