@@ -157,7 +157,7 @@ fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<
     }
     let corner = |vertex: &Vector| match &vertex.get_ref()[..] {
         [x, y] => Ok([scope.number(x, &key)?, scope.number(y, &key)?]),
-        _ => Err(scope.error(vertex.span(), format!("{key}: a corner is [x, y]"))),
+        _ => Err(scope.error(vertex.span(), format!("{key}: a corner must be [x, y]"))),
     };
     let corners = vertices.get_ref().iter().map(corner);
     Ok(Polygon::new(corners.collect::<Result<_>>()?))
