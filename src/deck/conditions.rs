@@ -45,7 +45,7 @@ pub fn initials(
             let velocity = velocity.or(by_file.map(|file| (file.span.clone(), "file")));
             if let (Some((place, name)), true) = (velocity, first.is_quasi_static()) {
                 let message = format!(
-                    "{key} {name}: initial velocities have no effect in a run that begins with {}; remove them",
+                    "{key} {name}: initial velocities have no effect in a run that begins with `method = \"{}\"`; remove them",
                     first.name()
                 );
                 return Err(scope.error(place, message));

@@ -39,7 +39,7 @@ A value with commas, such as [1, 2] or max(a, b), is one value.
 With a reference r, the error of a value f is (f - r)/|r|. The convergence rate over a parameter h is
 the exponent p in |f - r| ~ h^p, computed from each run and the run before it.
 Without a reference, the rate is the exponent p in f - f0 ~ h^p, computed from three successive runs,
-because f0 is also unknown. This rate is printed only if h changes a spacing, a horizon or a time
+because the limit f0 is also unknown. This rate is printed only if h changes a spacing, a horizon or a time
 step, or if --x names h.
 
 Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 a signal stopped the
