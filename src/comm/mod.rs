@@ -1,8 +1,8 @@
 //! Communication between ranks. No other folder calls MPI.
 //!
 //! All other code uses [`Communicator`]: a few collective operations, and a halo exchange that overlaps with
-//! computation. It has two implementations: [`mpi::World`], and [`threads`] for one rank without MPI and for
-//! tests with several ranks in one process.
+//! computation. [`Communicator`] has two implementations: [`mpi::World`], and [`threads`] for one rank
+//! without MPI and for tests with several ranks in one process.
 
 mod by_id;
 mod file_sync;
@@ -166,7 +166,7 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     Err(unpack(&packed))
 }
 
-/// Span of a packed error without a span.
+/// Entry for the span in a packed error that has no span.
 const NO_SPAN: [u64; 2] = [u64::MAX; 2];
 
 /// Number of bytes of a packed error before its message: exit code, and start and end of the span.

@@ -36,14 +36,14 @@ pub struct BondEnergy {
     pub critical: f64,
     /// α: effect of the smallest stretch of a point on its threshold.
     pub alpha: f64,
-    /// Critical stretch s0 of the same fracture energy, to which α refers.
+    /// Critical stretch s0 for the same fracture energy; the threshold depends on α s_min/s0.
     pub stretch: f64,
-    /// Rule for the work of bonds.
+    /// Rule for breaking bonds by their work.
     pub rule: WorkRule,
 }
 
 impl Calibration {
-    /// Whether the formula of the source exists in this dimension.
+    /// Whether this formula is defined in `dimension` dimensions.
     pub fn is_for(self, dimension: usize) -> bool {
         match self {
             Self::Energy | Self::Opening(_) | Self::Willberg2022 => true,
@@ -52,7 +52,8 @@ impl Calibration {
         }
     }
 
-    /// Return the energy per area that breaking all bonds dissipates, divided by the fracture energy.
+    /// Return the energy per area that breaking all bonds across an area dissipates, divided by the fracture
+    /// energy.
     pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         match (self, dimension) {
@@ -162,7 +163,7 @@ mod tests {
         };
         // s0 − α s_min = 0.03 is 1.5 s0.
         assert!((law.threshold(1.0, -0.02) - 9.0).abs() < 1e-12);
-        // The work grows with the square of the strength.
+        // The threshold is proportional to the square of the strength.
         assert!((law.threshold(0.5, 0.0) - 0.25 * law.critical).abs() < 1e-12);
     }
 }

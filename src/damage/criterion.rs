@@ -1,4 +1,5 @@
-//! Criteria that break bonds. Points i and j of a bond decide with the same operations.
+//! Criteria that break bonds. Both ends of a bond evaluate its criterion with the same operations, so that
+//! their results agree.
 //!
 //! - Stretches are compared by x of [`crate::material::bond`], which needs no root.
 //! - Energies are compared by the work of the force states of the ends that act on the bond.
@@ -45,18 +46,18 @@ pub enum Criterion {
 /// their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
-/// Factors that convert a work threshold to another horizon. Entry `[e][k]` converts the threshold of point k
-/// to end e; all are 1 if both horizons are equal.
+/// Factors that convert a work threshold or a stretch threshold to another horizon. Entry `[e][k]` converts
+/// the threshold of point k to end e; all are 1 if both horizons are equal.
 pub type HorizonRatios = [[f64; 2]; 2];
 
 /// Critical stretch of a bond between points whose critical stretches belong to different horizons.
 ///
 /// An end e acts on the bond if the bond is within the horizon of e. The energy of this end is then ½ k_e s²
 /// |ξ|, with the stiffness k_e.
-/// If only end e acted, the bond would break at m_e = min_k t_k √(δ_k/δ_e), with the critical stretch t_k and
-/// the horizon δ_k of point k.
-/// The bond breaks when the energies of the acting ends add up to the sum of their energies at these
-/// stretches: s² = Σ k_e m_e²/Σ k_e.
+/// If only end e acted, the bond would break at the stretch m_e = min_k t_k √(δ_k/δ_e), with the critical
+/// stretch t_k and the horizon δ_k of point k.
+/// The bond breaks when the energies of the acting ends add up to the sum of their energies at the stretches
+/// m_e: s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is √(δ_k/δ_e).
@@ -85,7 +86,7 @@ impl StretchConversion {
     }
 }
 
-/// Rule for the work of bonds.
+/// Rule for breaking bonds by their work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
     /// Bonds that can break: stretched bonds only, or compressed bonds too.
@@ -126,7 +127,7 @@ impl Sense {
         }
     }
 
-    /// Return the bits of the bonds that can break in this sense.
+    /// Return `bits` without the bonds that cannot break in this sense.
     #[inline(always)]
     fn select<const D: usize>(self, bits: u8, bond: &Bond<D>) -> u8 {
         match self {
@@ -225,8 +226,8 @@ impl Criterion {
     #[inline(always)]
     pub fn limit(&self) -> f64 {
         match *self {
-            // `next_down` lowers the limit by one bit: only bonds above the limit are tested, and a bond at
-            // exactly the critical stretch must break.
+            // `next_down` lowers the limit to the next smaller number: only bonds above the limit are tested,
+            // and a bond at exactly the critical stretch must break.
             Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
             // The margin of 1e-12 covers the round-off by which this bound and the threshold of a bond
             // differ.
@@ -357,8 +358,9 @@ impl Criterion {
         }
     }
 
-    /// Fraction of the energy of each broken bond that exceeds its criterion, because breaking is checked
-    /// once per step: 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)². The stretch of the bond must be set.
+    /// Return the fraction of the energy of each broken bond that exceeds its criterion: 1 − (s_c/s)², 1 −
+    /// w_c/w or 1 − (σ_c/σ)², at least 0. Bonds exceed their criterion because it is checked only once per
+    /// step. Criteria of stretch read [`Bond::stretch`].
     #[inline(always)]
     pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
         &self,

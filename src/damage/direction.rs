@@ -182,7 +182,8 @@ pub(super) struct DirectionFactors<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> DirectionFactors<'a, D> {
-    /// Copy ξ and 1/|ξ| of the bonds. With a reference to the bonds, all their data would stay in memory.
+    /// Copy ξ and 1/|ξ| of the bonds. With a reference to the bonds, all their data would stay in memory
+    /// instead of registers.
     #[inline(always)]
     pub(super) fn new<S: Simd>(
         simd: S,

@@ -1,4 +1,4 @@
-//! Damage laws, one per file: criteria that break bonds.
+//! Damage laws: criteria that break bonds.
 
 mod bond_energy;
 mod criterion;
@@ -38,7 +38,7 @@ impl DamageLaw {
         }
     }
 
-    /// α: effect of the smallest stretch of a point on its threshold; 0 for the criterion of stress.
+    /// α: effect of the smallest stretch of a point on its threshold; 0 for the stress criterion.
     pub fn alpha(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.alpha,

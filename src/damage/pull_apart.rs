@@ -1,12 +1,13 @@
 //! Energy for pulling an ordinary state-based body apart along a plane, with a critical stretch.
 //!
 //! The halves of a body move apart by Δ normal to the plane. A bond at the angle φ to the normal has the
-//! extension Δ cos φ and breaks at s0|ξ|. Breaking a bond dissipates its energy ½ (A/m) ω|ξ|²s0², and at each
-//! end the loss of dilatation energy κ θ (d/m) ω|ξ|² s0. Here θ is the dilatation of the bonds that are still
-//! intact. The sum over all bonds across a unit area is G0 = δ s0² (A b + κ τ). The numbers b and τ depend
-//! only on the dimension and the influence function; ω, κ and A are defined in [`crate::material::Ordinary`].
-//! For the Poisson ratio of bond-based laws κ = 0. With ω = 1/|ξ| the result is then the critical stretch of
-//! the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014, eq. 5).
+//! extension Δ cos φ and breaks at s0|ξ|. Breaking a bond dissipates its energy ½ (A/m) ω|ξ|²s0². At each
+//! end, the dilatation energy decreases by κ θ (d/m) ω|ξ|² s0, which is dissipated, too. Here θ is the
+//! dilatation of the bonds that are still intact. The sum over all bonds across a unit area is G0 = δ s0² (A
+//! b + κ τ). The numbers b and τ depend only on the dimension and the influence function; ω, κ and A are
+//! defined in [`crate::material::Ordinary`]. For the Poisson ratio of bond-based laws κ = 0. With ω = 1/|ξ|
+//! the result is then the critical stretch of the bond-based law (Silling & Askari 2005; Dipasquale et al.
+//! 2014, eq. 5).
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -28,7 +29,7 @@ pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
 }
 
 fn quadrature(dimension: i32, influence: Influence) -> [f64; 2] {
-    // δ = 1; thickness and solid angle are omitted because these cancel.
+    // δ = 1. The thickness is omitted because it cancels.
     let moment = influence.moment(dimension + 1);
     let (mass, share) = match dimension {
         3 => (4.0 * PI * moment, 0.25),

@@ -84,9 +84,9 @@ pub struct StressLimit {
     pub rule: StressRule,
 }
 
-/// Computation of the mean stress measure (Pa) over the ends of each bond that count. The result also has one
-/// bit per bond, set if at least one end counts. An end counts if the bond is within the horizon of the end,
-/// and the point at this end carries stress. Points i and j compute the same bits.
+/// Computation of the mean stress measure of each bond, Pa. An end counts in the mean if the bond is within
+/// the horizon of the end, and the point at this end carries stress. The result also has one bit per bond,
+/// set if at least one end counts. Points i and j compute the same bits.
 pub(super) struct MeanStress {
     stresses: [Lanes; 2],
     acting: [u8; 2],

@@ -1,8 +1,8 @@
 //! Compressed neighbour indices of list families, in groups of eight.
 //!
 //! Points close in space usually have close indices. A compact group stores its lowest index and eight
-//! 16-bit differences. If the range of indices is too wide, for example for owned points with ghosts, the
-//! group stores eight full indices in a second array.
+//! 16-bit differences. If the range of indices is too wide, for example in a group of owned points and
+//! ghosts, the group stores eight full indices in a second array.
 
 use std::ops::Range;
 

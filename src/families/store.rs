@@ -20,9 +20,9 @@ pub struct Store {
 
 /// A range of groups that can be split between threads.
 pub struct Groups<'a> {
-    /// See [`Store`].
+    /// One bit per bond, clear if the bond is broken or absent.
     pub intact: &'a mut [u8],
-    /// See [`Store`].
+    /// One bit per bond, clear if the bond is unbreakable; `None` if all bonds can break.
     pub breakable: Option<&'a [u8]>,
     width: usize,
     history: &'a mut [Lanes],

@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 
 use super::{Lanes, WIDTH};
 
-/// Several quantities of eight bonds or points: `[Lanes; N]`, or a pair of such arrays.
+/// Several quantities of eight bonds or points: an array or a matrix of [`Lanes`], or a pair of such tuples.
 pub trait LaneTuple: Copy + Send + Sync {
     /// Number of quantities.
     const COUNT: usize;

@@ -1,4 +1,4 @@
-//! Dynamic dispatch over all laws, for work per point, for set-up and outputs, and for bonds between
+//! Dynamic dispatch over all laws: for computations per point, for set-up and outputs, and for bonds between
 //! different laws.
 
 use nalgebra::SMatrix;

@@ -28,7 +28,8 @@ pub struct Declaration {
     pub linear: bool,
     /// Return the invariants of the law with these values of its keys.
     pub invariants: fn(&Values) -> Invariants,
-    /// Return the error in the combination of the keys' values, if there is one.
+    /// Return the error in the combination of the keys' values, if there is one. The field is `None` if every
+    /// combination is allowed.
     pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
     /// Return the elastic constants that follow from the law's own keys, if the deck gives these keys. Such a
     /// deck must give no other elastic constants.

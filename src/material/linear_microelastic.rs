@@ -18,7 +18,7 @@ use crate::lanes::{IsaSet, Lanes};
 pub struct LinearMicroelastic {
     /// c, N/m⁶.
     pub micromodulus: f64,
-    /// Classical energy density at unit isotropic stretch W₁ (J/m³), to which the energy sum of each point is
+    /// Classical energy density W₁ (J/m³) at unit isotropic stretch, to which the energy sum of each point is
     /// scaled; `None` for no scaling.
     pub corrected_to: Option<f64>,
 }

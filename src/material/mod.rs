@@ -1,7 +1,8 @@
-//! Material laws, one per file. A law evaluates bonds, eight at a time. Laws are independent of decks,
-//! points, ranks and fields.
+//! Material laws. A law evaluates bonds, eight at a time. Laws are independent of decks, points, ranks and
+//! fields.
 //!
-//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007).
+//! The force density that a bond exerts on point i, per volume of its neighbour j, is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩
+//! (Silling et al. 2007).
 //! The force state T_i depends on three inputs:
 //!
 //! - the bond;
@@ -342,7 +343,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Test whether points need enough bonds in all directions, compared with their family before pre-cracks.
+    /// Test whether the law needs enough bonds in all directions. The intact bonds of a point are then
+    /// compared with its family before pre-cracks.
     fn needs_shape(&self) -> bool {
         false
     }
@@ -377,7 +379,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Return the energy per bond of a point, divided by the energy per bond of an interior point at the
+    /// Return the energy per bond of a point, divided by the energy per bond in an untruncated family at the
     /// same strain. `_sums` are the sums of [`Self::reference_contribution`].
     ///
     /// Laws that give truncated families the energy density of untruncated families return more than 1 for

@@ -22,7 +22,7 @@ use crate::lanes::Lanes;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalised {
-    /// Classical energy density at unit isotropic stretch W₁, J/m³.
+    /// Classical energy density W₁ at unit isotropic stretch, J/m³.
     pub energy: f64,
     /// Micromodulus to which the critical stretch of the damage law belongs, N/m⁶; `None` if the critical
     /// stretch holds for all bonds.
@@ -86,8 +86,9 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// Return the critical stretch of a fracture energy (J/m²). For the printed law it follows in the plane
-/// from eq. 16–17, and in space from the energy of all bonds across a plane. Otherwise it is that of `pmb`.
+/// Return the critical stretch of a fracture energy (J/m²). For the printed law, the critical stretch follows
+/// in the plane from eq. 16–17, and in space from the energy of all bonds across a plane. For the other law,
+/// it is the critical stretch of `pmb`.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     if !as_printed(given) {
         return bond_based_critical_stretch(given, energy);

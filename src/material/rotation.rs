@@ -24,7 +24,7 @@ pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 const MOST_ITERATIONS: usize = 40;
 
 /// R has converged if no entry changes by more than this in an iteration; the next change would be of the
-/// order of its square.
+/// order of the square of this change.
 const CONVERGED: f64 = 1e-9;
 
 /// Return R of a deformation gradient in the plane or in space. In space, the result is the identity if det F

@@ -71,8 +71,8 @@ const RESIDUAL: f64 = 0.01;
 /// Number of decay stretches from s0 to sc, ln(1/r).
 const DECAYS: f64 = 4.605_170_185_988_092;
 
-/// β and γ of a straight line. [`CONCRETE`] has β and γ of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t,
-/// 0 at 3.6 G_F/f_t.
+/// β and γ of a straight line. [`CONCRETE`] has β and γ of concrete (Petersson 1981): the stress is ⅓ f_t at
+/// the crack opening 0.8 G_F/f_t, and 0 at 3.6 G_F/f_t.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
 const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 

@@ -80,9 +80,9 @@ pub fn domain(
     }
 }
 
-/// Select the points of this rank that lie in cells adjacent to the cells of each other rank. Also return the
-/// indices of all points that are sent to any rank; only these points can have ghosts as neighbours. `owned`
-/// is sorted by cell.
+/// For each other rank, select the points of this rank in cells that are adjacent to cells of the other rank.
+/// Return their bytes by rank, and the indices of all selected points; only these points can have ghosts as
+/// neighbours. `owned` is sorted by cell.
 fn offers(
     comm: &dyn Communicator,
     cells: &Cells,

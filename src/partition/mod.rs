@@ -19,7 +19,7 @@ use cells::{CellLoads, Cells, max_cells};
 /// length of the longest bond.
 ///
 /// # Errors
-/// If METIS fails; equal on all ranks.
+/// If METIS fails; the error is the same on all ranks.
 pub fn distribute(
     comm: &dyn Communicator,
     pieces: Vec<Point>,

@@ -6,15 +6,15 @@ use super::super::symmetric::{from_entries, mixed};
 use super::super::{Bond, Rotation, rotation};
 use crate::lanes::{LaneTuple, Lanes};
 
-/// A shape tensor is singular if its determinant is below this fraction of that of an isotropic family with
-/// the same trace.
+/// A shape tensor counts as nearly singular if its determinant is below this fraction of that of an isotropic
+/// family with the same trace.
 const SINGULAR: f64 = 1e-2;
 
 /// Limit of the stiffness of a family's intact part, relative to the initial family. A stiffer part carries
 /// no force.
 ///
 /// The time step is stable for initial families only. Without a limit, points of torn plates moved without
-/// bound; a limit of 16 prevented this.
+/// bound; even a limit of 16 prevented this.
 const STIFFEST: f64 = 8.0;
 
 /// Contribution of a bond to the shape tensor (diagonal and mixed entries) and to Σ ω η⊗ξ Ṽ (row by row).
@@ -98,7 +98,7 @@ impl<const D: usize> ShapeTensor<D> {
     }
 }
 
-/// Compute the rotation of a family from its [`FamilyShare`] sums; the identity if the shape tensor is
+/// Compute the rotation of a family from its [`FamilyShare`] sums; the identity if the shape tensor is nearly
 /// singular.
 pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
     let inverse = ShapeTensor::<D>::new(sums).inverse();

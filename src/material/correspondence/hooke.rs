@@ -286,7 +286,8 @@ pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64
     })
 }
 
-/// Return Hooke's matrix in the material's axes, Pa; `None` for isotropic constants.
+/// Return Hooke's matrix in the material's axes, Pa; `None` for isotropic constants. The entries are NaN if
+/// the compliance has no inverse.
 fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let number = |key: &str| values.get(key).map_or(0.0, |_| values.number(key));
     if given_of(values, full_entries()).is_some() {

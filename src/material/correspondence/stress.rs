@@ -18,7 +18,7 @@ pub enum Stress {
     /// equals St. Venant–Kirchhoff at small strains without rotation, and is not objective.
     Willberg2022(Hooke),
     /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress the thickness adjusts so
-    /// that the stress across is 0.
+    /// that the stress across the plane is 0.
     NeoHooke(NeoHooke),
 }
 
@@ -240,7 +240,8 @@ impl NeoHooke {
         (log, energy)
     }
 
-    /// Solve μ (e^q − 1) + ½ λ (own + q) = 0 for q by Newton's method.
+    /// Return the logarithm q of the squared stretch across the plane in plane stress. `own` is ln det FᵀF of
+    /// the plane. q solves μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
     fn across(&self, own: f64) -> f64 {
         let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
         for _ in 0..20 {

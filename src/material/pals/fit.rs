@@ -8,12 +8,13 @@ use crate::material::symmetric::mixed;
 /// Smallest σ/σ₀; bonds with σ ≤ 0 would repel when stretched. At a corner of a block σ/σ₀ is 0.42.
 const SMALLEST: f64 = 0.1;
 
-/// Largest σ/σ₀. It is 1.8 at edges of a block, 12 in bars of three points, and 30 in sheets of two.
+/// Largest allowed σ/σ₀. Without a limit, σ/σ₀ reaches 1.8 at edges of a block, 12 in bars of three points
+/// across, and 30 in sheets of two layers.
 const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest are dropped; their multipliers stay 0.
 ///
-/// The smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two points, and 0 in a single
+/// The smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two layers, and 0 in a single
 /// layer.
 const RANK: f64 = 5e-3;
 
@@ -44,7 +45,8 @@ fn of_product(a: usize, b: usize) -> [usize; 3] {
     exponents
 }
 
-/// Result of a fit: of all functions of the direction that satisfy given sums, the one nearest to a constant.
+/// Result of a fit: among all functions of the bond direction with prescribed sums over the family, the
+/// function nearest to a constant.
 pub(super) struct Fit<const D: usize> {
     /// Matrix of the function: T in n·T n or N·T N.
     pub(super) tensor: SMatrix<f64, D, D>,
@@ -55,7 +57,7 @@ pub(super) struct Fit<const D: usize> {
 }
 
 /// Fit the function c + Σ τ_k p_k to the conditions Σ p_l (c + Σ τ_k p_k) = wanted_l, as far as the family
-/// allows.
+/// allows. c is `constant`; p_k and wanted_k are the entries of `conditions`.
 ///
 /// `sums` are the sums over the family of the monomials of degree 4, in the components of n or N.
 /// `one` is the polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².

@@ -54,8 +54,8 @@ fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
     }
 }
 
-/// Stiffness of a bond per stretch and volume at an end with these constants, in arbitrary units:
-/// micromoduli are proportional to E/δ^(d+1).
+/// Return the bond stiffness at an end with these constants, in arbitrary units. Micromoduli are proportional
+/// to E/δ^(d+1).
 fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
     let Constants { elastic, horizon } = constants;
     elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
@@ -173,8 +173,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Data of the points of this body that failure criteria read. Only the bonds to bodies with which this body
-/// has a separate damage law count.
+/// Return which data of this body's points the failure criteria read. Only bonds between two bodies with a
+/// separate damage law for these bonds count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -269,7 +269,7 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
 }
 
 /// Failure criterion of the bonds between two blocks, from the damage of both blocks; see [`Criterion`]. A
-/// block without damage has no threshold.
+/// block without damage has no threshold. `per_point` is whether thresholds are stored per point.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],

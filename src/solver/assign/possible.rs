@@ -40,7 +40,8 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     horizons_are_possible(problem)
 }
 
-/// Return an error if bonds that never break would soften.
+/// Return an error if the law of a body of this pair breaks bonds itself. The bonds of the pair are
+/// unbreakable, so they would soften and never break.
 fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
     let softens = |body: &&Body| pair.has(body) && body.material.law.declaration.breaks_by_itself();
     let Some(body) = problem.bodies.iter().find(softens) else {

@@ -1,9 +1,9 @@
 //! Consequences of broken bonds.
 //!
-//! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends decide with the same
-//! operations. The force sums exclude the bonds that break. Point numbers that follow from sums over bonds,
-//! and the forces that depend on them, are then recomputed. This is done only at the points that a broken
-//! bond affects.
+//! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends evaluate the
+//! criterion with the same operations. The force sums exclude the bonds that break. Point numbers that follow
+//! from sums over bonds, and the forces that depend on them, are then recomputed. This is done only at the
+//! points that a broken bond affects.
 
 use std::ops::Range;
 use std::time::Instant;

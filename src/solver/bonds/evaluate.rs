@@ -422,7 +422,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
         return;
     }
     let results = L::Sum::columns_mut(sums);
-    // No law has more point sums. Loops are compiled only for the point sums that a law has.
+    // No law has more than three point sums. Loops are compiled only for the point sums that a law has.
     match number {
         0 if const { L::PASSES > 0 } => {
             let kernel = PassSum::<L, 0> { law, bond_update };

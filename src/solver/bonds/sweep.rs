@@ -37,7 +37,7 @@ pub struct PointData<'a, const D: usize> {
     pub numbers: &'a [Column],
     /// Thresholds, truncation factors, rotations and stress measures, for lists.
     pub limits: &'a LimitColumns,
-    /// Point data for lattices (point numbers, limits and geometry), by grid.
+    /// Point data for lattices (displacements, thermal stretches, point numbers and limits), by grid.
     pub grids: &'a [GridValues<D>],
     /// Whether points have thermal stretches.
     pub is_thermal: bool,
