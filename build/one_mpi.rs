@@ -131,7 +131,8 @@ fn base_name(path: &str) -> String {
     path.rsplit('/').next().unwrap_or(path).to_owned()
 }
 
-/// Return the output of a program for a file, in English; `None` if the program is missing.
+/// Run a program on a file and return its standard output, in English; `None` if the program cannot be
+/// started.
 fn printed(program: &str, options: &[&str], file: &Path) -> Option<String> {
     let mut command = Command::new(program);
     let output = command

@@ -80,7 +80,7 @@ fn kibibytes(path: &str, name: &str) -> Option<u64> {
     entry(&fs::read_to_string(path).ok()?, name).map(|kibibytes| 1024 * kibibytes)
 }
 
-/// Return the number after `name` at the start of a line.
+/// Return the number after `name` in the first line that starts with `name`.
 fn entry(text: &str, name: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()

@@ -1,5 +1,5 @@
-//! Random numbers of points, such as the scatter of positions and strengths. They depend only on a seed and
-//! the id of a point, so they are the same for any number of ranks and threads and after a restart.
+//! Random numbers of points, such as the scatter of positions and strengths. The numbers depend only on a
+//! seed and the id of a point, so they are the same for any number of ranks and threads and after a restart.
 
 /// A scattered quantity. The random numbers of different quantities are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub struct Weibull {
 
 impl Weibull {
     /// Return the strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform
-    /// random number u. The probability that it is below x is 1 − exp(−x^m).
+    /// random number u. The probability that this quotient is below x is 1 − exp(−x^m).
     pub fn strength(self, id: u64) -> f64 {
         let survival = uniform(self.seed, Scattered::Strength, id);
         libm::pow(-libm::log(survival), 1.0 / self.modulus)

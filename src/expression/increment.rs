@@ -1,10 +1,10 @@
 //! Change of an expression's value over a time interval, without cancellation.
 //!
-//! The difference of two computed values u has an error of ε|u|. Dividing a second difference by the square
-//! of a small step amplifies this error. Here most operations compute the change of their result from the
-//! changes of their operands, so the error is relative to the change. For example, the change of sin from a
-//! to b is 2 cos((a + b)/2) sin((b − a)/2). The other operations, such as `tan` and `atan2`, subtract two
-//! values.
+//! The difference of two computed values of size |u| has a round-off of ε|u|, where ε is the machine epsilon.
+//! Dividing a second difference by the square of a small step amplifies this error. Here most operations
+//! compute the change of their result from the changes of their operands, so the error is relative to the
+//! change. For example, the change of sin from a to b is 2 cos((a + b)/2) sin((b − a)/2). The other
+//! operations, such as `tan` and `atan2`, subtract two values.
 
 use std::sync::Arc;
 

@@ -69,10 +69,10 @@ pub enum Variable {
     R,
 }
 
-/// Position and time.
+/// The variables of position and time.
 pub const POSITION_AND_TIME: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
 
-/// Position only.
+/// The variables of position.
 pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 impl Variable {
@@ -92,7 +92,7 @@ impl Variable {
         }
     }
 
-    /// Return the index of the variable among x, y, z, t.
+    /// Return the index of the variable among x, y, z, t. `r` has the index of x.
     fn slot(self) -> usize {
         match self {
             Self::X | Self::R => 0,

@@ -100,8 +100,8 @@ impl Scope<'_> {
 
     /// Return the instruction that pushes the value of this name, or an error message.
     pub(super) fn value(&self, name: &str) -> Result<Instruction, String> {
-        // `r`, the length of a bond, is a variable only in keys that are functions of it; elsewhere
-        // parameters often have this name.
+        // `r`, the length of a bond, is a variable only in keys that are functions of this length. Elsewhere,
+        // parameters often have the name `r`.
         let reserved =
             |variable: &Variable| *variable != Variable::R || self.variables.contains(variable);
         if let Some(variable) = Variable::from_name(name).filter(reserved) {

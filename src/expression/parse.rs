@@ -57,7 +57,7 @@ struct Parser<'a> {
     tokens: Vec<Token>,
     /// Index of the next token.
     next: usize,
-    /// Number of expressions that are open at this position.
+    /// Number of nested expressions that are being parsed.
     nesting: usize,
     /// Code so far.
     code: Vec<Instruction>,

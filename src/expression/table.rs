@@ -57,7 +57,7 @@ impl Table {
         from + (to - from) * ((time - self.times[k]) / (self.times[k + 1] - self.times[k]))
     }
 
-    /// Compute the change of the value from a time over a step, s. Within a segment round-off is relative to
+    /// Compute the change of the value from a time over a step, s. Within a segment, round-off is relative to
     /// the change, not to the value.
     pub(super) fn increment(&self, time: f64, step: f64) -> f64 {
         let end = time + step;

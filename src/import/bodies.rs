@@ -24,7 +24,7 @@ pub struct Material {
 /// Criterion of a damage model.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Criterion {
-    /// Bonds break at this stretch: value to write, and number.
+    /// Bonds break at this stretch, given as the value to write and as a number.
     Stretch(Value, f64),
     /// Bonds break at a work that follows from a fracture energy by PeriLab's formula.
     Energy {
@@ -75,7 +75,7 @@ const BOND_BASED: [&str; 1] = ["pmb"];
 /// and the elastic constants determine no fracture energy.
 ///
 /// # Errors
-/// None at present.
+/// At present, the function returns no errors.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,

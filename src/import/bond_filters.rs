@@ -134,7 +134,7 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
     Ok(())
 }
 
-/// Write a disc as a pre-crack; in 2-D the line normal to the disc's normal.
+/// Write a disc as a pre-crack; in 2-D, write a segment perpendicular to the disc's normal.
 fn disc(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
     let written = translation.name("crack", name);
     let shape = match translation.dimension {

@@ -209,7 +209,7 @@ impl Draft {
         })
     }
 
-    /// Write a comment in place of a section that the import cannot translate.
+    /// Write a comment instead of a section that the import cannot translate.
     pub fn leave_out(&mut self, header: &str, why: &str) {
         let mut section = Section::new(header);
         section.comment(format!("left out: [{header}] {why}"));

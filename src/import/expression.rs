@@ -300,7 +300,7 @@ impl Rewriter<'_> {
         rewriter.formula(tokens, depth)
     }
 
-    /// Translate a Julia formula: `if a b else c end`, `a ? b : c`, or one without a choice.
+    /// Translate a Julia formula: `if a b else c end`, `a ? b : c`, or a formula without a choice.
     fn choice(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());
@@ -343,7 +343,8 @@ impl Rewriter<'_> {
         self.formula(tokens, depth)
     }
 
-    /// Find the end of the condition in `if a b`: two operands in sequence separate condition and result.
+    /// Find the end of the condition in `if a b`, which is where two operands follow one another without an
+    /// operator. `None` if there is no such position.
     fn condition_end(&self, tokens: &[Token]) -> Option<usize> {
         let mut level = 0_i64;
         for (index, pair) in tokens.windows(2).enumerate() {

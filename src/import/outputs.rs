@@ -211,7 +211,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Read an output: its variables and interval. Without a frequency, Peridigm writes every step.
+    /// Read an output: its variables, and its interval if it has one.
     ///
     /// # Errors
     /// If the frequency is not a whole number above 0.

@@ -7,7 +7,7 @@ use super::script::Variables;
 /// surface, which round-off could exclude.
 const MARGIN: f64 = 1e-6;
 
-/// A region with numbers in distance units.
+/// A region; its numbers are lengths in the units of the script.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Region {
     /// Lower and upper corner; infinite where the region is unbounded.
@@ -50,7 +50,8 @@ pub fn region(
     let number = |k: usize| -> Result<f64, String> {
         match *rest.get(k).ok_or("a number is missing")? {
             "INF" | "EDGE" => {
-                // Lower bounds are the even arguments of a block, and argument 4 of a cylinder.
+                // With arguments counted from 0, lower bounds are the even arguments of a block, and argument
+                // 4 of a cylinder.
                 let is_lower = match style {
                     "block" => k.is_multiple_of(2),
                     _ => k == 4,

@@ -191,7 +191,7 @@ impl Variables {
         let mut rest = text;
         while let Some(at) = rest.find(['$', '"', '\'']) {
             if !rest[at..].starts_with('$') {
-                // After an apostrophe within a word, nothing is replaced.
+                // After a quote that is not closed, such as an apostrophe within a word, nothing is replaced.
                 let after = quoted(&rest[at..]).map_or("", |(_, after)| after);
                 let (kept, after) = rest.split_at(rest.len() - after.len());
                 result.push_str(kept);

@@ -37,8 +37,8 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Add a node set of the source deck. An entry that is not declared is a node set only if something uses
-    /// it.
+    /// Add a node set of the source deck. `is_declared` is whether Peridigm or PeriLab treats the entry as a
+    /// node set because of its name or position. Any other entry is a node set only if something uses it.
     pub fn define(&mut self, name: &str, node: &'n Node, is_declared: bool) {
         self.defined.push(Defined {
             name: name.to_owned(),

@@ -71,8 +71,8 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Read a solver that starts at a time, s. `damage_by_default` holds if the deck does not switch damage
-/// models on or off.
+/// Read a solver that starts at a time, s. `damage_by_default` is whether damage models are active if the
+/// deck does not switch them on or off.
 ///
 /// # Errors
 /// If no solver is known, the end is missing or not after the start, or a key is not a number.

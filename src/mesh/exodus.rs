@@ -84,7 +84,7 @@ fn kind(name: &str, nodes: usize) -> Option<Kind> {
     is_known.then_some(Kind::new(form, nodes))
 }
 
-/// Return the position of each node of a type in the order of Exodus.
+/// Return for each node of a type, in the order of [`super::kind`], its position in the order of Exodus.
 fn order(kind: Kind) -> Vec<usize> {
     kind.permutation(match (kind.form, kind.nodes) {
         (Form::Hexahedron, 20) => orders::HEXAHEDRON_20,

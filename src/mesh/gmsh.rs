@@ -147,7 +147,7 @@ struct File<'a> {
     entities: Grouping,
 }
 
-/// Elements by a dimension and a tag, in the order of the file.
+/// Elements grouped by dimension and tag. Groups and elements have the order of the file.
 #[derive(Default)]
 struct Grouping {
     groups: Vec<((i64, i64), Runs)>,

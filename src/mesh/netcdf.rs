@@ -142,7 +142,7 @@ impl<'a> Netcdf<'a> {
                     .dataset(variable)
                     .and_then(|dataset| dataset.attr(name));
                 let attribute = attribute.map_err(words)?;
-                // Text has a fixed length, as netCDF writes it, or any length.
+                // The text has a fixed length, as in files that netCDF writes, or a variable length.
                 let fixed = attribute.read_scalar::<hdf5_metno::types::FixedAscii<64>>();
                 fixed
                     .map(|text| text.as_str().to_owned())
@@ -156,7 +156,7 @@ impl<'a> Netcdf<'a> {
     }
 }
 
-/// Return the text before the first zero byte.
+/// Return the text before the first zero byte, without white space at its ends.
 fn text(bytes: &[u8]) -> String {
     let end = bytes
         .iter()

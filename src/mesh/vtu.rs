@@ -286,8 +286,8 @@ impl File<'_> {
         for value in &values {
             different.insert(*value);
             if different.len() > MOST_GROUPS {
-                // Add one empty group more than the limit. Arrays with more groups than the limit lose all
-                // groups in `read`.
+                // Add an empty group for each of these values. `read` then removes all groups of this array,
+                // because they are more than the limit.
                 for value in different {
                     groups
                         .entry((of_nodes, name.to_owned(), value))

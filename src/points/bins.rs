@@ -179,7 +179,8 @@ mod tests {
                     .filter(|k| distance_squared(*centre, positions[*k]) <= radius * radius)
                     .collect();
                 prop_assert_eq!(&found, &expected);
-                // Search with a smaller radius; the point at the position itself is not counted.
+                // Search with a smaller radius; the point at the position itself is counted, but is not in
+                // `found`.
                 let square = (0.3 * radius).powi(2);
                 let mut found = Vec::new();
                 let at_position = bins.collect(*centre, square, &mut found);

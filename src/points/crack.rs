@@ -103,8 +103,9 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     })
 }
 
-/// Part of a bond between the faces of a crack whose mid-plane contains `origin`. For a crack without width,
-/// both ends of the part are the point where the bond crosses the plane.
+/// Return the part of a bond between the faces of a crack whose mid-plane contains `origin`; `None` if there
+/// is no such part. For a crack without width, both ends of the part are the point where the bond crosses the
+/// plane.
 fn between_faces(
     origin: Vector,
     normal: Vector,
@@ -119,7 +120,8 @@ fn between_faces(
     within(bond, height, [-0.5, 0.5])
 }
 
-/// Part of a segment on which a linear coordinate lies in an interval [low, high] of length 1.
+/// Return the part of a segment on which a linear coordinate lies in an interval [low, high] of length 1;
+/// `None` if there is no such part.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,

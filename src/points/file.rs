@@ -14,7 +14,8 @@ use super::Point;
 use super::columns::{Columns, Layout, layout};
 use super::rows::{Part, for_each_row};
 
-/// The bodies that use a file: index, and the block number that they select.
+/// The bodies that use a file: index of the body, and the block number that the body selects. Without a block
+/// number, a body selects the rows that no other body selects.
 pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
     problem
         .bodies
@@ -79,7 +80,8 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     Ok(points)
 }
 
-/// Sample the points of a file. Return them and the number of points that each sample represents.
+/// Sample the points of a file. Return the sampled points, and the number of points that each sample
+/// represents.
 ///
 /// From a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot be
 /// read or its heading is invalid.

@@ -42,7 +42,7 @@ struct User<'a> {
 pub struct Found {
     /// The points, with ids from 0.
     pub points: Vec<Point>,
-    /// Ids of the points of a set; `None` for sets that name no group of the mesh.
+    /// For each set of the problem, the ids of its points; `None` for sets that name no group of the mesh.
     pub sets: Vec<Option<Runs>>,
     /// Names of the groups, on rank 0.
     pub names: Vec<String>,
@@ -353,8 +353,8 @@ fn points(
     Ok((points, point_of))
 }
 
-/// Return volume and centroid of an element. `nodes` are the positions of its nodes, m. The volume is negative
-/// if the nodes of a solid element have the order of a mirrored element.
+/// Return volume and centroid of an element. `nodes` are the positions of its nodes, m. The volume is
+/// negative if the nodes of a solid element have the order of a mirrored element.
 fn solid(
     mesh: &Mesh,
     element: usize,
@@ -461,7 +461,7 @@ fn members(
     marks: &mut [bool],
 ) -> Runs {
     let mut ids = Vec::new();
-    // Corners of the faces, edges and points, the smallest corner first; this corner is marked.
+    // Sorted corners of each face, edge and point. The node of the first corner is marked in `marks`.
     let mut faces: Vec<Vec<u32>> = Vec::new();
     match group {
         Members::Nodes(nodes) => faces.extend(nodes.iter().map(|node| vec![node as u32])),

@@ -69,7 +69,8 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Generate this rank's piece of the points. Return the piece and the number of points of all ranks. The ids
-/// of a piece are contiguous per body, or per file or mesh if bodies share it. Collective.
+/// of a piece are contiguous per body. If several bodies share a file or mesh, they are contiguous per file
+/// or mesh. Collective.
 ///
 /// # Errors
 /// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, cells of
@@ -201,7 +202,7 @@ fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
     Ok(())
 }
 
-/// Create the message for an id in a file that no point has.
+/// Create the message for an id that a file lists but no point has.
 fn wrong_number(file: &IdFile, ids: &[u64], id: u64, total: u64) -> String {
     let IdFile { path, first } = file;
     let number = id + first;

@@ -91,8 +91,8 @@ impl Polygon {
         (self.lower, self.upper)
     }
 
-    /// Test a position by the even-odd rule. A position that is closer to an edge than |tolerance| (m) counts
-    /// as inside if the tolerance is positive, and as outside if it is negative.
+    /// Test a position by the even-odd rule. A position at most |tolerance| (m) away from an edge counts as
+    /// inside if the tolerance is positive, otherwise as outside.
     pub fn contains(&self, position: [f64; 2], tolerance: f64) -> bool {
         let (along, across) = (self.axis, 1 - self.axis);
         let at = position[along];
@@ -236,7 +236,7 @@ mod tests {
             let angle = f64::from(k) * std::f64::consts::TAU / f64::from(count);
             [libm::cos(angle), libm::sin(angle)]
         };
-        // Teeth along y, and the same along x.
+        // A comb with teeth along y, and the same comb with teeth along x.
         let tooth = |k: u32| [f64::from(k), if k % 4 < 2 { 0.0 } else { 1e4 }];
         let back = [[f64::from(count), -1.0], [0.0, -1.0]];
         let comb: Vec<[f64; 2]> = (0..count).map(tooth).chain(back).collect();

@@ -19,7 +19,7 @@ pub struct Initial {
     pub displacement: Option<(Vec<Expression>, Range<usize>)>,
     /// Velocity (m/s) by component, and its span in the deck.
     pub velocity: Option<(Vec<Expression>, Range<usize>)>,
-    /// A file with the values of each point, in place of expressions.
+    /// A file with the values of each point, instead of expressions.
     pub file: Option<InitialFile>,
 }
 

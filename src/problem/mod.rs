@@ -97,7 +97,7 @@ pub struct Problem {
 /// Spans of values for errors that are found after the deck has been read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Places {
-    /// The horizon of the grid.
+    /// Span of the horizon of the grid.
     pub horizon: Range<usize>,
     /// Span of the end time.
     pub end: Range<usize>,

@@ -4,17 +4,18 @@ use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
-/// The test whether a node of a level has coarser nodes within a distance.
+/// Test for coarser nodes within a distance of a node of a given level.
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// The indices of the level that refinement of coarser levels adds to level 0. There are nodes at those
-    /// indices at which nodes are possible.
+    /// Indices, in steps of the level, that the refinement of coarser levels adds to level 0. A node exists
+    /// at such an index if a node is possible there.
     finer: GridIndexSet,
     /// Bits of a word whose indices lie on the grid of level 0. All words with such indices have the same
     /// bits.
     coarsest: u64,
-    /// For each bit of a word, the neighbouring words and their bits within the distance.
+    /// For each bit of a word: offsets to the words within the distance, and the bits of these words that lie
+    /// within the distance.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
@@ -64,10 +65,10 @@ impl<'a> AtCoarser<'a> {
         }
     }
 
-    /// Test whether a coarser node lies within the distance of `index`. This is true if an index within the
-    /// distance could have a node of the level but has none.
+    /// Test whether a coarser node lies within the distance of `index`. If so, an index within the distance
+    /// could have a node of the level but has none.
     ///
-    /// `body` tests whether a cell belongs to the body.
+    /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {
         let (centre, bit) = split(index);
         self.reach[bit].iter().any(|(offset, within)| {

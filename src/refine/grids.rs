@@ -160,8 +160,8 @@ impl<'a> Grids<'a> {
         removed
     }
 
-    /// The refined node to be coarsened at the point of a body at a position (m). It is `None` if this node
-    /// is permanent or not refined, or if the body has no refined grid.
+    /// The finest refined node at `position` (m) in a body, which is the node to coarsen. `None` if this node
+    /// is permanent, if no node is refined there, or if the body has no refined grid.
     pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
         let index = self.index_at(body, position)?;
         let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(index)?;
@@ -194,8 +194,8 @@ impl<'a> Grids<'a> {
         }
     }
 
-    /// The faces between adjacent nodes at which nodes are suppressed. Each face has its centre (m), the
-    /// edges of the cells of these nodes (m), and the axis of its normal.
+    /// The faces half-way between adjacent nodes at which a node is suppressed. Each face has its centre (m),
+    /// the edges (m) of the cells of the two adjacent nodes, and the axis of its normal.
     pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
@@ -213,7 +213,7 @@ impl<'a> Grids<'a> {
         faces
     }
 
-    /// All refined nodes, and all suppressed nodes with canonical level and index.
+    /// All refined nodes, then all suppressed nodes by canonical level and index. Both lists are sorted.
     pub fn state(&self) -> [Vec<NodeKey>; 2] {
         let mut state = [Vec::new(), Vec::new()];
         for (body, grid) in (0..).zip(&self.bodies) {
@@ -241,8 +241,8 @@ impl<'a> Grids<'a> {
         self.refine(refined)
     }
 
-    /// The node to be refined at the point of a block at a position (m); `None` if the point has the finest
-    /// level, or if its body is on no lattice.
+    /// The node to refine at `position` (m), the position of a point of block `block`. `None` if the point
+    /// has the finest level, or if its body is on no lattice.
     pub fn refining(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
         let level = self.problem.block(block).level;
         if level == self.finest {
@@ -255,15 +255,15 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// The grid index in steps of the finest level at a position (m) in a body; `None` if the body is on no
-    /// lattice, or without refinement.
+    /// The grid index in steps of the finest level at a position (m) in a body. `None` if the body is on no
+    /// lattice, or if the problem has no refinement.
     pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
-    /// Reference position (m) of a grid index in steps of the finest level; `None` if the index is not on the
-    /// grid of level 0, if the body is on no lattice, or without refinement.
+    /// Reference position (m) of a grid index in steps of the finest level. `None` if the index is not on the
+    /// grid of level 0, if the body is on no lattice, or if the problem has no refinement.
     pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))

@@ -10,7 +10,7 @@ use super::grid_index_set::GridIndexSet;
 /// A node of a refined grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// The level of the node's block, which determines the spacing of its neighbours.
+    /// Level of the node's block; the spacing of level l is dx₀/2^l.
     pub level: u32,
     /// Ratio of the node's volume to the volume of a level-0 cell.
     pub volume_fraction: f64,
@@ -20,7 +20,7 @@ pub struct Node {
 
 /// The refined nodes of a body, by level. A node is stored as a grid index in steps of its level.
 ///
-/// - The `body` arguments test whether a cell belongs to the body.
+/// - The `body` arguments test whether a level-0 cell belongs to the body.
 /// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level, except
 ///   next to suppressed nodes.
 /// - If a crack separates the parents of a new node, the node is suppressed. Crack faces then act like the
@@ -28,7 +28,7 @@ pub struct Node {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pattern {
     dimension: usize,
-    /// One set per level, except the finest.
+    /// Refined nodes, by level. Nodes of the finest level cannot be refined, so this level is missing.
     refined: Vec<FxHashSet<GridIndex>>,
     /// Nodes that are never coarsened, by level.
     permanent: Arc<[FxHashSet<GridIndex>]>,

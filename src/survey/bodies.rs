@@ -7,11 +7,12 @@ use crate::points::{LatticeBody, distance_squared};
 use crate::problem::{Body, PointSource, Problem};
 use crate::solver::Simulation;
 
-/// Relative difference between the volumes of points and shape above which a warning is printed.
+/// Largest relative difference between the volume of all points and the volume of the shape; a warning is
+/// printed for a larger difference.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// Ratio between the mean volume of the points of a file or mesh and their spacing³ above which a warning is
-/// printed.
+/// Largest factor between the mean volume of the points of a file or mesh and the volume of a cell with their
+/// mean spacing. A warning is printed if the mean volume is larger or smaller by more than this factor.
 const VOLUME_FACTOR: f64 = 10.0;
 
 /// Number, volume, mass, centre and neighbours of a body's points.
@@ -83,8 +84,8 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
     Some(lattice.shape_volume())
 }
 
-/// Return the distance (m) of each owned point to its nearest bonded neighbour; empty if no body has points
-/// from a file or mesh.
+/// Return the distance (m) of each owned point to its nearest bonded neighbour, infinite without bonds. The
+/// result is empty if no body has points from a file or mesh.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
     if !problem.bodies.iter().any(is_from_file) {

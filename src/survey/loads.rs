@@ -14,8 +14,9 @@ use crate::solver::conditions::members;
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Ratio of the thickness of a loaded layer to the depth of the load above which a warning is printed. A
-/// curved layer of one cell is up to π/2 cells thick.
+/// Largest factor between the thickness of a loaded layer and the depth of the load. A warning is printed if
+/// the thickness is larger or smaller by more than this factor. A curved layer of one cell is up to π/2 cells
+/// thick.
 const MAX_THICKNESS_RATIO: f64 = 1.8;
 
 /// Maximum number of points of a layer for which the thickness is checked.
@@ -250,7 +251,7 @@ fn inward_normals<const D: usize>(
     if !problem.conditions.iter().any(is_pressure) {
         return;
     }
-    // Sum of the unit vectors to the neighbours of each point.
+    // For each point, the sum of the unit vectors to its neighbours.
     let mut inward = vec![[0.0; 3]; model.owned()];
     simulation.forces.for_each_intact(|i, j| {
         let (a, b) = (model.position(i), model.position(j));

@@ -32,7 +32,7 @@ use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
 /// A point is weakly bonded if it has fewer intact bonds than this number, by dimension. The numbers are half
-/// a family at a horizon of two spacings.
+/// the number of neighbours of a complete family with a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Common horizons, in spacings.

@@ -6,7 +6,7 @@ use crate::points::{LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
-/// Maximum number of lattice cells that are read to count neighbours, over all samples.
+/// Maximum number of lattice cells that are read to count neighbours, over all samples of a body.
 const MAX_CELLS_READ: f64 = 4e6;
 
 /// Maximum number of points per body at which neighbours are counted.

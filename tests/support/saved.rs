@@ -4,7 +4,7 @@ use fissure::comm::IdOrder;
 use fissure::solver::Simulation;
 use fissure::solver::motion::Saved;
 
-/// Return the saved state of the rank's part of the points, ordered by id.
+/// Return the order of the ids, and the saved state of this rank's part of the points in this order.
 pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
     let owned = simulation.model.owned();
     let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);

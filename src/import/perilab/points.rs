@@ -17,11 +17,11 @@ pub(super) enum Points {
 pub(super) enum MeshBlocks {
     /// The numbers of groups of the mesh.
     Numbers,
-    /// The numbers of groups of the mesh. The only block of a deck has all elements if its number is 1, because
-    /// the mesh may have no groups; the import does not read it.
+    /// The numbers of groups of the mesh. The only block of a deck has all elements if its number is 1,
+    /// because the import does not read the mesh, which may have no groups.
     NumbersOrAll,
-    /// Positions, from 1, in this list of element sets; `None` if the mesh cannot be read. The only block of a
-    /// deck has all elements if its number is 1.
+    /// Positions, from 1, in this list of element sets; `None` if the mesh cannot be read. The only block of
+    /// a deck has all elements if its number is 1.
     Sets(Option<Vec<String>>),
 }
 
@@ -35,8 +35,8 @@ impl MeshBlocks {
     }
 }
 
-/// Return the element sets of an Abaqus file that are blocks in PeriLab, in the order of their numbers; `None`
-/// if the file cannot be read.
+/// Return the element sets of an Abaqus file that are blocks in PeriLab, in the order of their numbers;
+/// `None` if the file cannot be read.
 ///
 /// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
 /// last. PeriLab has no fixed order for the other sets, so the order is that of the file.
@@ -57,7 +57,8 @@ fn blocks_of_abaqus(
     for group in &mesh.groups {
         if let (Some(name), Members::Elements(elements), "element set") =
             (&group.name, &group.members, group.kind)
-            // Names with a point belong to one instance; the same sets without it follow.
+            // A name with a point is that of a set of one instance. The set of all instances has the name
+            // without the point.
             && !name.contains('.')
         {
             let place = used.iter().position(|used| used == name);

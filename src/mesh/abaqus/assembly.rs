@@ -42,7 +42,7 @@ pub(super) struct Set {
     pub(super) ranges: Vec<[u64; 3]>,
     /// Names of other sets, which this set includes.
     pub(super) names: Vec<String>,
-    /// The members are all nodes of the element sets in `names`.
+    /// Whether the members are all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
     pub(super) place: Place,
 }
