@@ -89,10 +89,11 @@ impl Family {
     }
 }
 
-/// Largest fraction of the points that can touch other points: cracks must be more than a bond length apart.
+/// Largest allowed fraction of the points that touch other points. It keeps the cracks more than a bond
+/// length apart.
 const MOST_TOUCHING: f64 = 0.25;
 
-/// Strain of the block, which presses the faces of the cracks against each other.
+/// Initial strain of the block along x with contact. It presses the faces of the cracks against each other.
 const PRESSED: f64 = -1e-5;
 
 /// Parse the fraction of the points that touch other points.
@@ -130,7 +131,8 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// Return the deck of the problem. A small initial displacement avoids zeros, which could be faster.
+/// Return the deck of the problem. A small initial displacement avoids zeros, with which processors could
+/// compute faster.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
     let breaking = arguments.law.damage();

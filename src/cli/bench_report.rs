@@ -65,13 +65,13 @@ pub struct Figures {
     pub phases: Vec<Phase>,
     /// Memory of all ranks at several stages, bytes; the last entry is the peak.
     pub memory: Vec<(&'static str, f64)>,
-    /// Bytes sent per step.
+    /// Bytes that all ranks send per step.
     pub halo_bytes: f64,
     /// Communication time per step that does not overlap with computation, mean over the ranks, s.
     pub messages_time: f64,
     /// Communication time per step if nothing overlaps, mean over the ranks, s.
     pub messages_time_alone: f64,
-    /// Number of messages per step.
+    /// Number of messages of all ranks per step.
     pub messages: f64,
     /// Number of messages per step of the rank that sends most.
     pub most_messages: f64,
@@ -95,7 +95,7 @@ impl Figures {
     }
 
     /// Return the fraction of the communication time that overlaps with interior bonds; NaN without messages.
-    /// The fraction is at least 0, although waiting for other ranks can give a negative number.
+    /// Waiting for other ranks can give a negative number, which counts as 0.
     fn hidden(&self) -> f64 {
         if self.messages > 0.0 {
             (1.0 - self.messages_time / self.messages_time_alone).max(0.0)
@@ -104,7 +104,7 @@ impl Figures {
         }
     }
 
-    /// Return the mean time of contact divided by that of the bonds; `None` without contact.
+    /// Return the mean time of contact divided by the mean time of the bonds; `None` without contact.
     fn contact_over_bonds(&self) -> Option<f64> {
         let mean = |name: &str| {
             let phase = self.phases.iter().find(|phase| phase.name == name)?;

@@ -48,7 +48,7 @@ fn report_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> 
         path,
         deck: &deck,
         ranks: arguments.ranks,
-        // Nothing is printed with --quiet, so skip the slow measurements.
+        // With --quiet, skip the slow measurements. A report as JSON then lacks their results.
         measure: verbosity != Verbosity::Quiet,
         json: arguments.json,
     };

@@ -361,7 +361,7 @@ pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     report.line("bonds", count(bonds));
 }
 
-/// Append the memory and disk space. `ghosts` is the number of ghosts divided by that of owned points.
+/// Append the memory and disk space. `ghosts` is the number of ghosts divided by the number of owned points.
 pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     let memory = bytes(cost.memory_of_a_rank(ranks, ghosts));
     report.line(

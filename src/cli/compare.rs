@@ -170,8 +170,8 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// Format the comparison: what only one of the results has, then a table of the fields and one of the
-/// columns.
+/// Format the comparison: the fields, columns, outputs, points and rows that only one result has, then a
+/// table of the fields and a table of the columns.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,
@@ -209,7 +209,7 @@ fn report(
     text
 }
 
-/// Largest number of names that a list shows in full.
+/// Largest number of names in a list. Of further names, only the number is given.
 const LONGEST_LIST: usize = 8;
 
 /// Append a line with the names that only one of the results has.

@@ -117,7 +117,8 @@ pub fn slurm(arguments: &SlurmArguments) -> Result<()> {
 }
 
 impl Script {
-    /// Return the script of slurm/ with the file `launch` included, so that no other file is needed.
+    /// Return a script of the folder `slurm/`. The script contains the text of `slurm/launch`, so it needs no
+    /// other file.
     fn text(self) -> String {
         let (name, script) = match self {
             Self::Hybrid => ("hybrid", include_str!("../../slurm/hybrid.sbatch")),

@@ -75,8 +75,8 @@ impl Template {
 
 /// Write a deck to a new file, and the file that it reads beside it.
 ///
-/// # Errors
-/// If a file exists or cannot be written.
+/// # Errors If the deck exists, if the other file exists with other content or is the deck itself, or if a
+/// file cannot be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     let mut path = arguments.name.clone();
     if path.extension().is_none() {

@@ -76,7 +76,7 @@ fn joined(started: Option<(&str, usize)>, ranks: usize) -> Result<()> {
     }
 }
 
-/// Return the first number among the values of some environment variables.
+/// Return the value of the first of these environment variables that is set to a number.
 fn number(names: &[&str]) -> Option<usize> {
     names
         .iter()

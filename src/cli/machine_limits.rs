@@ -44,7 +44,7 @@ fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     (0..REPETITIONS).map(once).fold(f64::INFINITY, f64::min)
 }
 
-/// Size of the arrays divided by that of the last-level cache.
+/// Size of each array of a thread, divided by the thread's share of the last-level cache.
 const CACHES: usize = 4;
 
 fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
@@ -119,8 +119,8 @@ fn triad_any(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
     }
 }
 
-/// Number of independent sums. More than latency (4 or 5 cycles) × throughput (2 per cycle) of multiply-adds,
-/// so that no multiply-add waits for another.
+/// Number of independent sums. It exceeds the latency (4 or 5 cycles) times the throughput (2 per cycle) of
+/// multiply-adds, so that no multiply-add waits for another multiply-add.
 const SUMS: usize = 12;
 
 /// Multiply-adds per sum and repetition; a repetition takes some 30 ms.
@@ -138,7 +138,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        /// Function for one instruction set.
+        /// Define the function for one instruction set.
         macro_rules! version {
             ($feature:literal, $splat:ident, $multiply_add:ident) => {{
                 #[target_feature(enable = $feature)]

@@ -66,8 +66,8 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Update the display after a step that ends at `time` (s). `steps` is the current estimate of the last
-    /// step.
+    /// Update the display after a step that ends at `time` (s). `steps` is the current estimate of the number
+    /// of the last step.
     pub fn update(&mut self, step: u64, steps: u64, time: f64) {
         match self {
             Self::Silent => {}

@@ -29,7 +29,8 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    // With refinement, the number of bonds is known for the last points only, so the rate is omitted.
+    // After a refinement, the number of bonds is known for the last points only, so the rate is omitted.
+    // After a rebalance, the rate is omitted too, because its time also counts as `regridding`.
     let regrids = summary.seconds.regridding > 0.0;
     if !regrids {
         line("bond updates", si(bond_updates(summary), "/s"));

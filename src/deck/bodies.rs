@@ -17,16 +17,15 @@ use crate::points::Columns;
 use crate::problem;
 
 /// Largest number of bodies. Each step searches one bond list per pair of bodies, so the cost grows with the
-/// square.
+/// square of the number of bodies.
 const MOST_BODIES: usize = 256;
 
 /// Validate the bodies.
 ///
-/// # Errors
-/// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage
-/// law that the material does not support, an invalid number or shape, or a body without exactly
-/// one source of points. If two bodies request the same rows or elements of a file, or name
-/// different columns of it.
+/// # Errors If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage
+/// law that the material does not support, an invalid number or shape, or a body without exactly one source
+/// of points. If two bodies request the same rows or elements of a file, or name different columns of the
+/// same file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -155,9 +154,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     is_whole(upper - lower).then_some(if is_whole(lower) { 0.0 } else { lower })
 }
 
-/// Return the positions of the two faces that bound a shape along an axis, m; `None` if a face is
-/// round. For the base of a prism or a polygon, return the smallest and largest coordinate of its
-/// corners. For a difference, return the faces of its first shape.
+/// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
+/// faces normal to this axis. For the base of a prism or a polygon, return the smallest and largest
+/// coordinate of its corners. For a difference, return the faces of its first shape.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),

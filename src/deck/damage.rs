@@ -146,8 +146,8 @@ impl<'a> Directed<'a> {
         )
     }
 
-    /// Return the toughness by direction; `None` if the table has none of the keys. It is an error if the
-    /// table has only some of the keys.
+    /// Return the toughness by direction; `None` if the table has none of the keys. Return an error if the
+    /// table has only some of the keys, for a bar, and for a ratio out of range.
     fn toughness(&self, scope: &Scope, key: &str) -> Result<Option<ToughnessByDirection>> {
         let across = self.across.as_ref();
         let given = [

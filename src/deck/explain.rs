@@ -31,7 +31,7 @@ pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> 
         .map_err(|error| Error::run(format!("cannot write the deck: {error}")))
 }
 
-/// Write defaults that depend on other values into the deck.
+/// Fill in the defaults that depend on other values of the deck.
 fn fill(deck: &mut Deck, problem: &Problem) {
     let number = |value| Some(default_number(value));
     match problem.dimension {

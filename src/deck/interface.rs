@@ -252,8 +252,8 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     Err(scope.error(other.span.clone(), message))
 }
 
-/// Return an error if a rule needs one micromodulus for both ends of a bond, and the two laws have different
-/// micromoduli.
+/// Return an error if the rule needs one micromodulus for both ends of a bond (any rule but `own`), unless
+/// both bodies have the same bond-based law without a function of the bond length.
 fn one_micromodulus(
     scope: &Scope,
     key: &str,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use toml::de::{DeTable, DeValue};
 
-/// The files of a merged deck, and the byte ranges of its text that come from them.
+/// The files of a merged deck, and the byte ranges of the merged text that come from each file.
 #[derive(Debug)]
 pub struct Origins {
     /// Paths and texts: the deck and its overlays.
@@ -26,7 +26,7 @@ struct Piece {
 }
 
 impl Origins {
-    /// Locate the keys and values of the merged text in these files; later files take precedence.
+    /// Locate the keys and values of the merged text `text` in `files`; later files take precedence.
     pub fn new(text: &str, files: Vec<(PathBuf, String)>) -> Self {
         let mut pieces = Vec::new();
         if let Ok(changed) = DeTable::parse(text) {

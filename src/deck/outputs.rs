@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem;
 
-/// Part of the names of results that a restart has renamed instead of overwriting them.
+/// Part of the file names of results that a restart has renamed, so that no new result replaces such a file.
 const SET_ASIDE: &str = "until_step_";
 
 /// Validate the main result; `end` is the end of the run, s.
@@ -26,9 +26,8 @@ pub fn output(
 
 /// Validate the further results; `end` is the end of the run, s.
 ///
-/// # Errors
-/// As [`output`]. Also on a name that cannot be part of a file name, or that differs from another name only
-/// in upper and lower case.
+/// # Errors As [`output`]. Also on a name that cannot be part of a file name, that contains `until_step_`, or
+/// that differs from another name only in upper and lower case.
 pub fn further_outputs(
     scope: &Scope,
     deck: &Deck,
@@ -140,7 +139,7 @@ fn every(
     }
 }
 
-/// Return the given times of outputs in ascending order, s.
+/// Return the given times of outputs in ascending order and without duplicates, s.
 fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Result<Vec<f64>> {
     let Some(written) = &output.times else {
         return Ok(Vec::new());

@@ -7,8 +7,8 @@ use super::toml_error::toml_error;
 use crate::error::Result;
 
 /// Return the text of a deck merged with overlays; later overlays override earlier overlays. Tables are
-/// merged key by key. Any other value, including the list of stages, is replaced as a whole. A choice is
-/// replaced by a different choice.
+/// merged key by key. Any other value, including the list of stages, is replaced as a whole. A different
+/// choice in an overlay, for example another law of a material, replaces the choice of the deck.
 ///
 /// # Errors
 /// If the deck or an overlay is not TOML.

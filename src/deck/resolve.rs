@@ -240,8 +240,8 @@ impl<'a> Scope<'a> {
         if largest == 0.0 {
             return Err(self.error(vector.span(), format!("{key}: must not be zero")));
         }
-        // The squares of very large and very small components are not representable. A power of two does not
-        // change the digits.
+        // The squares of very large and very small components are not representable, so scale the vector
+        // first. The scale is a power of two, which does not change the digits.
         let (_, exponent) = libm::frexp(largest);
         let scaled = values.map(|value| libm::scalbn(value, -exponent));
         Ok((scaled / scaled.dot(&scaled).sqrt()).into())

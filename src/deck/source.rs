@@ -56,8 +56,8 @@ impl Source {
         source
     }
 
-    /// Return the path and text of the file that a span comes from, and the span in this file. The last
-    /// entry is a note for a span that is in no file, and empty otherwise.
+    /// Return the path and text of the file that a span comes from, and the span in this file. The last entry
+    /// is [`CHANGED`] for a span that is in no file, and empty otherwise.
     fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
         let Some(origins) = &self.origins else {
             return (&self.path, &self.text, span, "");

@@ -18,13 +18,13 @@ use crate::problem::{Action, Problem, RigidMotion};
 /// Maximum number of rows.
 const MAX_ROWS: usize = 100_000;
 
-/// Round-off tolerance of times, as a fraction of the end.
+/// Round-off tolerance of times, as a fraction of the end time of the stage or run.
 const ROUNDING: f64 = 1e-9;
 
 /// Maximum size of a file, bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// Default names of the column of times.
+/// Default names of the column of times, in upper or lower case.
 const TIME: [&str; 2] = ["t", "time"];
 
 /// Read the tables, and store them in the scope.

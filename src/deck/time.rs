@@ -57,7 +57,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         end,
         step: time.step.as_ref(),
         safety: &time.safety,
-        // With stages, keys without effect in a relaxation may be intended for other stages.
+        // With stages, keys without effect in a relaxation may be intended for other stages, so validate
+        // these keys as for explicit steps.
         method: if deck.stage.is_empty() {
             method
         } else {

@@ -89,7 +89,7 @@ impl ChangingPoints {
         let own: Vec<i64> = own.collect();
         file.write_rows(&self.connectivity, first, &own)?;
         // A step with n cells has n + 1 offsets: each rank writes the ends of its cells, and rank 0 also
-        // writes the start.
+        // writes the start of the first cell.
         file.resize(&mut self.offsets, end + steps + 1)?;
         let begin = piece.first + u64::from(!root);
         let ends: Vec<i64> = (begin..piece.first + count as u64 + 1)
@@ -131,8 +131,8 @@ impl ChangingPoints {
     }
 }
 
-/// Copy the first rows of the dataset with the same path in another file. Each rank copies a share of the
-/// rows.
+/// Copy the first `rows` rows to `dataset` from the dataset with the same path in the file `old`. Each rank
+/// copies a share of the rows.
 pub fn copy<T: H5Type + bytemuck::Pod>(
     old: &mut CollectiveFile<'_>,
     file: &mut CollectiveFile<'_>,

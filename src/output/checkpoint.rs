@@ -1,7 +1,7 @@
 //! Checkpoints: two alternating files, readable on any number of ranks.
 //!
-//! A checkpoint is written to a temporary file and sealed with a checksum. A rename then replaces the
-//! older file, so a kill at any time leaves at least one valid checkpoint.
+//! A checkpoint is written to a temporary file and sealed with a checksum. A rename then replaces the older
+//! file. If the run is killed during a write, the existing checkpoints remain valid.
 
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// Contents of a checkpoint, except the state of the points and bonds, and the progress of the run.
+/// Contents of a checkpoint without the state of the points and bonds and without the progress of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// Number of the time step.
@@ -44,7 +44,7 @@ pub struct Header {
     pub grids: [Vec<NodeKey>; 2],
     /// Number of points over all ranks.
     pub points: u64,
-    /// Hash of the points.
+    /// Hash of the ids, positions, volumes and blocks of the points.
     pub fingerprint: u64,
     /// Number of outputs in the main result.
     pub outputs: u64,
@@ -93,7 +93,7 @@ const FURTHER: [&str; 2] = ["further_outputs", "counts_of_further_outputs"];
 /// Attribute with the names of the datasets of the state, one per line.
 const STATE: &str = "state";
 
-/// Datasets with the state of the refined grids; absent if empty.
+/// Datasets with the refined nodes and the suppressed nodes of the refined grids; absent if empty.
 const GRIDS: [&str; 2] = ["/refined", "/parted"];
 
 /// The two checkpoints of a folder.
@@ -104,7 +104,7 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// Create the checkpoints of a new run, which replaces existing files.
+    /// Create the checkpoints of a new run. The first checkpoint is `checkpoint_0.h5`.
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -118,8 +118,8 @@ impl Checkpoints {
         NAMES.into_iter().map(move |name| folder.join(name))
     }
 
-    /// Remove existing checkpoints and a leftover temporary file, which would belong to another run. For
-    /// rank 0.
+    /// Remove existing checkpoints and a leftover temporary file, because all these files belong to another
+    /// run. For rank 0.
     ///
     /// # Errors
     /// If a file cannot be removed.

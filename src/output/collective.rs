@@ -31,10 +31,9 @@ const OBJECT_BYTES: u64 = 8192;
 /// Rank 0 reserves the space before the ranks write (see [`Reservation`]). A full disk inside a
 /// collective write of three or more ranks would make some of them hang.
 ///
-/// # Kill and loss of power
-/// A killed process leaves the file as of its last flush, because metadata stays in memory until then.
-/// A loss of power leaves at least the state of the last [fsync](Self::sync). After that, writes
-/// change values in place only; a flush after growth includes an fsync.
+/// # Kill and loss of power A killed process leaves the file as of its last flush, because metadata stays in
+/// memory until then. A loss of power leaves at least the state of the last [fsync](Self::sync): until the
+/// next fsync, flushed writes change values in place only, because a flush after growth includes an fsync.
 ///
 /// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
 pub struct CollectiveFile<'a> {
@@ -56,9 +55,9 @@ pub struct CollectiveFile<'a> {
 impl<'a> CollectiveFile<'a> {
     /// Create a file.
     ///
-    /// # Errors
-    /// If the file exists and `creation` is exclusive, it cannot be created, or
-    /// [`initialise`](super::transfer::initialise) was not called before MPI.
+    /// # Errors If the file exists and `creation` is exclusive, if the file cannot be created, if
+    /// [`initialise`](super::transfer::initialise) was not called before MPI, or if several ranks are
+    /// threads.
     pub fn create(path: &Path, comm: &'a dyn Communicator, creation: Creation) -> Result<Self> {
         let raw = comm.raw();
         if raw.is_some() && !transfer::initialised_before_mpi() {
@@ -251,8 +250,8 @@ impl<'a> CollectiveFile<'a> {
 
     /// Read this rank's `count` rows from `first_row` on, in one collective transfer.
     ///
-    /// # Errors
-    /// If the rows are out of range, the type differs, or the dataset cannot be read.
+    /// # Errors If the rows are out of range, the stored numbers cannot be converted to `T`, or the dataset
+    /// cannot be read.
     pub fn read_rows<T: hdf5::H5Type + bytemuck::Pod>(
         &mut self,
         dataset: &Dataset,
@@ -285,8 +284,7 @@ impl<'a> CollectiveFile<'a> {
 
     /// Read an attribute of integers of a group (`/` for the root).
     ///
-    /// # Errors
-    /// If the attribute is missing or has another type.
+    /// # Errors If the attribute is missing or cannot be converted to integers.
     pub fn integers_attribute(&mut self, group: &str, name: &str) -> Result<Vec<i64>> {
         self.collectively(
             &format!("cannot read the attribute {name} of {group}"),

@@ -54,7 +54,7 @@ pub struct Difference {
     pub unit: String,
     /// Names of the components; empty for a scalar.
     pub components: &'static [&'static str],
-    /// Largest absolute difference; infinite if one of two numbers is not finite.
+    /// Largest absolute difference; infinite if one of two unequal numbers is not finite.
     pub largest: f64,
     /// Largest finite absolute value in the first result.
     pub scale: f64,
@@ -178,7 +178,8 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// Add the common fields to `comparison`. Return for each field whether it changes with time.
+/// Add the common fields, and the names of the fields that only one result has, to `comparison`. Return for
+/// each common field whether one of the results stores the field per step.
 fn common_fields(
     first: &ResultReader,
     second: &ResultReader,
@@ -334,7 +335,7 @@ struct Matches {
 
 impl Matches {
     /// Match each time of the first list with the nearest unmatched time of the second list, within the
-    /// larger of [`TIME_TOLERANCE`] and [`ROUND_OFF`].
+    /// larger of the tolerances that follow from [`TIME_TOLERANCE`] and [`ROUND_OFF`].
     fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
         let reach = |index: usize, time: f64| {

@@ -127,7 +127,7 @@ impl Dataset {
     }
 }
 
-/// Return the rows per chunk. A chunk has 4 kB to 4 MB: one append, an even fraction of a long append, or
+/// Return the rows per chunk. A chunk has 4 kB to 4 MB: one append, an equal part of a long append, or
 /// several short appends.
 fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
     let (min, max) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));

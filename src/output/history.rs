@@ -84,7 +84,7 @@ impl History {
         Self::with(file, table, csv, rewritten)
     }
 
-    /// Open the CSV file with `begin` on rank 0, and return the history.
+    /// Call `begin` on rank 0 to open the CSV file, and return the history.
     fn with(
         file: &CollectiveFile<'_>,
         table: Dataset,

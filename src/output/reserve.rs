@@ -32,10 +32,10 @@ impl Reservation {
         })
     }
 
-    /// Reserve space up to `bytes` without a change of the file's length.
+    /// Reserve disk space for the first `bytes` bytes of the file, without a change of its length.
     ///
-    /// On file systems without preallocation, only the free space is checked. Other processes can still
-    /// take it, and quotas are ignored.
+    /// On file systems without preallocation, only the free space is checked. Other processes can still take
+    /// this space, and quotas are ignored.
     ///
     /// # Errors
     /// If the disk or the quota is full.

@@ -91,8 +91,8 @@ fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     Ok((magic == MAGIC && length == sealed).then_some(seal))
 }
 
-/// Read words on rank 0 and broadcast the words, because the file system may be out of date on other ranks.
-/// Collective.
+/// Call `read` on rank 0 and broadcast the words that it returns. The other ranks do not read, because their
+/// file system may be out of date. Collective.
 fn from_root<const N: usize>(
     comm: &dyn Communicator,
     path: &Path,

@@ -19,8 +19,8 @@ static BEFORE_MPI: AtomicBool = AtomicBool::new(false);
 
 /// Initialise HDF5. Every program that opens collective files must call this before MPI starts.
 ///
-/// If MPI is already running, HDF5 registers itself with `MPI_Finalize`. There it flushes open files,
-/// which hangs or crashes for a file that was abandoned on a full disk.
+/// If MPI is already running, HDF5 registers itself with `MPI_Finalize`. In `MPI_Finalize`, HDF5 then flushes
+/// open files. This flush hangs or crashes for a file that was abandoned on a full disk.
 pub fn initialise() {
     sync(|| ());
     BEFORE_MPI.fetch_or(!comm::mpi::is_running(), Ordering::Relaxed);

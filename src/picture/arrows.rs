@@ -19,15 +19,16 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Vector length, measured in the picture, that the longest arrow stands for; the arrows of longer vectors
-    /// are cut. `None` to choose it from the drawn points.
+    /// Vector length, measured in the picture, that the longest arrow stands for; the arrows of longer
+    /// vectors are cut. `None` to choose this length from the drawn points.
     pub longest_arrow: Option<f64>,
 }
 
 /// Length of the longest arrow, in text sizes. The middles of arrows are at least this far apart.
 const LONGEST_ARROW: f64 = 2.4;
 
-/// Edge of the cells of the picture with one arrow each, in text sizes.
+/// Edge of the square cells into which the picture is divided, in text sizes. Each cell has at most one
+/// arrow.
 const SPACING: f64 = 3.0;
 
 /// Shortest arrow, in pixels.
@@ -40,8 +41,8 @@ const WHITE: Colour = [255; 3];
 
 /// Draw arrows whose middles are at the points, and the legend.
 ///
-/// The length of an arrow is proportional to the projection of the vector, up to the length `longest` of a
-/// vector. Only some points have arrows, so that arrows do not overlap.
+/// The length of an arrow is proportional to the length of the projected vector, up to the vector length
+/// `longest`. Only some points have arrows, so that arrows do not overlap.
 pub fn draw(
     pen: &mut Pen,
     marks: impl Iterator<Item = (Mark, [f64; 3])>,
@@ -83,15 +84,15 @@ struct Root {
     place: [f64; 2],
     /// The arrow, in pixels.
     arrow: [f64; 2],
-    /// The arrow is shorter than in proportion to its vector.
+    /// The arrow is cut: it is shorter than proportional to its vector.
     is_cut: bool,
     /// Depth of the point; larger depths are nearer to the camera.
     depth: f64,
 }
 
 /// Return at most one root for each square cell of the picture, at distances of at least `reach`. `cell` and
-/// `reach` are in pixels, and `reach` is at most `cell`. The root of a cell is the nearest to the camera, and
-/// among these the nearest to the centre of the cell.
+/// `reach` are in pixels, and `reach` is at most `cell`. Each cell keeps the root nearest to the camera.
+/// Among roots of equal depth, it keeps the root nearest to the centre of the cell.
 fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root> {
     let rank = |root: &Root, number: [i64; 2]| {
         let offset = [0, 1].map(|k| root.place[k] / cell - number[k] as f64 - 0.5);
@@ -132,7 +133,7 @@ fn arrow(image: &mut Image, middle: [f64; 2], vector: [f64; 2], text: f64, thick
             middle[1] + ahead * along[1] + aside * along[0],
         ]
     };
-    // Heads of short arrows are shorter, but as wide in proportion.
+    // Short arrows have smaller heads of the same shape.
     let part = (length / (2.0 * HEAD[0] * text)).min(1.0);
     let [head, width] = HEAD.map(|size| part * size * text);
     let (tail, tip) = (-length / 2.0, length / 2.0);
@@ -180,7 +181,7 @@ fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout:
     pen.write(texts[1], [column + lengths[1] / 2.0, row], Running::Across);
 }
 
-/// Return a round length up to the longest, and its text.
+/// Return a round vector length of at most `longest`, and its text with the unit.
 fn legend_entry(longest: f64, unit: &str) -> (f64, String) {
     if longest <= 0.0 {
         return (0.0, format!("0 {unit}").trim_end().to_owned());

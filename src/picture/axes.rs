@@ -130,7 +130,7 @@ impl Pen<'_> {
         });
     }
 
-    /// Draw the values of contour lines on the colour bar.
+    /// Draw a line across the colour bar at the value of each contour line.
     pub fn levels(&mut self, bar: &Bar, colouring: Colouring, levels: &[f64]) {
         let ([left, right], [top, bottom]) = (bar.columns, bar.rows);
         let fractions = levels.iter().map(|level| colouring.fraction(*level));

@@ -170,7 +170,7 @@ fn first_centre(edge: f64) -> i64 {
     (edge - 0.5).ceil() as i64
 }
 
-/// Return the smallest and largest of some numbers; an inverted pair without numbers.
+/// Return the smallest and largest of some numbers; (∞, −∞) if there are none.
 fn extremes(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
     numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), number| {
         (low.min(number), high.max(number))

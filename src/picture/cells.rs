@@ -1,9 +1,8 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
 //! These cells are the Voronoi cells of the points. A cell ends at a distance that follows from the volume of
-//! its point, so borders, holes and open cracks of a body stay visible.
-//! Between points on all sides, a cell extends farther to close gaps. In a slice, the cells are sections of
-//! the cells in space.
+//! its point, so borders, holes and open cracks of a body stay visible. At pixels with points on all sides,
+//! cells extend farther to close gaps. In a slice, the cells are sections of the cells in space.
 
 use super::canvas::{Colour, Image};
 use super::layout::Layout;
@@ -15,7 +14,7 @@ use super::scene::Mark;
 /// the point. Cells of a lattice end 0.5 to 0.71 edges away from their points.
 const REACH: f64 = 0.6;
 
-/// Largest distance from a point, in edges, of a pixel that has points within this distance on all sides.
+/// Same as [`REACH`], for pixels that have points within this distance on all sides.
 const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
@@ -66,9 +65,10 @@ struct Pixel {
     square: f32,
     /// Colour of the nearest point so far.
     colour: Colour,
-    /// The pixel is in the cell of a point.
+    /// Whether a point is within [`REACH`] of the pixel.
     is_near: bool,
-    /// Directions in which there are points: one bit per eighth of a turn.
+    /// Directions from the pixel in which there are points within [`REACH_INSIDE`]: one bit per eighth of a
+    /// turn.
     directions: u8,
 }
 

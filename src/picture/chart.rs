@@ -46,7 +46,8 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the marker of an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points, to find curves in the corner of the legend.
+/// Number of samples on each line between two points, to test whether a curve crosses the place of the
+/// legend.
 const LINE_SAMPLES: usize = 32;
 
 /// Distance in pixels below which consecutive points of a curve are drawn as one point.

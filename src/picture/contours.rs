@@ -18,8 +18,9 @@ pub struct Sample {
     pub value: f64,
 }
 
-/// Return the samples that no later sample covers: those whose positions are not within half a cell of a later
-/// one. A slice between two layers of points shows both, and the later points are nearer to its plane.
+/// Return the samples that no later sample covers. A sample is covered if its position is within half a cell
+/// edge of a later sample. A slice between two layers of points shows both layers, and the later samples are
+/// nearer to the plane of the slice.
 pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
     let largest = samples
         .iter()
@@ -75,7 +76,7 @@ pub fn segments(samples: &[Sample], levels: &[f64]) -> Vec<[[f64; 2]; 2]> {
     found
 }
 
-/// Return the position at which the value along a side equals the level.
+/// Return the position at which the value along a side equals the level; `None` if there is no such position.
 fn crossing([one, other]: &[Sample; 2], level: f64) -> Option<[f64; 2]> {
     if (one.value < level) == (other.value < level) {
         return None;

@@ -71,7 +71,7 @@ impl<'a> Cubes<'a> {
             cosines,
             growth: cosines.map(|cosine| {
                 // A face that is almost parallel to the view comes nearer by a large distance if it moves
-                // outwards.
+                // outwards, so the cube grows less in this direction.
                 let is_steep = (LEAST_COSINE..STEEP_COSINE).contains(&cosine);
                 let part = if is_steep { cosine / STEEP_COSINE } else { 1.0 };
                 part * (BACKING - 1.0)
@@ -122,8 +122,8 @@ impl<'a> Cubes<'a> {
         self.paint_box((centre, depth), edge, [edge + overlap; 3], colour);
         // A face that moves outwards by a distance d comes nearer by d over its cosine. Each face of the
         // larger cube is half of the growth farther out. The shift is 4/3 of the largest approach that
-        // results, so it puts the faces behind the faces of their own cube. In a gap, they hide the sides of
-        // other cubes.
+        // results, so the larger cube lies behind the faces of the cube itself. In a gap, the larger cube
+        // hides the sides of other cubes.
         let visible = self
             .visible()
             .map(|axis| self.growth[axis] / self.cosines[axis]);
@@ -138,8 +138,8 @@ impl<'a> Cubes<'a> {
         (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
     }
 
-    /// Paint the visible faces of a box of a cube, without shading. `edge` is the edge of the cube, and
-    /// `sizes` are the edges of the box along x, y and z, all in pixels.
+    /// Paint the visible faces of a box that represents a cube, without shading. `edge` is the edge of the
+    /// cube, and `sizes` are the edges of the box along x, y and z, all in pixels.
     fn paint_box(
         &mut self,
         (centre, depth): ([f64; 2], f64),

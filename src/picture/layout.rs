@@ -47,7 +47,7 @@ const UPRIGHT_BAR: f64 = 8.0;
 const LYING_BAR: f64 = 5.4;
 /// Additional room in text sizes for a ruler between the frame and the colour bar.
 const RIGHT: f64 = 3.0;
-/// Height in text sizes of the line at the bottom.
+/// Height in text sizes of the legend at the bottom of the picture.
 const LEGEND: f64 = 1.5;
 /// Margin in text sizes without labels.
 const EMPTY: f64 = 2.2;
@@ -59,8 +59,8 @@ const UPRIGHT_HEIGHT: f64 = 11.0;
 const GREATEST_HEIGHT: f64 = 1.1;
 
 impl Layout {
-    /// Create the arrangement for a drawing that extends between two positions in the drawing plane, m.
-    /// `has_legend` reserves room for a line at the bottom of the picture.
+    /// Create the arrangement for a drawing that extends from `low` to `high` in the drawing plane, m.
+    /// `has_legend` reserves room for the legend of the arrows at the bottom of the picture.
     pub fn new(
         width: u32,
         [low, high]: [[f64; 2]; 2],
@@ -137,7 +137,7 @@ impl Layout {
         ]
     }
 
-    /// Return the position in the drawing plane of pixel coordinates.
+    /// Return the position in the drawing plane, m, of pixel coordinates.
     pub fn position(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         [
             self.origin[0] + (column - self.columns[0]) / self.scale,

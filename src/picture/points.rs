@@ -48,8 +48,8 @@ impl Colouring {
     }
 }
 
-/// Enlargement of cells on each side in a first pass, pixels. Otherwise a small strain would open gaps
-/// between rounded edges.
+/// Enlargement of cells on each side in a first pass, pixels. Without this enlargement, a small strain would
+/// open gaps between rounded edges.
 pub const OVERLAP: f64 = 0.5;
 
 /// Enlargement of cells on each side against round-off of positions and sizes, pixels.

@@ -57,8 +57,9 @@ impl Camera {
         dot(self.towards, position)
     }
 
-    /// Return the low end of the edge of a box for the ruler of an axis, and the unit vector in the picture
-    /// (to the right and down) away from the box. `None` if the axis is along the view.
+    /// Return the outer edge of a box for the ruler of an axis: the corner at the low end of the edge (true
+    /// for the high end of an axis), and the unit vector in the picture (to the right and down) that points
+    /// away from the box. `None` if the axis is along the view.
     ///
     /// An outer edge belongs to one face that the camera sees and to one face that it does not see. Of the
     /// two outer edges along an axis, the ruler is at the lower one, or at the left one if both are upright.
@@ -75,7 +76,8 @@ impl Camera {
         let normal = [-down / length, across / length];
         let is_preferred = normal[1] - 0.5 * normal[0] > 0.0;
         let outward = normal.map(|x| if is_preferred { x } else { -x });
-        // Remove the sign of zero and round-off, because captions of upright rulers run upwards.
+        // Replace −0 and round-off by 0: the caption of a ruler runs upwards only if the downward component
+        // is exactly 0.
         let outward = outward.map(|x| if x.abs() < ALONG_VIEW { 0.0 } else { x });
         let mut start = [false; 3];
         for other in axis.others() {

@@ -19,10 +19,10 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Create a scale from `low` to `high` with about `most` ticks or fewer.
+    /// Create a scale from `low` to `high` with at most `most + 1` ticks.
     ///
     /// `magnitude` is the largest number that the prefix must suit. Scales that belong together get the same
-    /// magnitude.
+    /// magnitude, so that their units have the same prefix.
     pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, magnitude);
         let factor = 10_f64.powi(-exponent);
@@ -39,8 +39,8 @@ impl Scale {
     }
 
     /// Create a logarithmic scale from `low` to `high`, both above 0, with about `most` ticks or fewer. The
-    /// ticks are at powers of ten; with fewer than three powers of ten, also at 2 and 5 times these. With
-    /// fewer than two such ticks, the ticks are at round numbers.
+    /// ticks are at powers of ten; with fewer than three powers of ten, also at 2 and 5 times the powers.
+    /// With fewer than two such ticks, the ticks are at round numbers.
     pub fn logarithmic(low: f64, high: f64, unit: &str, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, high);
         let factor = 10_f64.powi(-exponent);

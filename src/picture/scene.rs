@@ -90,7 +90,7 @@ pub struct Scene<'a> {
     pub width: u32,
     /// Lines over the points of a flat view (m), each with the index of its colour.
     pub lines: &'a [(usize, Vec<[f64; 3]>)],
-    /// Values of the lines of equal value over the points of a flat view.
+    /// Values of the contour lines that are drawn over the points of a flat view.
     pub contours: &'a [f64],
     /// Vector field that is drawn as arrows.
     pub vectors: Option<Vectors<'a>>,
@@ -148,7 +148,8 @@ impl Scene<'_> {
         };
         match self.effective_view() {
             View::Plane if self.dimension == 3 => sort_by_key(&|mark| mark.position[2]),
-            // Where cells overlap or share a pixel, damage must stay visible.
+            // Where cells overlap or share a pixel, damage must stay visible, so paint points with more
+            // damage later.
             View::Plane if is_damage(self.field) => {
                 sort_by_key(&|mark| mark.value.max(0.0));
             }
@@ -186,7 +187,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Return the distance of a point from the drawn plane, m; 0 without a slice.
+    /// Return the signed distance of a point from the plane of the slice, m; 0 without a slice.
     pub fn depth(&self, mark: &Mark) -> f64 {
         match self.effective_view() {
             View::Slice { axis, position } => mark.position[axis.index()] - position,
@@ -211,7 +212,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Return this number of values at equal distances on the colour bar, without its ends.
+    /// Return `count` values at equal distances on the colour bar, without its ends.
     ///
     /// # Errors
     /// If there are 2³² points or more.
@@ -271,8 +272,8 @@ fn index_limit(points: usize) -> Result<u32> {
 /// Fraction of the vectors whose arrows are never cut.
 const WHOLE_ARROWS: f64 = 0.995;
 
-/// Ratio of the largest length of all vectors to the largest length of these above which longer arrows are
-/// cut.
+/// Long arrows are cut if the longest vector is longer than the longest vector of this fraction by more than
+/// this factor.
 const LONG_ARROWS: f64 = 4.0;
 
 /// The points of a scene to draw, in painting order.
@@ -307,8 +308,8 @@ impl Marks<'_> {
 
     /// Return the vector length that the longest arrow stands for; 0 without vectors.
     ///
-    /// It is the largest length in the picture. If few vectors are much longer than all others, such as the
-    /// velocities of splinters, it is a percentile of the lengths, and longer arrows are cut.
+    /// This length is the largest length in the picture. If few vectors are much longer than all others, such
+    /// as the velocities of splinters, this length is a percentile of the lengths, and longer arrows are cut.
     pub fn longest_arrow(&self) -> f64 {
         let Some(vectors) = &self.scene.vectors else {
             return 0.0;
@@ -495,7 +496,7 @@ mod tests {
         };
         assert_eq!(longest(2.0, 900.0), 2.0);
         assert_eq!(longest(2.0, 7.0), 7.0);
-        // A pulse moves few points.
+        // A pulse moves few points. The percentile is then 0, so no arrow is cut.
         assert_eq!(longest(0.0, 900.0), 900.0);
     }
 

@@ -11,10 +11,10 @@ use crate::solver::Simulation;
 use super::files::Files;
 use super::recorder::Recorder;
 
-/// Writer of checkpoints, with their number and the time spent on them.
+/// Writer of checkpoints, with the number of written checkpoints and the time spent on writing.
 pub struct CheckpointWriter {
     checkpoints: Checkpoints,
-    /// Description of the physics, which a restart compares with that of its deck.
+    /// Description of the physics. A restart compares this description with the description of its deck.
     physics: String,
     fingerprint: u64,
     /// Number of checkpoints written.
@@ -53,7 +53,8 @@ impl CheckpointWriter {
         }
     }
 
-    /// Fsync the result and write a checkpoint; return the time spent. Collective.
+    /// Write the buffered history rows, fsync the results, and write a checkpoint. Return the time spent.
+    /// Collective.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full. The existing checkpoints are kept.

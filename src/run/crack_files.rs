@@ -1,4 +1,4 @@
-//! Crack paths, and in 3-D crack fronts, at the latest output as CSV files, one per crack.
+//! CSV files with the crack paths (in 3-D, the crack fronts) at the latest output, one file per crack.
 
 use std::fmt::Write as _;
 use std::fs;

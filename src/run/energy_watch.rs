@@ -13,10 +13,11 @@ use crate::solver::observers::{Energies, HistoryRow};
 /// instability.
 const WARNING_GAIN: f64 = 1.0;
 
-/// Ratio of energy gain to energy input that ends the run, if it is exceeded in two consecutive rows.
+/// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows, or the last row,
+/// exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
-/// Ratio of energy gain to energy input that ends the run at once.
+/// Ratio of energy gain to energy input. The run ends with an error at the first row above this ratio.
 const CERTAIN_GAIN: f64 = 1e9;
 
 /// If breaking bonds have added more energy than this fraction of the energy input, a warning is printed.
@@ -69,8 +70,8 @@ impl EnergyWatch {
         }
     }
 
-    /// Check a row of the history. Return a warning at the first row with a gain above [`WARNING_GAIN`].
-    /// The result is the same on all ranks.
+    /// Check the energy gain of a row of the history. Return a warning at the first row with a gain above
+    /// [`WARNING_GAIN`]. The result is the same on all ranks.
     ///
     /// # Errors
     /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last one, above
@@ -106,8 +107,9 @@ impl EnergyWatch {
         Ok(Some(format!("{} ({})", text(), self.steps)))
     }
 
-    /// Check a row of the history. Return a warning at the first row in which breaking bonds have added
-    /// energy. A correspondence law can store more energy with fewer bonds.
+    /// Check the fracture energy of a row of the history. Return a warning at the first row in which breaking
+    /// bonds have added more than [`MAX_ADDED_FRACTION`] of the energy input. A correspondence law can store
+    /// more energy with fewer bonds.
     pub fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
         self.max_freed = self.max_freed.max(freed);
@@ -126,7 +128,8 @@ impl EnergyWatch {
     }
 
     /// Check the last row of a run. Return a warning if the energy balance does not close, unless
-    /// [`Self::check`] has reported a gain. `is_quasi_static`: whether the last stage has load steps.
+    /// [`Self::check`] has already reported this gain. `is_quasi_static`: whether the last stage has load
+    /// steps.
     pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
         let Energies {
             kinetic,

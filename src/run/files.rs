@@ -46,8 +46,7 @@ impl Files {
 
     /// Check that a new run may write to the folder. Called on rank 0.
     ///
-    /// # Errors
-    /// If the folder contains a result or checkpoint that must not be replaced.
+    /// # Errors If the folder contains a result, history or checkpoint, and `overwrite` is false.
     pub fn prepare(&self, overwrite: bool) -> Result<()> {
         let files = self.results().chain([self.history.as_path()]);
         let existing = files
@@ -87,7 +86,7 @@ impl Files {
         let begin = Instant::now();
         loop {
             match file.try_lock() {
-                // After a kill, the ranks of a run need a moment to exit.
+                // The ranks of a killed run need a moment to exit and to release the lock.
                 Err(fs::TryLockError::WouldBlock) if begin.elapsed() < LOCK_TIMEOUT => {
                     std::thread::sleep(Duration::from_millis(100));
                 }
@@ -135,7 +134,7 @@ impl Files {
     }
 }
 
-/// Return the path of the result of an output; of the main result if `name` is `None`.
+/// Return the path of the further result `name`, or of the main result for `None`.
 fn result_of(folder: &Path, name: Option<&str>) -> PathBuf {
     match name {
         None => folder.join("result.vtkhdf"),

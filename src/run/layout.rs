@@ -25,7 +25,7 @@ pub struct ResultLayout<'a> {
 
 impl<'a> ResultLayout<'a> {
     /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range that the
-    /// result contains. Collective.
+    /// result contains; `None` for all rows. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,
@@ -65,7 +65,7 @@ impl<'a> ResultLayout<'a> {
         }
     }
 
-    /// Return the static fields, see [`FIXED`].
+    /// Return the static fields, see [`FIXED`]; `level` only for a deck with `[refinement]`.
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,

@@ -88,7 +88,7 @@ pub struct Outcome {
     pub no_collective_cause: u32,
 }
 
-/// Initialise HDF5 and MPI, for all ranks that `mpirun` started, or for one rank.
+/// Initialise HDF5 and MPI: for all ranks that `mpirun` started, or for one rank without `mpirun`.
 ///
 /// # Errors
 /// If MPI is already running in this process or lacks support for threads.
@@ -100,7 +100,7 @@ pub fn start_mpi() -> Result<World> {
 
 /// Run a problem to its end or to a stop, and write the result. Collective.
 ///
-/// Threads are those of Rayon's global pool. Without MPI, there must be one rank.
+/// The loops use the threads of Rayon's global pool. A communicator without MPI must have one rank.
 ///
 /// # Errors
 /// The error is the same on all ranks. There is an error if:
@@ -243,7 +243,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Stop the run if a signal was received during the set-up. Collective.
+    /// Check for stop signals received during the set-up. Collective.
     ///
     /// # Errors
     /// If any rank received a stop signal.
@@ -279,7 +279,8 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // The energy input from changing temperatures is not counted, so such runs are not checked.
+        // The energy input from changing temperatures is not counted, so the energy of runs with changing
+        // temperatures is not checked.
         let is_closed = !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         let is_quasi_static = self.problem.is_quasi_static();
@@ -490,8 +491,8 @@ impl<'a> Job<'a> {
         Ok((checkpoints, recorder))
     }
 
-    /// Rename the existing files that cannot be continued, and report the reason, so that new files can be
-    /// created.
+    /// Rename the existing files that cannot be continued, so that new files can be created, and report the
+    /// reason. Collective.
     fn set_aside<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -17,7 +17,8 @@ pub trait Observer {
     /// Called before the first step, with the state of step 0 or of the checkpoint.
     fn begin(&mut self, _now: &mut dyn RunState) {}
 
-    /// Called after each step, when its scheduled output has been written.
+    /// Called after each explicit step and each iteration of a load step. The scheduled output has been
+    /// written.
     fn step(&mut self, _now: &mut dyn RunState) {}
 
     /// Called after a row of the history has been computed.
@@ -64,8 +65,8 @@ pub enum Message {
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
     },
-    /// Paths of removed files: further results and tables of cracks of an earlier run, which this run does
-    /// not replace.
+    /// Paths of removed files: further results, with their side-cars, and tables of cracks of an earlier run
+    /// that this run does not replace.
     Removed(Vec<PathBuf>),
     /// The grid was refined or coarsened.
     Refined {

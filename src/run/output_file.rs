@@ -12,7 +12,7 @@ use crate::solver::observers::{Schedule, Snapshot};
 
 use super::layout::{ResultLayout, select};
 
-/// Beginning of a result file.
+/// Whether a result file is created or resumed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
     /// Create a new file.
@@ -42,10 +42,10 @@ pub type Past = Vec<Vec<f64>>;
 
 impl<'a> OutputFile<'a> {
     /// Create or resume the file at a path. `history` is the history of the main result and its number of
-    /// rows; `None` for further results. Also return the rows that a resumed file retains. Collective.
+    /// rows; `None` for further results. Also return the history rows that a resumed file retains.
+    /// Collective.
     ///
-    /// # Errors
-    /// If the file cannot be written, or the set of the output is empty.
+    /// # Errors If the file cannot be created, resumed or written, or the set of the output is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         (output, path): (&'a Output, &Path),

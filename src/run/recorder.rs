@@ -123,8 +123,7 @@ impl<'a> Recorder<'a> {
 
     /// Find the points of outputs and history again after a rebalance or refinement. Collective.
     ///
-    /// # Errors
-    /// Same as for [`HistoryObserver::new`].
+    /// # Errors Same as for [`HistoryObserver::new`]. Also if the set of an output is empty.
     pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
         for file in &mut self.files {
@@ -237,7 +236,8 @@ impl<'a> Recorder<'a> {
         self.last_row.as_ref().filter(is_now)
     }
 
-    /// Write the state of a failed run to the files that have no output at this step. Collective.
+    /// Write the state of a failed run to the files that have no output at this step, and fsync all files.
+    /// Collective.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.

@@ -57,8 +57,8 @@ pub struct Phases {
 }
 
 impl Summary {
-    /// Collect the summary from all ranks. The durations are those of results, history and checkpoints, and
-    /// the total time. Collective.
+    /// Collect the summary from all ranks. The durations are the times spent on results, on history and on
+    /// checkpoints, and the total time. Collective.
     pub(super) fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         steps: u64,

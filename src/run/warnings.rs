@@ -10,7 +10,8 @@ use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
 use crate::solver::{Simulation, Stepper};
 
-/// Ratio of kinetic to strain energy above which loading is not quasi-static.
+/// Ratio of kinetic to strain energy above which loading does not count as quasi-static, and a warning is
+/// printed.
 const MAX_INERTIA: f64 = 0.05;
 
 /// Ratio of overshoot to fracture energy above which a warning is printed. For comparison: a branching crack
@@ -51,8 +52,8 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn of a fixed step that refinement has made unstable. `before` is the stable step before the
-    /// refinement (s). Return the present stable step, s.
+    /// Warn of a fixed step that refinement has made unstable. `before` is the smallest stable step so far
+    /// (s). Return the present stable step, s.
     pub(super) fn warn_of_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
@@ -106,9 +107,9 @@ impl<'a> Job<'a> {
         }
         if fracture < 0.0 {
             let text = format!(
-                "bonds that carried no load passed their criterion within one step, so the fracture energy, \
-                 {fracture:.3e} J, is not resolved; check the units of the toughness and of the velocities, and repeat with \
-                 a shorter time step",
+                "within one step, bonds went from no load to beyond their criterion; the fracture energy, \
+                 {fracture:.3e} J, is therefore wrong; check the units of the toughness and of the velocities, and \
+                 repeat with a shorter time step",
             );
             self.observer.message(&Message::Warning(text));
             return;

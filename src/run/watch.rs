@@ -39,7 +39,7 @@ pub struct Decision {
 pub struct Votes {
     stop: bool,
     is_wrong: bool,
-    /// Fingerprint of all requests of load factors.
+    /// Fingerprint of all load factors that this rank's observer has requested.
     factors: f64,
 }
 
@@ -219,7 +219,8 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Return the time left in the Slurm job of this process; `None` outside a job.
+/// Return the time left in the Slurm job of this process; `None` if the environment variable
+/// `SLURM_JOB_END_TIME` is not set, as outside a job.
 fn slurm_time_left() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;

@@ -56,7 +56,8 @@ fn name(path: &Path) -> String {
 fn all_messages_are_listed() {
     let mut list = "# Messages\n\n\
         The messages for the decks in `tests/decks/bad` and `tests/decks/warned`, after line and column.\n\
-        The test `deck::messages` compares this list; with `FISSURE_WRITE_MESSAGES=1` it writes it.\n\
+        The test `deck::messages` compares this file with the messages that Fissure prints.\n\
+        With `FISSURE_WRITE_MESSAGES=1`, the test writes this file.\n\
         Read the difference before you commit it.\n"
         .to_owned();
     let mut section = |title: &str, messages: &mut dyn Iterator<Item = (String, String)>| {

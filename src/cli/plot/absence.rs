@@ -1,4 +1,4 @@
-//! Check that a picture shows points. If it does not, the error says why.
+//! Check that a picture shows points. Otherwise, the error gives the reason.
 
 use fissure::error::{Error, Result};
 use fissure::picture::{Axis, View};
@@ -47,8 +47,8 @@ impl Painter<'_> {
         }
     }
 
-    /// Return the error for an output of which no point is drawn. It says which option leaves out the last
-    /// points, and where the points are.
+    /// Return the error for an output of which no point is drawn. The message names the option that leaves
+    /// out the last points, and the positions or values of the points.
     fn nothing_drawn(&self, index: usize) -> Result<Error> {
         let none = [f64::INFINITY, f64::NEG_INFINITY];
         let include = |ends: &mut [f64; 2], value: f64| {

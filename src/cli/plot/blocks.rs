@@ -12,8 +12,8 @@ const BLOCK: usize = 1 << 18;
 /// lattice differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
-/// Largest number of combinations of coordinates of a lattice with n points, divided by n^1.5. Scattered
-/// points have more combinations; see [`scattered_bodies`].
+/// A body of n points counts as scattered if the numbers of different x, y and z, multiplied together, exceed
+/// this number times n^1.5; see [`scattered_bodies`].
 const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Divide `points` points into ranges of at most [`BLOCK`] points.
@@ -40,8 +40,9 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
 /// is empty in 1-D and without outputs.
 ///
 /// The number of combinations of a body is the product of the numbers of different x, y and z. A body of n
-/// points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. It is about n for a lattice, and
-/// n² for scattered points in the plane. There, 16 points or fewer never count as scattered.
+/// points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. The number of combinations is
+/// about n for a lattice, and n² for scattered points in the plane. In the plane, 16 points or fewer never
+/// count as scattered.
 ///
 /// # Errors
 /// If the result is damaged.

@@ -9,13 +9,13 @@ use fissure::picture::Axis;
 use super::choice::{axis_named, choose_field, number};
 use super::quantity::Quantity;
 
-/// A half space, of which only the points are drawn.
+/// A half space; only the points in this half space are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
     axis: Axis,
     /// The half space is below the position, not above it.
     is_below: bool,
-    /// Coordinate of its plane, m.
+    /// Coordinate of the plane that bounds the half space, m.
     position: f64,
 }
 
@@ -58,7 +58,7 @@ impl Clip {
 pub struct Threshold {
     low: f64,
     high: f64,
-    /// The values; `None` for the drawn values.
+    /// The quantity that is compared with the range; `None` for the drawn quantity.
     pub quantity: Option<Quantity>,
 }
 

@@ -7,7 +7,7 @@ use fissure::output::StoredField;
 
 use super::choice::{choose_field, number};
 
-/// Lines of equal value, as `--contours` asks for them.
+/// The lines of equal value that `--contours` requests.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contours {
     /// Number of values at equal distances on the colour bar.
@@ -20,7 +20,7 @@ pub enum Contours {
 const MOST_CONTOURS: usize = 100;
 
 impl Contours {
-    /// Read the argument of `--contours`: a whole number is a count, anything else are values.
+    /// Read the argument of `--contours`: a whole number is a count, and any other text is a list of values.
     ///
     /// # Errors
     /// If the text is neither, the count is not from 1 to 100, or a value is not above 0 on a logarithmic

@@ -191,7 +191,7 @@ impl<'a> Painter<'a> {
         name
     }
 
-    /// Return the drawn values of consecutive points.
+    /// Return the drawn values of consecutive points of the output `index`.
     pub(super) fn drawn_values(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<f64>> {
         let values = (self.result).field_of(&self.quantity.field, index, points.clone())?;
         let mut values = self.quantity.of(values);
@@ -201,7 +201,8 @@ impl<'a> Painter<'a> {
         Ok(values)
     }
 
-    /// Return whether the colour bar starts at 0: damage is never negative, but its difference can be.
+    /// Return whether the colour bar starts at 0: true for damage, which is never negative, and false for a
+    /// difference of damages.
     fn starts_at_zero(&self) -> bool {
         self.minus.is_none() && is_damage(&self.quantity.field)
     }

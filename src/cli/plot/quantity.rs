@@ -20,8 +20,8 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Create the quantity for a component or invariant of a field. The default is the magnitude, or the von
-    /// Mises equivalent of a symmetric tensor.
+    /// Create the quantity for a component or invariant of a field. The default is the value of a scalar, the
+    /// magnitude of a vector or a full tensor, and the von Mises equivalent of a symmetric tensor.
     ///
     /// # Errors
     /// If the field has no such component.

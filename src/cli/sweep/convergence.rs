@@ -41,7 +41,8 @@ fn positive<const N: usize>(sizes: [f64; N]) -> Option<()> {
     sizes.iter().all(|h| *h > 0.0).then_some(())
 }
 
-/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio, for monotonic h.
+/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio; `None` if h is not monotonic or there is no
+/// root.
 fn rate_of_differences([h1, h2, h3]: [f64; 3], ratio: f64) -> Option<f64> {
     let (up, down) = ((h1 / h2).ln(), (h3 / h2).ln());
     let monotonic = up * down < 0.0;

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use fissure::error::{Error, Result};
 use fissure::message::suggestion;
 
-/// Longest folder name of a run that contains the values.
+/// Largest length of a folder name that contains the values of a run, characters.
 const LONGEST_NAME: usize = 120;
 
 /// Name of a parameter or key, and its values as texts.
@@ -94,10 +94,10 @@ pub struct Design {
 
 impl Design {
     /// Create all combinations of the values; the last axis changes fastest. With `zip`, combine only the
-    /// k-th values of all axes.
+    /// k-th values of all axes; the only value of an axis is combined with all rows.
     ///
-    /// # Errors
-    /// If a name is given twice, or zipped axes have different numbers of values.
+    /// # Errors If a name is given twice, or if zipped axes with several values have different numbers of
+    /// values.
     pub fn new(axes: &[Axis], zip: bool) -> Result<Self> {
         for (number, axis) in axes.iter().enumerate() {
             if axes[..number].iter().any(|other| other.name == axis.name) {
@@ -194,13 +194,13 @@ impl Design {
             .collect()
     }
 
-    /// Return the value of an axis in a row as a number.
+    /// Return the value of an axis in a row as a number; `None` if the value is not a finite number.
     pub fn number(&self, row: &[usize], axis: usize) -> Option<f64> {
         number(self.value(row, axis))
     }
 
     /// Return the axis for rates and pictures: the named axis, or the first varied axis whose values are
-    /// numbers.
+    /// numbers; `None` if there is no such axis.
     ///
     /// # Errors
     /// If the named axis is missing, has one value, or has values that are not numbers.

@@ -61,7 +61,7 @@ pub const SECTIONS: [Section; 39] = [
     Section::new("constraint", Key, Fixed),
     // Parameters are compared where they are used.
     Section::new("parameters", Table, Free),
-    // Tables are also compared where they are used.
+    // Tables, like parameters, are compared where they are used.
     Section::new("table", Named, Free).referred_to(),
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),

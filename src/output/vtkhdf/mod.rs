@@ -61,11 +61,11 @@ pub struct Piece {
     pub total: u64,
 }
 
-/// A result file open for writing. All methods are collective; if one fails on any rank, it fails on
-/// all, and the file is abandoned.
+/// A result file open for writing. Every method that returns a `Result` is collective. A method that fails on
+/// one rank fails on all ranks, and the file is abandoned.
 ///
-/// Space for all expected steps is allocated in advance. A new step then hardly changes metadata, and a
-/// killed run leaves a valid file.
+/// Unless each step has its own points, space for all expected steps is allocated in advance. A new step then
+/// hardly changes metadata, and a killed run leaves a valid file.
 pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
@@ -87,7 +87,7 @@ pub struct ResultFile<'a> {
     history: Option<History>,
 }
 
-/// A table with one row per step, and values that are known in advance.
+/// A table with one row per step, and the rule for its values.
 struct Table {
     dataset: Dataset,
     rule: Rule,
@@ -126,8 +126,8 @@ pub struct Contents<'a> {
 impl<'a> ResultFile<'a> {
     /// Create the file and write the static data.
     ///
-    /// # Errors
-    /// If the file exists or cannot be written, there are no points, or a field has the wrong length.
+    /// # Errors If the file exists and `creation` is exclusive, if the file cannot be written, if there are
+    /// no points, or if a field has the wrong length.
     pub fn create(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -500,7 +500,8 @@ fn write_geometry(
     let dataset = file.create_dataset::<i64>("/VTKHDF/Connectivity", total, None)?;
     let own: Vec<i64> = (first..first + count).collect();
     file.write_rows(&dataset, piece.first, &own)?;
-    // n cells have n + 1 offsets: each rank writes the ends of its cells, and rank 0 also writes the start.
+    // n cells have n + 1 offsets: each rank writes the ends of its cells, and rank 0 also writes the start of
+    // the first cell.
     let dataset =
         file.create_dataset::<i64>("/VTKHDF/Offsets", Rows::Fixed(piece.total + 1), None)?;
     let begin = if root { first } else { first + 1 };

@@ -31,9 +31,10 @@ impl<'a> ResultFile<'a> {
     /// Resume a result after its first steps and history rows, and drop later ones. Return the retained
     /// history rows.
     ///
-    /// A file is continued in place if its points never change, it is of the same deck and version, and it
-    /// has space for all expected steps. No retained row moves, so a kill loses no row. Otherwise, or if the
-    /// file is not writable, the retained part is copied to a new file, which then replaces the old file.
+    /// A file is continued in place if the points never change, if deck and version are the same, and if the
+    /// file has space for all expected steps. No retained row then moves, so a kill loses no row. Otherwise,
+    /// or if the file is not writable, the retained part is copied to a new file, which then replaces the old
+    /// file.
     ///
     /// # Errors
     /// If the old file cannot be read, or has fewer steps, or other points or fields. If a write fails, for
@@ -193,7 +194,8 @@ impl<'a> ResultFile<'a> {
         result.record_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
     }
 
-    /// Write the tables of the copied steps. `points` is the number of points of each step.
+    /// Write the times, the numbers and the count of the copied steps. `points` is the number of points of
+    /// each step.
     fn record_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
         for ((time, number), points) in times.iter().zip(numbers).zip(points) {
             append_one(&mut self.file, &mut self.numbers, *number)?;
@@ -206,7 +208,8 @@ impl<'a> ResultFile<'a> {
         Ok(self)
     }
 
-    /// Copy the first steps of an old file with points per step. Return the number of points of each step.
+    /// Copy the first steps of an old file in which each step has its own points. Return the number of points
+    /// of each step.
     fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, retained: u64) -> Result<Vec<i64>> {
         let Some(changing) = &mut self.changing else {
             return Ok(Vec::new());
@@ -263,8 +266,8 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     Ok(true)
 }
 
-/// Test whether a file can be continued in place: points that never change, same deck and version, space for
-/// all expected steps, and no chunk freed by the truncation.
+/// Test whether a file can be continued in place: points that never change, same number of points, same deck
+/// and version, space for all expected steps, and no chunk freed by the truncation.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,
