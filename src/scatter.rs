@@ -103,7 +103,8 @@ mod tests {
             }];
         for (number, product) in pairs.iter().enumerate() {
             let mean = (0..COUNT).map(product).sum::<f64>() / COUNT as f64;
-            // Standard deviation (1/12)/√n; five of them are exceeded once in two million samples.
+            // The mean has the standard deviation (1/12)/√n. One in about two million means deviates by more
+            // than five standard deviations.
             let deviation = 1.0 / 12.0 / (COUNT as f64).sqrt();
             assert!(mean.abs() < 5.0 * deviation, "{number}: {mean}");
         }

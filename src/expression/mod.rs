@@ -65,7 +65,7 @@ pub enum Variable {
     Z,
     /// `t`, the time.
     T,
-    /// `r`, a length; the value of the first coordinate.
+    /// `r`, a length. Its value is passed as the first coordinate.
     R,
 }
 

@@ -46,7 +46,8 @@ pub struct DamageModel {
     pub node: Node,
 }
 
-/// Log the damage models that no block uses. `models` is the table of damage models, `blocks` that of blocks.
+/// Log the damage models that no block uses. `models` is the table of damage models, `blocks` is the table of
+/// blocks.
 pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &Node) {
     let used = |name: &str| {
         blocks.tables().any(|(_, block)| {

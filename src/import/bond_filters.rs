@@ -93,8 +93,8 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
     let corner = vector(translation, filter, "Lower Left Corner", &header)?;
     let given = unit(vector(translation, filter, "Bottom Unit Vector", &header)?);
     let bottom_length = length(translation, filter, "Bottom Length", &header)?;
-    // Peridigm and PeriLab compare intersections along ub and along ub × n. If ub leaves the plane, both
-    // edges are longer by the factor 1/|ub_t|, with the part ub_t of ub in the plane.
+    // Peridigm and PeriLab project the position of an intersection on ub and on ub × n. If ub is not in the
+    // plane, both edges are therefore longer by the factor 1/|ub_t|, with the part ub_t of ub in the plane.
     let along: f64 = given.iter().zip(&normal).map(|(g, n)| g * n).sum();
     let (mut bottom, mut stretch) = (given, 1.0);
     if along.abs() > SLANT {

@@ -17,7 +17,7 @@ pub enum Quantity {
     BodyForce,
     /// Force on each point of the set, N.
     ForceOfPoint,
-    /// Temperature minus the reference temperature, which is 0 if not given.
+    /// Temperature, from which this reference temperature is subtracted, if there is one.
     Temperature(Option<Value>),
 }
 
@@ -35,7 +35,7 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Names of the conditions in the new deck, with the numbers of their steps.
+    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act.
     pub written: Vec<(String, Vec<u64>)>,
     /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,

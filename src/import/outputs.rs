@@ -173,7 +173,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Create an empty list; `has_temperature` if points have temperatures.
+    /// Create an empty list. `has_temperature` is whether points have temperatures.
     pub fn new(has_temperature: bool) -> Self {
         Self {
             has_temperature,

@@ -22,11 +22,12 @@ pub enum Region {
     Difference(Vec<Region>),
 }
 
-/// Read a region from the arguments after its name; `spacing` is that of the lattice.
+/// Read a region from the arguments after its name. `spacing` is the spacing of the lattice, and `known`
+/// returns a region by its name.
 ///
 /// # Errors
-/// If the style is unknown, an argument is missing or not a number, or the region lies outside of its
-/// surface.
+/// If the style or a region of a union is unknown, an argument is missing or not a number, or the region lies
+/// outside of its surface.
 pub fn region(
     variables: &Variables,
     arguments: &[&str],

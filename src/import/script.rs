@@ -60,8 +60,8 @@ pub fn is_script(text: &str) -> bool {
 /// Split a script into commands, and replace each `$` by the value of the variable at this command.
 ///
 /// # Errors
-/// If a quote or bracket is not closed, a variable is not defined, a formula after `$` changes with time, a
-/// time step is not a number, or the script or a line is too long.
+/// If a quote or bracket is not closed, a variable is not defined, a formula in `$(…)` is invalid or changes
+/// with time, a time step is not a number, or the script or a line is too long.
 pub fn parse(text: &str) -> Result<Script, Mistake> {
     let mut script = Script::default();
     let mut variables = Variables::default();

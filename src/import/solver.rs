@@ -5,7 +5,7 @@ use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::{Result, excerpt};
 
-/// Load steps of a deck that does not give their number.
+/// Number of load steps of a deck that does not give this number.
 const LOAD_STEPS: u64 = 1;
 
 /// Quasi-static solvers.

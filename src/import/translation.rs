@@ -11,7 +11,7 @@ use crate::deck::Source;
 use crate::error::{Error, Result, excerpt};
 use crate::expression::{POSITION, POSITION_AND_TIME};
 
-/// Longest name of a table; names in decks have at most 64 characters.
+/// Longest name of a table before a suffix such as `_2` is added. Names in decks have at most 64 characters.
 const LONGEST_NAME: usize = 56;
 
 /// State of an import.

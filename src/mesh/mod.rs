@@ -25,7 +25,7 @@ use crate::error::{Error, Result, excerpt};
 use crate::message::nearest;
 use kind::KINDS;
 
-/// Kind of a group of elements in a file of Exodus; all elements of a block have the same type.
+/// Kind of the groups in an Exodus file that have elements of one type.
 pub const BLOCK: &str = "block";
 
 /// Kind of a group of faces of elements. The group holds the elements, not the faces.
@@ -84,7 +84,7 @@ pub struct Mesh {
     volumes: Vec<f64>,
     /// Named or numbered groups of elements and of nodes.
     pub groups: Vec<Group>,
-    /// Names of groups are matched without regard to case.
+    /// Whether names of groups are matched without regard to case.
     pub ignores_case: bool,
 }
 
@@ -188,8 +188,8 @@ pub struct Group {
     pub number: Option<i64>,
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
-    /// The group is a geometrical entity. A number without a kind stands for an entity only if no other group
-    /// has this number.
+    /// Whether the group is a geometrical entity. A number without a kind stands for an entity only if no
+    /// other group has this number.
     pub is_entity: bool,
     /// Members of the group.
     pub members: Members,
@@ -223,7 +223,7 @@ impl fmt::Display for GroupKey {
 }
 
 impl Mesh {
-    /// Return the volume that the file gives for a single-node element.
+    /// Return the volume that the file gives for a single-node element; `None` if the file gives no volume.
     pub fn volume(&self, element: usize) -> Option<f64> {
         self.volumes
             .get(element)

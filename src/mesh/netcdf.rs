@@ -61,7 +61,7 @@ impl<'a> Netcdf<'a> {
         }
     }
 
-    /// Return the dataset of a variable, unless it is larger than the file can hold.
+    /// Return the dataset of a variable, or an error if the variable is larger than the file can hold.
     fn dataset(file: &hdf5_metno::File, name: &str, size: u64) -> Fault<hdf5_metno::Dataset> {
         let words = |error: hdf5_metno::Error| format!("variable {name}: {error}");
         let dataset = file.dataset(name).map_err(words)?;
@@ -176,7 +176,8 @@ struct Variable {
     kind: u32,
     begin: usize,
     attributes: FxHashMap<String, String>,
-    /// The variable is a record variable: its entries are interleaved with the entries of other variables.
+    /// Whether the variable is a record variable, whose entries are interleaved with those of other
+    /// variables.
     is_record: bool,
 }
 

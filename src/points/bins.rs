@@ -15,7 +15,7 @@ pub struct Bins {
 }
 
 impl Bins {
-    /// Bin positions (m); `radius` (m) is the usual search radius.
+    /// Bin positions (m). `radius` (m) is the search radius of [`Self::within`].
     pub fn new(positions: &[[f64; 3]], radius: f64) -> Self {
         let mut lower = [f64::INFINITY; 3];
         let mut upper = [f64::NEG_INFINITY; 3];

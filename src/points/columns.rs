@@ -9,10 +9,10 @@ use crate::error::excerpt;
 /// Coordinates in the order of their directions.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
 
-/// Names of the column of volumes.
+/// Accepted names of the column of volumes.
 const VOLUME: [&str; 2] = ["volume", "vol"];
 
-/// Names of the column of block numbers.
+/// Accepted names of the column of block numbers.
 const BLOCK: [&str; 3] = ["block", "block_id", "block id"];
 
 /// First word of the header of a file of PeriLab.

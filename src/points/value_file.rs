@@ -34,12 +34,12 @@ pub struct ValueColumns {
 }
 
 impl ValueColumns {
-    /// Whether the file has a column of displacements.
+    /// Test whether the file has a column of displacements.
     pub fn has_displacement(&self) -> bool {
         self.displacement.iter().any(Option::is_some)
     }
 
-    /// Whether the file has a column of velocities.
+    /// Test whether the file has a column of velocities.
     pub fn has_velocity(&self) -> bool {
         self.velocity.iter().any(Option::is_some)
     }

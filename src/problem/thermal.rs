@@ -17,8 +17,8 @@ impl ThermalExpansion {
     /// Return the free stretch per kelvin in the plane or along the bar, 1/K, for Poisson's ratio ν.
     ///
     /// If the strain perpendicular to the plane or bar is 0, the stress in this direction adds to the
-    /// stretch. The stretch is then (1 + ν) α in plane strain, and (1 + ν)/(1 − ν) α under uniaxial strain.
-    /// Otherwise it is α.
+    /// stretch. The free stretch per kelvin is then (1 + ν) α in plane strain, and (1 + ν)/(1 − ν) α under
+    /// uniaxial strain. Otherwise, it is α.
     pub fn in_setting(self, dimension: Dimension, poisson_ratio: f64) -> f64 {
         let factor = match dimension {
             Dimension::PlaneStrain { .. } => 1.0 + poisson_ratio,
@@ -39,8 +39,8 @@ impl Problem {
         actions.any(|action| matches!(action, Action::Temperature(_)))
     }
 
-    /// Test whether prescribed temperatures change during a run. The energy balance does not contain their
-    /// work.
+    /// Test whether prescribed temperatures change during a run. The energy balance does not contain the work
+    /// of such changes.
     pub fn temperature_changes(&self) -> bool {
         let stages = self.all_stages();
         let acts_always = |index: usize| stages.iter().all(|stage| stage.acting[index]);

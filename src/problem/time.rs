@@ -75,7 +75,7 @@ pub enum Method {
 pub struct Static {
     /// Number of load steps.
     pub load_steps: u64,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
     pub tolerance: f64,
     /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub max_iterations: u64,
@@ -118,7 +118,7 @@ impl Method {
 pub struct Relaxation {
     /// Number of load steps.
     pub load_steps: u64,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
     pub tolerance: f64,
     /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub iterations: u64,

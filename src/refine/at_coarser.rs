@@ -11,8 +11,8 @@ pub struct AtCoarser<'a> {
     /// Indices, in steps of the level, that the refinement of coarser levels adds to level 0. A node exists
     /// at such an index if a node is possible there.
     finer: GridIndexSet,
-    /// Bits of a word whose indices lie on the grid of level 0. All words with such indices have the same
-    /// bits.
+    /// Bits of those indices of a word that lie on the grid of level 0. All words that contain such indices
+    /// have the same bits.
     coarsest: u64,
     /// For each bit of a word: offsets to the words within the distance, and the bits of these words that lie
     /// within the distance.

@@ -160,7 +160,8 @@ impl Cost {
     }
 }
 
-/// Return the bytes of history per bond of a body; each bond stores the history for both ends.
+/// Return the bytes of history per directed bond of a body. Each directed bond stores the history of both
+/// ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {

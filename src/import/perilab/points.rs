@@ -57,8 +57,8 @@ fn blocks_of_abaqus(
     for group in &mesh.groups {
         if let (Some(name), Members::Elements(elements), "element set") =
             (&group.name, &group.members, group.kind)
-            // A name with a point is that of a set of one instance. The set of all instances has the name
-            // without the point.
+            // A name with a point, such as `INSTANCE.SET`, is the name of a set of one instance. The name
+            // `SET` is that of the set of all instances.
             && !name.contains('.')
         {
             let place = used.iter().position(|used| used == name);
