@@ -46,7 +46,8 @@ pub struct Simulation<'a, const D: usize> {
     pub fields: Fields<D>,
     /// The bonds and their forces.
     pub forces: Forces<D>,
-    /// Contact between points that no bond joins; `None` in runs without contact.
+    /// Contact between points that no intact bond joins, and of points with rigid bodies; `None` in runs
+    /// without contact.
     pub contact: Option<Contact<D>>,
     /// Conditions of the present stage.
     pub conditions: Conditions<D>,

@@ -110,7 +110,8 @@ impl Control {
         }
     }
 
-    /// Return the constant of a point for [`Self::matrix`], N/m⁷, from ω₀ (m³) of its initial family.
+    /// Return the constant of a point for [`Self::matrix`], N/m⁷, from ω₀ (m³) of its initial family. It is 0
+    /// for the controls that do not use it, and for ω₀ = 0 with `silling2017`.
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,

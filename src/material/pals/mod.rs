@@ -12,8 +12,7 @@
 //!
 //! Σ ω|ξ| e Ṽ = tr H, Σ σ ε² Ṽ = 2G dev H : dev H.
 //!
-//! Among all such functions, ω and σ are nearest to those of [`Ordinary`], ω₀ = d/m and σ₀ =
-//! A/m.
+//! Among all such functions, ω and σ are nearest to those of [`Ordinary`], ω₀ = d/m and σ₀ = A/m.
 //! The distance is Σ |ξ|² (ω − ω₀)² Ṽ, and the same for σ.
 //! Lagrange multipliers then give ω = n·Λ n and σ = N·S N, with N_a = n_a² and symmetric matrices Λ and S.
 //! Because ω is quadratic in n, the dilatation is exact for every homogeneous strain, not only for the probe

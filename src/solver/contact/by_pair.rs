@@ -42,7 +42,7 @@ struct PairSum<const D: usize> {
     force: [ExactSum; D],
 }
 
-/// Compute the contact quantities at the present positions; they are empty if the run has no contact.
+/// Compute the contact quantities at the present positions; all are 0 or empty if the run has no contact.
 /// Collective.
 pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> ContactNow {
     let (comm, model, fields) = (simulation.comm, &simulation.model, &simulation.fields);

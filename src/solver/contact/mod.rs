@@ -276,7 +276,7 @@ impl<const D: usize> Contact<D> {
             if let Some(StepEnd { step, .. }) = end {
                 fields.book_dissipation(point, volume, step, [friction, damping]);
             }
-            // For other points, adding 0 would change the sign of −0.
+            // At a point without contact, adding 0 would change a force of −0 to 0.
             if sum.touches {
                 fields.add_contact(point, repulsion, sum.energy);
             } else {
@@ -342,8 +342,8 @@ impl<const D: usize> Contact<D> {
             [self.demand.stiffness, self.demand.damping] = largest;
             return;
         }
-        // The entries from the third on are one distance per rigid body: the largest distance of a touching
-        // point from the centre.
+        // The entries from the third on are one distance per rigid body: the largest distance from the centre
+        // to a point that touches the body or will do so within the look-ahead.
         let mut largest = vec![0.0; 2 + self.rigid.len()];
         (largest[0], largest[1]) = (stiffness, damping);
         let mut sums = Vec::new();

@@ -405,7 +405,7 @@ impl RigidBody {
 /// Rotate `rotation` by an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
-    // (1 + ½ Δt ω) q: the angle is accurate to third order, without a sine.
+    // (1 + ½ Δt ω) q needs no sine; the error of the angle is of third order in Δt.
     let turn = Quaternion::from_parts(1.0, half);
     UnitQuaternion::new_normalize(turn * rotation.quaternion())
 }

@@ -168,8 +168,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Velocity u̇ at full steps, m/s. Between the steps of a [`Stepper`](crate::solver::Stepper), they are
-    /// velocities at half steps.
+    /// Velocity u̇ at full steps, m/s. Between the steps of a [`Stepper`](crate::solver::Stepper), the field
+    /// holds the velocities at half steps.
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",

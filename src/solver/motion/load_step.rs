@@ -371,7 +371,7 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Add the work of loads and supports in the last load step, which ended in equilibrium.
+    /// Add the work of loads and supports in the present load step, at one of its equilibria; see [`Work`].
     fn add_work_since_equilibrium(&mut self, work: Work) {
         let (then, now) = (self.clock.time_before(), self.clock.time());
         // The columns are taken out of `fields` while they are read.

@@ -19,8 +19,8 @@ use crate::solver::model::Model;
 /// borders.
 const CELL: f64 = 8.0;
 
-/// Two points that start nearer than their spacing count only if their distance falls below this fraction of
-/// the initial distance.
+/// Two points of bodies that no bond joins are too near only if their distance is below this fraction of
+/// their initial distance.
 const NEARER: f64 = 0.9;
 
 /// If bonds joined two bodies, two of their points are too near if their distance is below this fraction of
@@ -256,7 +256,8 @@ fn candidates<const D: usize>(
     outgoing
 }
 
-/// The ranks that compare points in the cells that contain positions within `reach` (m) of `place`.
+/// The ranks that compare points in the cells that contain positions within `reach` (m) of `place`. `edge` is
+/// the edge of a cell, m.
 fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
     let mut homes = Vec::with_capacity(1);
     for corner in 0..1_u32 << D {

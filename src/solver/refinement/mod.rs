@@ -65,7 +65,8 @@ impl Refined {
     }
 }
 
-/// State of the points before a change of grids, distributed to ranks in the order of ids.
+/// State of the points of new grids, from the state before the change of grids; distributed to ranks in the
+/// order of ids.
 struct Kept {
     /// State of the points, one row per point. The last number of a row is the previous block.
     rows: Vec<f64>,

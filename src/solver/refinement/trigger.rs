@@ -18,7 +18,7 @@ struct Source {
     horizon: f64,
 }
 
-/// Nodes that the triggering points of all ranks select.
+/// The nodes to refine and the nodes to coarsen, over all ranks.
 pub struct Wanted {
     /// Nodes at which the grid is refined.
     pub finer: Vec<NodeKey>,
