@@ -31,8 +31,8 @@ const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest are dropped; the solution of smallest norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest ratio is 0.23 at a corner of a plate, 0.14 at a corner of a block,
-/// and 0.1 in a strip of two points. It is below 1e-4 in a slightly bent strip of one point.
+/// For a horizon of 3 spacings, the smallest ratio is 0.23 at a corner of a plate, 0.14 at a corner of a
+/// block, and 0.1 in a strip of two points. It is below 1e-4 in a slightly bent strip of one point.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
