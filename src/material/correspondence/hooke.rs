@@ -402,8 +402,8 @@ impl Hooke {
     /// directions (Reuss). The softest shear modes dominate it.
     pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
         let used = used(dimension);
-        // The determinant of a matrix of very small or very large entries is not representable. A power of two
-        // scales without round-off.
+        // The determinant of a matrix of very small or very large entries is not representable. A power of
+        // two scales without round-off.
         let (_, exponent) = libm::frexp(self.matrix.amax());
         let unit = libm::ldexp(1.0, exponent - 1);
         let own = DMatrix::from_fn(used.len(), used.len(), |a, b| {

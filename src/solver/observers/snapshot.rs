@@ -32,8 +32,8 @@ impl Snapshot {
         Self { stored }
     }
 
-    /// Take a snapshot from which these fields can be computed. Energies are summed only if a field needs them;
-    /// rows of the history always need them, see [`Self::new`].
+    /// Take a snapshot from which these fields can be computed. Energies are summed only if a field needs
+    /// them; rows of the history always need them, see [`Self::new`].
     pub fn for_fields<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         fields: impl IntoIterator<Item = Field>,
