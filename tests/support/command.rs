@@ -166,6 +166,9 @@ pub fn is_running(process: u32) -> bool {
 
 /// Wait for the end of a process with little output. Kill an mpirun that hangs after all of its ranks have
 /// ended.
+///
+/// # Panics
+/// If the process exceeds the time limit; the process is killed.
 pub fn wait(mut child: Child) -> Output {
     let start = Instant::now();
     let mut last_with_ranks = start;
