@@ -590,7 +590,7 @@ impl<'a> Cursor<'a> {
     fn skip_section(&mut self, section: &str) -> Result<()> {
         let end = format!("$End{section}");
         let rest = &self.bytes[self.at..];
-        // Search for the first byte, because comparisons at every byte of the file are slow.
+        // Search for the first byte of `end`, because comparisons at every byte of the file are slow.
         let mut places = rest.iter().enumerate().filter(|(_, byte)| **byte == b'$');
         let found = places.find(|(at, _)| rest[*at..].starts_with(end.as_bytes()));
         let Some((at, _)) = found else {
