@@ -89,8 +89,8 @@ impl Family {
     }
 }
 
-/// Largest allowed fraction of the points that touch other points. It keeps the cracks more than a bond
-/// length apart.
+/// Largest allowed fraction of the points that touch other points. This limit keeps the cracks more than a
+/// bond length apart.
 const MOST_TOUCHING: f64 = 0.25;
 
 /// Initial strain of the block along x with contact. It presses the faces of the cracks against each other.

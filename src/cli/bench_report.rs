@@ -73,11 +73,11 @@ pub struct Figures {
     pub messages_time_alone: f64,
     /// Number of messages of all ranks per step.
     pub messages: f64,
-    /// Number of messages per step of the rank that sends most.
+    /// Largest number of messages that one rank sends per step.
     pub most_messages: f64,
     /// Number of ghosts of all ranks.
     pub ghosts: f64,
-    /// Number of ghosts of the rank that has most.
+    /// Largest number of ghosts of one rank.
     pub most_ghosts: f64,
     /// Limits of the machine; `None` if the limits were not measured.
     pub limits: Option<Limited>,

@@ -168,7 +168,7 @@ fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String
         let range = json!({ "least": least, "median": median, "most": most });
         entry.insert("neighbours".to_owned(), range);
     }
-    // Bonds to other bodies can break by the damage law of their interface.
+    // Bonds to other bodies can break by the damage law of the pair of bodies.
     let pairs = &problem.interface.pairs;
     let has_own = |pair: &InterfacePair| pair.damage.own().is_some();
     let has_pair = |pair: &InterfacePair| has_own(pair) && pair.bodies.contains(&body.name);

@@ -71,8 +71,8 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("strength", si(law.strength, "Pa"));
                 }
             }
-            // Bonds that soften are broken by their law, without a damage section. Damage by stress has no
-            // alpha.
+            // Bonds that soften are broken by their material law, without a damage law. Damage by stress has
+            // no alpha.
             if body.damage.is_some() && damage.stress_measure().is_none() {
                 report.line("alpha", damage.alpha());
             }
@@ -221,7 +221,8 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     }
 }
 
-/// Format the damage thresholds at both ends of the bonds of a pair; a single number if both are equal.
+/// Format the damage thresholds at both ends of the bonds of a pair; a single number if both thresholds are
+/// equal.
 fn pair_damage(laws: [DamageLaw; 2]) -> String {
     let [first, second] = laws.map(|law| format!("{:.4e}", law.critical()));
     let values = if first == second {
@@ -447,8 +448,8 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Append the estimated run times of the steps, history rows and outputs, and of one force evaluation of a load
-/// step, on `ranks` ranks.
+/// Append the estimated run times of the steps, history rows and outputs, and of one force evaluation of a
+/// load step, on `ranks` ranks.
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

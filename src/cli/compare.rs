@@ -224,8 +224,8 @@ fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     }
 }
 
-/// Append a table of differences. With `lists_equal`, the table includes equal quantities; otherwise their
-/// number is appended.
+/// Append a table of differences. With `lists_equal`, the table includes equal quantities. Otherwise, the
+/// number of equal quantities is appended.
 fn table(
     text: &mut String,
     heading: &str,

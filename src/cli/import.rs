@@ -50,10 +50,10 @@ enum From {
     Lammps,
 }
 
-/// Translate a deck and write the new one.
+/// Translate a deck and write the new deck.
 ///
 /// # Errors
-/// If the deck cannot be translated, or the new one exists, has the same path or cannot be written.
+/// If the deck cannot be translated, or if the new deck exists, has the same path or cannot be written.
 pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let target = arguments.output.clone();
     let target = target.unwrap_or_else(|| default_target(&arguments.deck));

@@ -73,10 +73,11 @@ impl Template {
     }
 }
 
-/// Write a deck to a new file, and the file that it reads beside it.
+/// Write a deck to a new file. Write the file that the deck reads into the same folder.
 ///
-/// # Errors If the deck exists, if the other file exists with other content or is the deck itself, or if a
-/// file cannot be written.
+/// # Errors
+/// If the deck exists, if the other file exists with other content or is the deck itself, or if a file cannot
+/// be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     let mut path = arguments.name.clone();
     if path.extension().is_none() {

@@ -31,7 +31,8 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
         return finish(Err(error), speaks);
     }
     let speaks = world.rank() == 0;
-    // A panic on one rank would make the other ranks hang, so abort all. The panic message has been printed.
+    // A panic on one rank would make the other ranks hang, so abort all ranks. The panic message has been
+    // printed.
     catch_unwind(AssertUnwindSafe(|| body(&world)))
         .unwrap_or_else(|_| world.abort(1))
         .unwrap_or_else(|error| finish(Err(error), speaks))

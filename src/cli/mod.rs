@@ -343,7 +343,7 @@ pub fn main() -> ExitCode {
     finish(outcome, true)
 }
 
-/// Run `work` on all decks, even after an error. Print all errors except the last one, which is returned.
+/// Run `work` on all decks, even after an error. Print all errors except the last error, which is returned.
 ///
 /// # Errors
 /// The last error of `work`.

@@ -201,7 +201,7 @@ impl Observer for Log {
     }
 
     fn begin(&mut self, now: &mut dyn RunState) {
-        // A restart may have an end before its checkpoint.
+        // The end of a restarted run may be before its checkpoint.
         let left = now.last().saturating_sub(now.number());
         if self.prints && left > 0 {
             let step = si(now.step(), "s");

@@ -30,7 +30,8 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
     // After a refinement, the number of bonds is known for the last points only, so the rate is omitted.
-    // After a rebalance, the rate is omitted too, because its time also counts as `regridding`.
+    // After a rebalance, the rate is omitted too, because the time of a rebalance also counts as
+    // `regridding`.
     let regrids = summary.seconds.regridding > 0.0;
     if !regrids {
         line("bond updates", si(bond_updates(summary), "/s"));

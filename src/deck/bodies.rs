@@ -22,10 +22,10 @@ const MOST_BODIES: usize = 256;
 
 /// Validate the bodies.
 ///
-/// # Errors If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage
-/// law that the material does not support, an invalid number or shape, or a body without exactly one source
-/// of points. If two bodies request the same rows or elements of a file, or name different columns of the
-/// same file.
+/// # Errors
+/// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
+/// the material does not support, an invalid number or shape, or a body without exactly one source of points.
+/// If two bodies request the same rows or elements of a file, or name different columns of the same file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -178,9 +178,8 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// Return the bodies unchanged. Return an error if a body requests rows of a point file, or
-/// elements of a mesh, that belong to an earlier body, or if two bodies name different columns of a
-/// file.
+/// Return the bodies unchanged, or an error: if rows of a point file or elements of a mesh would belong to
+/// two bodies, or if two bodies name different columns of the same file.
 fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
     let rows = |body: &problem::Body| match &body.points {
         problem::PointSource::File {

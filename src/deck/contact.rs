@@ -24,9 +24,9 @@ pub(super) struct Keys<'a> {
 
 /// Validate contact. Return `None` for a deck without `[contact]`.
 ///
-/// # Errors On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not
-/// support contact. On a pair that inherits the stiffness of `[contact]` but has another model, except
-/// `"none"`.
+/// # Errors
+/// On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not support
+/// contact. On a pair that inherits the stiffness of `[contact]` but has another model, except `"none"`.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,

@@ -177,8 +177,8 @@ impl Comparison<'_> {
     }
 }
 
-/// Return whether a restart may add or remove tables of the section of a key
-/// ([`Restart::WhereUsed`]).
+/// Return whether a restart may add or remove tables in the section that contains this key, see
+/// [`Restart::WhereUsed`].
 fn counts_where_used(key: &str) -> bool {
     let section = key.split('.').next().and_then(Section::find);
     section.is_some_and(|section| section.restart == Restart::WhereUsed)

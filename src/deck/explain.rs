@@ -110,8 +110,8 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         }
     }
     let time = deck.time.get_mut();
-    // Newton's method uses the load steps and tolerance of the relaxation if `[time.static]` does not give
-    // them, so the table of the relaxation is written too.
+    // Newton's method uses the load steps and the tolerance of the relaxation if `[time.static]` lacks these
+    // keys, so the table of the relaxation is written too.
     if problem.is_quasi_static() {
         let default = || Spanned::new(0..0, Relaxation::default());
         time.relaxation.get_or_insert_with(default);
@@ -156,8 +156,8 @@ fn fill(deck: &mut Deck, problem: &Problem) {
 
 /// Return the grid origin of all lattice bodies, m; `None` if their origins differ.
 ///
-/// Without `origin`, the origin is chosen for each spacing, so bodies of different spacings may have different
-/// origins. One key cannot express these.
+/// Without `origin`, the origin is chosen for each spacing, so bodies of different spacings may have
+/// different origins. One key cannot express these.
 fn common_origin(problem: &Problem) -> Option<[f64; 3]> {
     let mut origins = problem.bodies.iter().filter_map(|body| match &body.points {
         problem::PointSource::Lattice { origin, .. } => Some(*origin),

@@ -1,5 +1,5 @@
-//! Warnings about probable mistakes in a deck: unused names, columns of files that are not read, numbers in
-//! place of conditions, and stages that change the mass of moving points.
+//! Warnings about probable mistakes in a deck: unused names, unread columns of files, numbers in place of
+//! conditions, and stages that change the mass of moving points.
 
 use std::ops::Range;
 
@@ -52,7 +52,7 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
     Ok(warnings)
 }
 
-/// Return a warning for each point file with columns that are not read.
+/// Return a warning for each point file with unread columns.
 fn ignored_columns(problem: &Problem) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for (index, body) in problem.bodies.iter().enumerate() {
@@ -72,7 +72,7 @@ fn ignored_columns(problem: &Problem) -> Vec<Warning> {
     warnings
 }
 
-/// Return a warning for each file of initial values with columns that are not read.
+/// Return a warning for each file of initial values with unread columns.
 fn ignored_values(problem: &Problem) -> impl Iterator<Item = Warning> {
     problem.initials.iter().filter_map(|initial| {
         let file = initial.file.as_ref()?;
@@ -85,7 +85,7 @@ fn ignored_values(problem: &Problem) -> impl Iterator<Item = Warning> {
     })
 }
 
-/// Return the warning about columns of a file that are not read; `None` without such columns.
+/// Return the warning about unread columns of a file; `None` without such columns.
 fn not_read(key: &str, ignored: &[&str], span: &Range<usize>) -> Option<Warning> {
     let warning = || {
         let names = ignored.join(", ");

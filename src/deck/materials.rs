@@ -21,8 +21,8 @@ use crate::problem::law;
 /// Validate a material.
 ///
 /// # Errors
-/// On an unknown law or key, on invalid, missing or surplus constants, and on elastic constants that the law does
-/// not support.
+/// On an unknown law or key, on invalid, missing or surplus constants, and on elastic constants that the law
+/// does not support.
 pub fn material(
     scope: &Scope,
     dimension: Dimension,

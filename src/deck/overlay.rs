@@ -180,7 +180,7 @@ mod tests {
         assert_eq!(plate.keys().collect::<Vec<_>>(), ["material", "shape"]);
         let shape = plate["shape"].as_table().unwrap();
         assert_eq!(shape.keys().collect::<Vec<_>>(), ["disc"]);
-        // If both decks name the same choice, its keys are merged.
+        // If both decks name the same choice, the keys of the choice are merged.
         let overlay = "material.glass.pmb.damping = 3";
         let merged = super::tests::merged(deck, overlay);
         let law = merged["material"]["glass"]["pmb"].as_table().unwrap();

@@ -103,7 +103,8 @@ fn trigger(
         let message = format!("{key}: give at least one of `energy`, `damage` and `where`");
         return Err(scope.error(table.span(), message));
     }
-    // The rank of a new point needs the parents of the point, which may be a cell's diagonal apart.
+    // The rank that owns a new point needs the parents of this point as owned points or ghosts. The parents
+    // may be a cell's diagonal apart, and ghosts are at most a horizon away.
     for body in bodies {
         if let PointSource::Lattice { spacing, .. } = body.points {
             let edges = spacing[..scope.dimension].iter();

@@ -136,7 +136,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Parse an expression of the given variables. y and z are only allowed if the dimension has them.
+    /// Parse an expression of the given variables. y is allowed in 2-D and 3-D only, and z in 3-D only.
     pub fn expression(
         &self,
         number: &Number,

@@ -1,4 +1,4 @@
-//! The deck's text, and errors that point into it.
+//! The text of the deck, and errors that point into this text.
 
 use std::fs::File;
 use std::io::Read;

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{self, Problem};
 
-/// Validate a parsed deck; `scope` has its parameters and tables.
+/// Validate a parsed deck; `scope` contains the evaluated parameters and the tables of the deck.
 ///
 /// # Errors
 /// On the first mistake. The message has the location in the deck, the key and the allowed values.

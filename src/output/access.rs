@@ -20,7 +20,8 @@ pub enum Creation {
 /// Open an existing file for reading.
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
     // No collective metadata reads: HDF5 1.10.8 deadlocks in such a read if the ranks have read different
-    // rows before, because their caches differ. A new file has all of its metadata in memory and is safe.
+    // rows before, because their caches differ. All metadata of a new file is in memory, so a new file is
+    // safe.
     options(raw, false)?.open(path)
 }
 

@@ -19,7 +19,7 @@ pub enum Attribute<'a> {
     Ascii(&'a str),
 }
 
-/// Write an attribute; an existing one must have the same type and length.
+/// Write an attribute; an existing attribute must have the same type and length.
 pub(super) fn set_attribute(
     object: &hdf5::Location,
     name: &str,

@@ -137,7 +137,7 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Write a checkpoint that replaces the older one. Collective.
+    /// Write a checkpoint that replaces the older checkpoint. Collective.
     ///
     /// # Errors
     /// If the checkpoint cannot be written, for example to a full disk; existing checkpoints are kept.

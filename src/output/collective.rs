@@ -28,12 +28,13 @@ const OBJECT_BYTES: u64 = 8192;
 /// [`initialise`](super::transfer::initialise) was called before MPI.
 ///
 /// # Full disk
-/// Rank 0 reserves the space before the ranks write (see [`Reservation`]). A full disk inside a
-/// collective write of three or more ranks would make some of them hang.
+/// Rank 0 reserves the space before the ranks write (see [`Reservation`]). A full disk inside a collective
+/// write of three or more ranks would make some of the ranks hang.
 ///
-/// # Kill and loss of power A killed process leaves the file as of its last flush, because metadata stays in
-/// memory until then. A loss of power leaves at least the state of the last [fsync](Self::sync): until the
-/// next fsync, flushed writes change values in place only, because a flush after growth includes an fsync.
+/// # Kill and loss of power
+/// A killed process leaves the file as of its last flush, because metadata stays in memory until then. A loss
+/// of power leaves at least the state of the last [fsync](Self::sync): until the next fsync, flushed writes
+/// change values in place only, because a flush after growth includes an fsync.
 ///
 /// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
 pub struct CollectiveFile<'a> {
@@ -55,7 +56,8 @@ pub struct CollectiveFile<'a> {
 impl<'a> CollectiveFile<'a> {
     /// Create a file.
     ///
-    /// # Errors If the file exists and `creation` is exclusive, if the file cannot be created, if
+    /// # Errors
+    /// If the file exists and `creation` is exclusive, if the file cannot be created, if
     /// [`initialise`](super::transfer::initialise) was not called before MPI, or if several ranks are
     /// threads.
     pub fn create(path: &Path, comm: &'a dyn Communicator, creation: Creation) -> Result<Self> {
@@ -168,7 +170,8 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// Set an attribute of a group (`/` for the root); an existing one must have the same type and length.
+    /// Set an attribute of a group (`/` for the root); an existing attribute must have the same type and
+    /// length.
     ///
     /// # Errors
     /// If the group is missing or the attribute cannot be written.
@@ -250,8 +253,9 @@ impl<'a> CollectiveFile<'a> {
 
     /// Read this rank's `count` rows from `first_row` on, in one collective transfer.
     ///
-    /// # Errors If the rows are out of range, the stored numbers cannot be converted to `T`, or the dataset
-    /// cannot be read.
+    /// # Errors
+    /// If the rows are out of range, the stored numbers cannot be converted to `T`, or the dataset cannot be
+    /// read.
     pub fn read_rows<T: hdf5::H5Type + bytemuck::Pod>(
         &mut self,
         dataset: &Dataset,
@@ -284,7 +288,8 @@ impl<'a> CollectiveFile<'a> {
 
     /// Read an attribute of integers of a group (`/` for the root).
     ///
-    /// # Errors If the attribute is missing or cannot be converted to integers.
+    /// # Errors
+    /// If the attribute is missing or cannot be converted to integers.
     pub fn integers_attribute(&mut self, group: &str, name: &str) -> Result<Vec<i64>> {
         self.collectively(
             &format!("cannot read the attribute {name} of {group}"),

@@ -88,7 +88,7 @@ impl Difference {
                 && (self.largest <= tolerance * self.scale || tolerance.is_infinite())
     }
 
-    /// Add a pair of values; return whether its difference is the largest so far.
+    /// Add a pair of values. Return whether the difference of the two values is the largest so far.
     fn add(&mut self, first: f64, second: f64) -> bool {
         self.values += 1;
         if first.is_finite() {
@@ -365,7 +365,7 @@ impl Matches {
         Self { pairs }
     }
 
-    /// Return the times of both lists that are in no pair.
+    /// Return for each list the times that are in no pair.
     fn single(&self, times: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
         [0, 1].map(|side| {
             let mut matched = self.pairs.iter().map(|pair| pair[side]).peekable();

@@ -54,7 +54,7 @@ impl StoredField {
 pub struct StoredColumn {
     /// Name of the column.
     pub name: String,
-    /// Unit of the column; empty if dimensionless.
+    /// Unit of the column; `1` or empty if dimensionless.
     pub unit: String,
     /// One number per row.
     pub values: Vec<f64>,
@@ -68,7 +68,7 @@ pub struct StoredColumn {
 pub struct ResultReader {
     file: hdf5::File,
     path: PathBuf,
-    /// Number of points: one entry for all steps, or one per step.
+    /// Number of points: one entry for all steps, or one entry per step.
     counts: Vec<usize>,
     steps: usize,
 }

@@ -56,7 +56,8 @@ impl Reservation {
         Ok(())
     }
 
-    /// Update the reservation after a truncation of the file to its length, which frees the space beyond.
+    /// Update the reservation after a truncation of the file to its length. The truncation frees the reserved
+    /// space behind the end of the file.
     pub fn truncated(&mut self) {
         let length = self.file.metadata().map_or(0, |metadata| metadata.len());
         self.bytes = self.bytes.min(length);

@@ -122,7 +122,8 @@ impl Transfer {
     }
 }
 
-/// Selection of consecutive rows of a dataset, and of the matching buffer.
+/// Selections of consecutive rows in a dataset (`file`) and of the same number of rows in a buffer
+/// (`memory`).
 struct Selection {
     memory: hdf5::Dataspace,
     file: hdf5::Dataspace,

@@ -16,8 +16,8 @@ const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
 /// Render the side-car of a result file.
 ///
-/// `file_name` is the result's name without its folder, `points` the number of points at each of the
-/// `times` (s). If `changing`, each step has its own points.
+/// `file_name` is the name of the result file without its folder, and `points` is the number of points at
+/// each of the `times` (s). If `changing`, each step has its own points.
 pub fn render(
     file_name: &str,
     (points, changing): (&[usize], bool),

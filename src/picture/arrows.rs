@@ -92,7 +92,7 @@ struct Root {
 
 /// Return at most one root for each square cell of the picture, at distances of at least `reach`. `cell` and
 /// `reach` are in pixels, and `reach` is at most `cell`. Each cell keeps the root nearest to the camera.
-/// Among roots of equal depth, it keeps the root nearest to the centre of the cell.
+/// Among roots of equal depth, the cell keeps the root nearest to its centre.
 fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root> {
     let rank = |root: &Root, number: [i64; 2]| {
         let offset = [0, 1].map(|k| root.place[k] / cell - number[k] as f64 - 0.5);

@@ -10,7 +10,7 @@ use super::points::Colouring;
 use super::projection::Projection;
 use super::scene::Mark;
 
-/// Largest distance of a pixel of a cell from its point, in edges of a cube or square with the volume of
+/// Largest distance between a point and a pixel of its cell, in edges of a cube or square with the volume of
 /// the point. Cells of a lattice end 0.5 to 0.71 edges away from their points.
 const REACH: f64 = 0.6;
 
@@ -49,7 +49,7 @@ pub fn paint(
 
 /// A point in the picture; lengths are in pixels.
 struct Point {
-    /// Column and row of its projection.
+    /// Column and row of the projected point.
     centre: [f64; 2],
     /// Distance of the point from the drawn plane.
     depth: f64,

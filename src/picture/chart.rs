@@ -226,7 +226,7 @@ impl Chart<'_> {
                         Running::Upwards => format!(" transform=\"rotate(-90 {x:.2} {y:.2})\""),
                     };
                     let text = escaped(&text);
-                    // Viewers use a wider font than the embedded one, so reduce the size.
+                    // Viewers use a wider font than the embedded font, so reduce the size.
                     let size = 0.9 * size;
                     let down = CAPITAL_HEIGHT * size / 2.0;
                     writeln!(

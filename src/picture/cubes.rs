@@ -12,17 +12,18 @@ const BACKING: f64 = 1.3;
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
 const LEAST_CUBE: f64 = 2.0;
 
-/// Brightness of the faces of a cube that are normal to x, y and z.
+/// Brightness of a face of a cube whose normal is along x, y or z.
 const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 
-/// Edge of a cube above which each of its faces has one brightness, pixels.
+/// Largest edge of a cube whose pixels have an averaged brightness, pixels. Each face of a larger cube has
+/// one brightness.
 const SMALL_CUBE: f64 = 10.0;
 
 /// Largest difference in depth between pixels whose brightness is averaged, in edges of a cube.
 const SAME_SURFACE: f32 = 2.0;
 
-/// Cosine of the angle between the view and the normal of a face below which the larger cube grows less along
-/// this normal. It is half the cosine of the isometric view.
+/// Limit of the cosine of the angle between the view and the normal of a face. Below this limit, the larger
+/// cube grows less along the normal. The limit is half the cosine in the isometric view.
 const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
 
 /// Smallest cosine of the angle between the normal of a painted face and the view. Other faces are seen from
@@ -32,10 +33,10 @@ const LEAST_COSINE: f64 = 1e-3;
 /// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
 pub struct Cubes<'a> {
     image: &'a mut Image,
-    /// Vectors in the picture, to the right and down, of edges of a cube with an edge of 1. They are parallel
-    /// to x, y and z, and start at the corner nearest to the viewer.
+    /// Vectors in the picture, to the right and down, of edges of a cube with an edge of 1. The edges are
+    /// parallel to x, y and z, and start at the corner nearest to the viewer.
     edges: [[f64; 2]; 3],
-    /// Decrease of depth along these edges. It is the cosine of the angle between the view and the axis.
+    /// Decrease of depth along each of these edges: the cosine of the angle between the view and the axis.
     cosines: [f64; 3],
     /// Enlargement along x, y and z of the cube behind a cube with an edge of 1.
     growth: [f64; 3],
@@ -166,7 +167,7 @@ impl<'a> Cubes<'a> {
                         column as f64 + 0.5 - corner[0],
                         row as f64 + 0.5 - corner[1],
                     ];
-                    // Fractions of the two edges of the face at this pixel.
+                    // Position of the pixel on the face, as fractions of the two edges of the face.
                     let along = (offset[0] * other[1] - offset[1] * other[0]) / area;
                     let beside = (one[0] * offset[1] - one[1] * offset[0]) / area;
                     let descent = along * descents[axes[0]] + beside * descents[axes[1]];

@@ -30,7 +30,7 @@ impl Film {
     /// Append a frame.
     ///
     /// # Errors
-    /// If the file cannot be written, or the frame has another number of pixels than the first one.
+    /// If the file cannot be written, or the frame has another number of pixels than the first frame.
     pub fn append(&mut self, frame: &Image) -> std::io::Result<()> {
         Ok(self.writer.write_image_data(&frame.rgb)?)
     }

@@ -10,7 +10,7 @@ pub struct Layout {
     pub width: f64,
     /// Height of the whole picture.
     pub height: f64,
-    /// Size of the text; all margins are multiples of it.
+    /// Size of the text; all margins are multiples of this size.
     pub text: f64,
     /// Left and right edge of the frame.
     pub columns: [f64; 2],
@@ -35,11 +35,11 @@ pub struct Bar {
     pub upright: bool,
 }
 
-/// Margin in text sizes that the labels on the left of the frame need.
+/// Margin for the labels on the left of the frame, in text sizes.
 const LEFT: f64 = 5.2;
-/// Margin in text sizes that the title needs.
+/// Margin for the title, in text sizes.
 const TOP: f64 = 3.4;
-/// Margin in text sizes that the labels below the frame need.
+/// Margin for the labels below the frame, in text sizes.
 const BOTTOM: f64 = 4.2;
 /// Room in text sizes for a vertical colour bar and its labels.
 const UPRIGHT_BAR: f64 = 8.0;

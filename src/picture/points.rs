@@ -69,8 +69,8 @@ pub fn paint(
 ) {
     if let Projection::Orthographic(camera) = projection {
         let mut cubes = Cubes::new(image, camera);
-        // The depth buffer stores 4-byte floats. Depths relative to the first point keep their digits far
-        // from the origin.
+        // The depth buffer stores 4-byte floats. Depths relative to the first point have enough digits even
+        // if the body is far from the origin.
         let mut first = None;
         for mark in marks {
             let depth = camera.depth(mark.position);

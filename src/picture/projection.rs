@@ -28,8 +28,8 @@ pub struct Camera {
 const ALONG_VIEW: f64 = 1e-6;
 
 impl Camera {
-    /// Create a camera. The azimuth is the angle of the camera from +x towards +y, the elevation is its
-    /// angle above the x-y plane; both in degrees. Positive z points up the picture.
+    /// Create a camera. The azimuth is the angle of the camera from +x towards +y, and the elevation is the
+    /// angle of the camera above the x-y plane, both in degrees. Positive z points up the picture.
     pub fn new(azimuth: f64, elevation: f64) -> Self {
         // Sine and cosine are exact for multiples of 90 degrees, so that axes along the view are points.
         let turn = |degrees: f64| match degrees.rem_euclid(360.0) {
@@ -62,7 +62,8 @@ impl Camera {
     /// away from the box. `None` if the axis is along the view.
     ///
     /// An outer edge belongs to one face that the camera sees and to one face that it does not see. Of the
-    /// two outer edges along an axis, the ruler is at the lower one, or at the left one if both are upright.
+    /// two outer edges along an axis, the ruler is at the lower edge, or at the left edge if both edges are
+    /// upright.
     pub fn outer_edge(self, axis: Axis) -> Option<([bool; 3], [f64; 2])> {
         let step = |axis: Axis| {
             let index = axis.index();
@@ -208,7 +209,8 @@ impl Bounds {
         let corner = |high| projection.project(self.corner(high));
         let (low, high) = (corner([false; 3]), corner([true; 3]));
         let offset = [0, 1].map(|k| position[k] - (low[k] + high[k]) / 2.0);
-        // The outline is a hexagon with a centre of symmetry. Its sides are parallel to the edges.
+        // The outline is a hexagon with a centre of symmetry. The sides of the hexagon are parallel to the
+        // edges of the box.
         let edges = [0, 1, 2].map(|axis| {
             let mut high = [false; 3];
             high[axis] = true;

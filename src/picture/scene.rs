@@ -258,7 +258,7 @@ impl Scene<'_> {
     }
 }
 
-/// Return the number of points, which their indices must be able to represent.
+/// Return the number of points as a `u32`, the type of the indices of points. A larger number is an error.
 fn index_limit(points: usize) -> Result<u32> {
     u32::try_from(points).map_err(|_| {
         Error::input(format!(

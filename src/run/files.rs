@@ -38,7 +38,7 @@ impl Files {
         }
     }
 
-    /// Return the results, the main one first.
+    /// Return the paths of the results, the main result first.
     pub fn results(&self) -> impl Iterator<Item = &Path> {
         let all = [&self.result].into_iter().chain(&self.further);
         all.map(PathBuf::as_path)
@@ -46,7 +46,8 @@ impl Files {
 
     /// Check that a new run may write to the folder. Called on rank 0.
     ///
-    /// # Errors If the folder contains a result, history or checkpoint, and `overwrite` is false.
+    /// # Errors
+    /// If the folder contains a result, history or checkpoint, and `overwrite` is false.
     pub fn prepare(&self, overwrite: bool) -> Result<()> {
         let files = self.results().chain([self.history.as_path()]);
         let existing = files

@@ -24,8 +24,8 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range that the
-    /// result contains; `None` for all rows. Collective.
+    /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range whose points
+    /// are in the result; `None` for all rows. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,

@@ -463,8 +463,8 @@ impl<'a> Job<'a> {
                 Ok(recorder) => break recorder,
                 Err(error) => error,
             };
-            // If a result is damaged, a new one replaces it, because the checkpoint is intact. After another
-            // error, such as a full disk, the results are not replaced.
+            // If a result is damaged, a new result replaces the damaged result, because the checkpoint is
+            // intact. After another error, such as a full disk, the results are not replaced.
             let mut is_damaged = false;
             for (number, path) in self.files.results().enumerate() {
                 if matches!(continued[number], Continuation::Resume)
@@ -526,7 +526,7 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// Find the files of an earlier run that this run does not replace. Collective.
+    /// Find the files that an earlier run has written and that this run does not replace. Collective.
     fn stale_files(&self) -> Result<Vec<PathBuf>> {
         let found = match self.comm.rank() {
             0 => stale_files::find(self.problem, &self.files),
@@ -535,7 +535,7 @@ impl<'a> Job<'a> {
         Ok(self.paths_of_rank_0(&agree(self.comm, found)?))
     }
 
-    /// Remove the files of an earlier run that this run does not replace, and report their paths. Collective.
+    /// Remove the files at `paths`, which an earlier run has written, and report the paths. Collective.
     fn remove_stale_files(&mut self, paths: Vec<PathBuf>) -> Result<()> {
         let removed = match self.comm.rank() {
             0 => stale_files::remove(&paths),

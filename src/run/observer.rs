@@ -58,15 +58,15 @@ pub enum Message {
         /// Whether the run was already complete at the checkpoint.
         complete: bool,
     },
-    /// An existing result cannot be continued. It is renamed, and a new one is created.
+    /// An existing result cannot be continued. The existing result is renamed, and a new result is created.
     SetAside {
         /// Reason why the result cannot be continued.
         reason: String,
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
     },
-    /// Paths of removed files: further results, with their side-cars, and tables of cracks of an earlier run
-    /// that this run does not replace.
+    /// Paths of removed files that an earlier run has written and that this run does not replace: further
+    /// results with their side-cars, and tables of cracks.
     Removed(Vec<PathBuf>),
     /// The grid was refined or coarsened.
     Refined {
@@ -149,8 +149,8 @@ pub trait RunState {
     fn velocity(&mut self, component: usize) -> &[f64];
 
     /// Return the values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit
-    /// of [`Field::unit`]. They are ordered by point, with [`Field::components`] values per point. A request
-    /// needs one to three passes over the bonds. Collective: all ranks must request the same field.
+    /// of [`Field::unit`]. The values are ordered by point, with [`Field::components`] values per point. A
+    /// request needs one to three passes over the bonds. Collective: all ranks must request the same field.
     fn field(&mut self, field: Field) -> Vec<f64>;
 
     /// Return the energies of all points, J. A request needs one pass over the bonds. Collective.
@@ -160,8 +160,8 @@ pub trait RunState {
     /// in [`Observer::row`], the run stops at this step; otherwise, it stops up to ten steps later.
     fn stop(&mut self);
 
-    /// Return the factor of a load in the next step; 1 unless an observer has set it. `None` if no load has
-    /// this name.
+    /// Return the factor of a load in the next step; 1 unless an observer has set the factor. `None` if no
+    /// load has this name.
     fn load_factor(&self, name: &str) -> Option<f64>;
 
     /// Multiply a load by a factor. A load is a condition with `force`, `body_force`, `traction` or

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::signals::Signals;
 use crate::deck::Deck;
 
-/// Options of a run; equal on all ranks, except `signals`.
+/// Options of a run; equal on all ranks, except `signals`, `started` and `attributes`.
 pub struct Options {
     /// Folder of the result, the history and the checkpoints; it is created if missing.
     pub folder: PathBuf,
@@ -20,7 +20,8 @@ pub struct Options {
     /// Signals that stop the run or request a checkpoint.
     pub signals: Option<Signals>,
     /// The deck; `None` for a problem that was built in Rust. Errors and warnings refer to lines of the deck,
-    /// the result contains its text, and a restart compares it with the deck of the checkpoint.
+    /// the result contains the text of the deck, and a restart compares the deck with the deck of the
+    /// checkpoint.
     pub deck: Option<Deck>,
     /// Additional attributes of the result: name and text, such as the command line. The attributes of rank 0
     /// are used.

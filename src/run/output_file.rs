@@ -1,4 +1,4 @@
-//! The result file of an output: the main one or a further one.
+//! The result file of an output: the main result or a further result.
 
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub struct OutputFile<'a> {
     /// Index of this output among the further outputs that count newly broken bonds; `None` for other
     /// outputs.
     counter: Option<usize>,
-    /// The rows of this rank's range of ids that the result contains; `None` for all rows.
+    /// Rows of this rank's range of ids whose points are in the result; `None` for all rows.
     rows: Option<Vec<usize>>,
     /// The side-car; on rank 0 only.
     side_car: Option<SideCar>,
@@ -45,7 +45,8 @@ impl<'a> OutputFile<'a> {
     /// rows; `None` for further results. Also return the history rows that a resumed file retains.
     /// Collective.
     ///
-    /// # Errors If the file cannot be created, resumed or written, or the set of the output is empty.
+    /// # Errors
+    /// If the file cannot be created, resumed or written, or the set of the output is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         (output, path): (&'a Output, &Path),
@@ -166,7 +167,7 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// Find the rows of this rank's range of ids that the result contains; `None` for all rows. Collective.
+/// Find the rows of this rank's range of ids whose points are in the result; `None` for all rows. Collective.
 ///
 /// # Errors
 /// If the set of the output is empty.

@@ -123,7 +123,8 @@ impl<'a> Recorder<'a> {
 
     /// Find the points of outputs and history again after a rebalance or refinement. Collective.
     ///
-    /// # Errors Same as for [`HistoryObserver::new`]. Also if the set of an output is empty.
+    /// # Errors
+    /// Same as for [`HistoryObserver::new`]. Also if the set of an output is empty.
     pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
         for file in &mut self.files {
@@ -346,10 +347,10 @@ pub enum Continuation {
     New(Option<String>),
 }
 
-/// Return the reason why the result file of an output cannot be continued; `None` if it can. The file may be
-/// missing or damaged, or have other points, fields or columns. `outputs` is the number of outputs that the
-/// checkpoint counts. For the main result, `history` has the observer, the number of rows, and the changes of
-/// the column definitions. Collective.
+/// Return the reason why the result file of an output cannot be continued; `None` if the file can be
+/// continued. Reasons are a missing or damaged file, and other points, fields or columns. `outputs` is the
+/// number of outputs that the checkpoint counts. For the main result, `history` has the observer, the number
+/// of rows, and the changes of the column definitions. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

@@ -20,8 +20,9 @@ pub struct Restart {
 
 /// Restore a simulation from the newest intact checkpoint. Collective.
 ///
-/// # Errors If there is no intact checkpoint, or if the checkpoint belongs to another deck or to other
-/// points. For another deck, the message lists the differences.
+/// # Errors
+/// If there is no intact checkpoint, or if the checkpoint belongs to another deck or to other points. For
+/// another deck, the message lists the differences.
 pub fn restart<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     files: &Files,

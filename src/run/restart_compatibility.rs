@@ -1,4 +1,4 @@
-//! Comparison of the physics of a run with that of its checkpoint.
+//! Comparison of the physics of a run with the physics of its checkpoint.
 
 use crate::deck::{self, Source};
 use crate::error::Result;
@@ -56,7 +56,8 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")
 }
 
-/// Return the differences in the definitions of the history's columns, in one line; `None` if they are equal.
+/// Return the differences in the definitions of the history's columns, in one line; `None` if the definitions
+/// are equal.
 ///
 /// # Errors
 /// If a deck cannot be parsed.
@@ -94,7 +95,7 @@ pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
 }
 
 /// Return the first line that differs in two listings, or a note that one listing has more lines; empty if
-/// they are equal.
+/// the listings are equal.
 fn listed_differences(old: &str, new: &str) -> Vec<String> {
     let short = |line: &str| line.trim().chars().take(MAX_LINE).collect::<String>();
     let mut lines = old.lines().zip(new.lines());

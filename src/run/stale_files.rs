@@ -1,5 +1,5 @@
-//! Files of an earlier run in the output folder that a new run does not replace: results of outputs and tables
-//! of cracks that the deck no longer has.
+//! Files in the output folder that an earlier run has written and that a new run does not replace: results
+//! and tables of cracks, if the deck no longer has their outputs and cracks.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};
@@ -11,12 +11,13 @@ use crate::problem::Problem;
 
 use super::files::Files;
 
-/// Longest heading of a history file that is searched, bytes.
+/// Largest number of bytes that are read to find the heading of a history file.
 const LONGEST_HEADING: u64 = 1 << 20;
 
-/// Find the further results, with their side-cars, and the tables of cracks that a run of this problem does not
-/// replace. Files with such names that the earlier run has not written are omitted. The names of the earlier
-/// cracks are read from the history file, so the function is called on rank 0 before that file is replaced.
+/// Find the further results, with their side-cars, and the tables of cracks that a run of this problem does
+/// not replace. A file with such a name is omitted if the earlier run has not written this file. The names of
+/// the earlier cracks are read from the history file, so the function is called on rank 0 before that file is
+/// replaced.
 ///
 /// # Errors
 /// If the folder cannot be read.
@@ -76,8 +77,8 @@ fn heading(path: &Path) -> std::io::Result<String> {
     Ok(line)
 }
 
-/// Test whether a file is the result of a further output with this name. A result that a restart has renamed
-/// has another name in its attributes.
+/// Test whether a file is the result of a further output with this name. False for a result that a restart
+/// has renamed, because its attributes contain the old name.
 fn is_result_of(path: &Path, name: &str) -> bool {
     let attributes = ResultReader::open(path).and_then(|reader| reader.attributes());
     attributes.is_ok_and(|attributes| {

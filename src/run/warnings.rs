@@ -14,8 +14,9 @@ use crate::solver::{Simulation, Stepper};
 /// printed.
 const MAX_INERTIA: f64 = 0.05;
 
-/// Ratio of overshoot to fracture energy above which a warning is printed. For comparison: a branching crack
-/// at `safety = 0.8` has a ratio of 0.4, and a quarter of the step changes its fracture energy by 1 %.
+/// Ratio of overshoot to fracture energy above which a warning is printed. For comparison: a run with a
+/// branching crack at `safety = 0.8` has a ratio of 0.4, and steps that are a quarter as long change the
+/// fracture energy of this run by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
 /// Initial fraction of a run without a check of inertia, because the strain energy is then small.

@@ -56,8 +56,8 @@ impl Painter<'_> {
                 *ends = [ends[0].min(value), ends[1].max(value)];
             }
         };
-        // Ends of the coordinates of all points, of the coordinates of points in the half spaces, and of the
-        // values of points that are also in the slice.
+        // Smallest and largest coordinates of all points (`all`) and of the points in the half spaces
+        // (`kept`), and smallest and largest value of the points that are also in the slice (`values`).
         let (mut all, mut kept, mut values) = ([none; 3], [none; 3], none);
         let mut nearest: Option<f64> = None;
         let power = 1.0 / self.dimension as f64;

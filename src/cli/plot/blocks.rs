@@ -36,8 +36,8 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
     Ok(true)
 }
 
-/// Return for each body whether its points are scattered, that is not on a lattice, at an output. The result
-/// is empty in 1-D and without outputs.
+/// Return for each body whether its points are scattered (not on a lattice) at an output. The result is empty
+/// in 1-D and without outputs.
 ///
 /// The number of combinations of a body is the product of the numbers of different x, y and z. A body of n
 /// points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. The number of combinations is

@@ -137,8 +137,8 @@ fn camera_of(text: &str) -> Result<Camera> {
 /// Return the view of a body of this dimension; `slice` and `camera` are the arguments of these options.
 ///
 /// # Errors
-/// If the text of the slice is not AXIS=POSITION, that of the camera not AZIMUTH,ELEVATION, or the body is not
-/// 3-D.
+/// If the text of the slice is not AXIS=POSITION, if the text of the camera is not AZIMUTH,ELEVATION, or if
+/// the body is not 3-D.
 pub fn view(slice: Option<&str>, camera: Option<&str>, dimension: usize) -> Result<View> {
     let wanted = "--slice must be AXIS=POSITION, such as z=0.005";
     let given = camera.is_some();

@@ -24,8 +24,9 @@ struct Table {
 
 /// Draw columns of one or more histories as curves.
 ///
-/// # Errors If an argument is wrong, if a file lacks a column or cannot be read, if there is no finite value
-/// to draw, or if the picture cannot be written.
+/// # Errors
+/// If an argument is wrong, if a file lacks a column or cannot be read, if there is no finite value to draw,
+/// or if the picture cannot be written.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let first = &arguments.results[0];
     let tables: Vec<Table> = arguments

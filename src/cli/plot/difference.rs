@@ -16,7 +16,8 @@ const SAME_TIME: f64 = 1e-9;
 pub struct Subtrahend {
     path: PathBuf,
     result: ResultReader,
-    /// For each output of the minuend, its time (s) and the index of the output of this result at this time.
+    /// Time (s) of each output of the minuend, and index of the output of this result at the same time;
+    /// `None` if this result has no such output.
     outputs: Vec<(f64, Option<usize>)>,
 }
 

@@ -109,7 +109,7 @@ fn check_alike(painters: &[Painter]) -> Result<()> {
     Ok(())
 }
 
-/// Draw all displacements with the smallest factor of the results that are displaced.
+/// Draw the displacements of all results with the same factor: the smallest factor of the displaced results.
 fn share_factor(painters: &mut [Painter]) {
     let displaced = painters.iter().filter(|painter| painter.is_displaced);
     let factors = displaced.map(|painter| painter.factor);

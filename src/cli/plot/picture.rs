@@ -136,7 +136,8 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
 
 /// Check that the name of a picture ends in .png.
 ///
-/// # Errors If the name has another ending.
+/// # Errors
+/// If the name has another ending.
 pub fn check_png(path: &Path) -> Result<()> {
     let hint = "; `--y` draws curves, and `fissure movie` films";
     check_ending(path, &["png"], hint)

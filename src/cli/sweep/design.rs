@@ -94,10 +94,10 @@ pub struct Design {
 
 impl Design {
     /// Create all combinations of the values; the last axis changes fastest. With `zip`, combine only the
-    /// k-th values of all axes; the only value of an axis is combined with all rows.
+    /// k-th values of all axes; an axis with one value has this value in all rows.
     ///
-    /// # Errors If a name is given twice, or if zipped axes with several values have different numbers of
-    /// values.
+    /// # Errors
+    /// If a name is given twice, or if zipped axes with several values have different numbers of values.
     pub fn new(axes: &[Axis], zip: bool) -> Result<Self> {
         for (number, axis) in axes.iter().enumerate() {
             if axes[..number].iter().any(|other| other.name == axis.name) {

@@ -117,8 +117,8 @@ impl SweepArguments {
 /// values.
 ///
 /// # Errors
-/// If the deck is invalid with the values of a combination, which the message names, or a value has an
-/// unknown column.
+/// If the deck is invalid with the values of a combination, or if a value has an unknown column. The message
+/// names the combination.
 fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
     let run = |(row, name): (&Vec<usize>, String)| {
         let (label, set) = (design.label(row), design.assignments(row));

@@ -17,7 +17,7 @@ use crate::cli::file_error;
 /// File with the output of a run.
 pub const LOG: &str = "log.txt";
 
-/// File with the deck of a run and all defaults, which identifies the run.
+/// File with the deck of a run and all defaults. This file identifies the run.
 const DECK: &str = "deck_in_full.toml";
 
 /// Result of a run.
@@ -151,7 +151,7 @@ impl<'a> Program<'a> {
     /// Execute the runs with the indices `due`, several at a time. Call `ended` with index, state and time
     /// (s) of each run that is complete or failed. Return true if a signal or a limit stopped a run.
     ///
-    /// A first SIGINT or SIGTERM makes all runs write checkpoints and stop; a second one kills the runs.
+    /// A first SIGINT or SIGTERM makes all runs write checkpoints and stop; a second signal kills the runs.
     ///
     /// # Errors
     /// If a run cannot be started, its marker file cannot be created, or `ended` fails. The other runs are

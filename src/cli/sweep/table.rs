@@ -82,7 +82,7 @@ impl<'a> Table<'a> {
         if prints {
             outln!("{}", printed(&cells));
         }
-        // Several tasks of a job array may write this table, so replace it by an atomic rename.
+        // Several tasks of a job array may write this table, so write a temporary file and rename it.
         let path = folder.join("sweep.csv");
         let part = folder.join(format!("sweep.csv.{}", std::process::id()));
         std::fs::write(&part, csv(&cells))

@@ -45,7 +45,7 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// Expected number for a value. The value is named if there are several.
+/// Expected number for a picked value. `name` is the value; `None` refers to the only value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     name: Option<Column>,

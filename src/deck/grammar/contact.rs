@@ -23,7 +23,7 @@ pub struct Contact {
     pub stiffness: Option<Number>,
     /// Distance in m at which contact begins. The default is the mean edge of the two cells, or 1.35 times
     /// this edge with `"short-range"`. For points that start closer, contact begins below their initial
-    /// distance (0.9 of it with `"short-range"`).
+    /// distance (0.9 times this distance with `"short-range"`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
@@ -32,8 +32,8 @@ pub struct Contact {
     /// Coefficient of static friction; `friction` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// Relative speed of two points after a collision, divided by the speed before it; from 0.01 to 1. The
-    /// default is 1 (no damping).
+    /// Relative speed of two points after a collision, divided by the speed before the collision; from 0.01
+    /// to 1. The default is 1 (no damping).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
     /// Pairs of bodies with their own rule, by a freely chosen name.

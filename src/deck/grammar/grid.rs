@@ -38,9 +38,9 @@ pub struct Grid {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
     /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid; points
-    /// from a file can form one. `"list"` works for any points. `"auto"` uses a lattice where possible. Bonds
-    /// between bodies on different grids are always stored in lists. The choice changes results by rounding
-    /// only.
+    /// from a file can form a regular grid. `"list"` works for any points. `"auto"` uses a lattice where
+    /// possible. Bonds between bodies on different grids are always stored in lists. The choice changes
+    /// results by rounding only.
     #[serde(default = "automatic")]
     pub family: Spanned<Family>,
 }

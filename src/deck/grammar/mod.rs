@@ -46,7 +46,7 @@ pub type Tables<T> = IndexMap<String, Spanned<T>>;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deck {
-    /// Title, one line for summaries and pictures.
+    /// Title: one line of text that appears in summaries and pictures.
     #[serde(default)]
     pub title: Text,
     /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.

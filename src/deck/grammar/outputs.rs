@@ -172,7 +172,7 @@ pub struct History {
     /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks by name. Their path and length are computed, in 3-D their area and front.
+    /// Cracks by name. The path and the length of each crack are computed, in 3-D the area and the front.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
     /// Crack tips that are tracked, by name.
@@ -236,7 +236,7 @@ pub struct SupportForce {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
-    /// Start position of the crack, m; damage within one horizon of it belongs to the crack.
+    /// Start position of the crack, m; damage within one horizon of this position belongs to the crack.
     pub from: Vector,
     /// The set of points that are evaluated; all points if not given.
     #[serde(default = "super::all_points")]
@@ -281,7 +281,7 @@ pub struct FieldStatistics {
 pub enum Statistic {
     /// The sum over the points.
     Sum,
-    /// The sum over the points of value times volume.
+    /// The sum of value times volume over the points.
     Integral,
     /// The integral divided by the volume of the set.
     Mean,
@@ -317,14 +317,15 @@ pub struct Front {
     pub threshold: Number,
 }
 
-/// A crack tip: the farthest point of a set in one direction whose damage exceeds a threshold. The position
-/// is then interpolated as for a [`Front`].
+/// A crack tip: among the points of a set whose damage exceeds a threshold, the farthest point in one
+/// direction. The position is then interpolated as for a [`Front`].
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {
     /// Position from which the length of the crack is measured, m.
     pub from: Vector,
-    /// Direction of the crack, a vector of any length; the length of the crack is measured along it.
+    /// Direction of the crack, a vector of any length; the length of the crack is measured along this
+    /// direction.
     pub direction: Vector,
     /// The set of points that are evaluated; all points if not given.
     #[serde(default = "super::all_points")]

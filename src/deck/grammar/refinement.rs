@@ -58,8 +58,8 @@ pub struct Trigger {
     /// A condition on the reference position and t that every trigger must fulfil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time in s without a nearby trigger or point with broken bonds, after which points become coarser. Each
-    /// evaluation coarsens by one level. If not given, points never become coarser.
+    /// Time in s after which points become coarser if no trigger and no point with broken bonds is nearby.
+    /// Each evaluation coarsens by one level. If not given, points never become coarser.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }

@@ -7,16 +7,16 @@ use super::Text;
 use crate::deck::number::{Number, default_number};
 use crate::deck::spanned::Spanned;
 
-/// A value over time, linear between rows. Expressions of `t` may use its name. The rows come from a file or
-/// from this table.
+/// A value over time, linear between rows. Expressions of `t` may use the name of the table. The rows come
+/// from a file or from this table.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
     /// Text file whose first row names its columns, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Name of the column of values. If not given and the file has two columns, the column other than the
-    /// time.
+    /// Name of the column of values. If not given and the file has two columns, the column that is not the
+    /// column of times.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<Text>,
     /// Name of the column of times in s. If not given, the column `t` or `time`, or the first

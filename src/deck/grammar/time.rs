@@ -118,8 +118,8 @@ impl Method {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a
-    /// smaller dt.
+    /// Largest number of bonds of one point that may break in a step. If more bonds break, the step is
+    /// repeated with a smaller dt.
     #[serde(default = "default_most_broken")]
     pub most_broken: Count,
     /// Largest number of bonds of one point that break in a calm step.
@@ -131,7 +131,7 @@ pub struct Adaptive {
     /// Factor on dt when a step is repeated.
     #[serde(default = "default_reduce")]
     pub reduce: Number,
-    /// Factor on dt when it is raised.
+    /// Factor by which dt is raised.
     #[serde(default = "default_raise")]
     pub raise: Number,
     /// The smallest step in s; 1/100 of the largest if not given.

@@ -126,8 +126,9 @@ pub struct Contents<'a> {
 impl<'a> ResultFile<'a> {
     /// Create the file and write the static data.
     ///
-    /// # Errors If the file exists and `creation` is exclusive, if the file cannot be written, if there are
-    /// no points, or if a field has the wrong length.
+    /// # Errors
+    /// If the file exists and `creation` is exclusive, if the file cannot be written, if there are no points,
+    /// or if a field has the wrong length.
     pub fn create(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -220,7 +221,7 @@ impl<'a> ResultFile<'a> {
         Ok(result)
     }
 
-    /// Set the points and static fields of the next step. The static fields must be those of
+    /// Set the points and static fields of the next step. The static fields must be the same fields as for
     /// [`create`](Self::create).
     ///
     /// # Errors
@@ -295,7 +296,7 @@ impl<'a> ResultFile<'a> {
             };
             write_field(&mut self.file, dataset, first, description, &data)?;
         }
-        // Flush the data before the tables that refer to them.
+        // Flush the data before the tables that refer to these data.
         self.file.flush()?;
         append_one(&mut self.file, &mut self.numbers, step)?;
         append_one(&mut self.file, &mut self.times, time)?;
@@ -326,7 +327,7 @@ impl<'a> ResultFile<'a> {
         self.steps
     }
 
-    /// Flush and fsync all data and history rows, so they survive a loss of power.
+    /// Flush and fsync all data and history rows of the file, so that these survive a loss of power.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.

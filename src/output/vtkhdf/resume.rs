@@ -28,8 +28,8 @@ struct Retained {
 type KeptHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
-    /// Resume a result after its first steps and history rows, and drop later ones. Return the retained
-    /// history rows.
+    /// Resume a result after its first steps and history rows, and drop later steps and rows. Return the
+    /// retained history rows.
     ///
     /// A file is continued in place if the points never change, if deck and version are the same, and if the
     /// file has space for all expected steps. No retained row then moves, so a kill loses no row. Otherwise,
@@ -112,8 +112,8 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// Copy the retained part to a new file, which replaces the old one by a rename. A kill leaves the old or
-    /// the new file.
+    /// Copy the retained part to a new file, which replaces the old file by a rename. A kill leaves the old
+    /// or the new file.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
