@@ -1,4 +1,4 @@
-//! Launch environment: rank before MPI starts, cores and threads.
+//! Start of MPI and of the threads; rank, cores and threads from the environment of the launcher.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;

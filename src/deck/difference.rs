@@ -1,4 +1,4 @@
-//! Comparison of the physics of two decks, which a restart must not change.
+//! Comparison of the physics of two decks. A restart must not change the physics.
 
 use toml::{Table, Value};
 

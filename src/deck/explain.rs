@@ -157,7 +157,7 @@ fn fill(deck: &mut Deck, problem: &Problem) {
 /// Return the grid origin of all lattice bodies, m; `None` if their origins differ.
 ///
 /// Without `origin`, the origin is chosen for each spacing, so bodies of different spacings may have
-/// different origins. One key cannot express these.
+/// different origins. The single key `origin` cannot express different origins.
 fn common_origin(problem: &Problem) -> Option<[f64; 3]> {
     let mut origins = problem.bodies.iter().filter_map(|body| match &body.points {
         problem::PointSource::Lattice { origin, .. } => Some(*origin),

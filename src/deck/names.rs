@@ -1,4 +1,4 @@
-//! Check of the names of tables, which appear in column names and messages.
+//! Check of the names of tables. These names appear in column names and messages.
 
 use super::grammar::{Deck, NamedTable};
 use super::resolve::Scope;
@@ -40,7 +40,7 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
 /// Check that a name can be part of a column name; `key` and `place` locate the name for the error.
 ///
 /// # Errors
-/// On a name with `/`, `.` or `,`, which separate columns and the parts of their names.
+/// On a name with `/`, `.` or `,`. These characters separate columns and the parts of the names of columns.
 pub fn suits_a_column<T>(scope: &Scope, key: &str, name: &str, place: &Spanned<T>) -> Result<()> {
     if name.contains(['/', '.', ',']) {
         let message = format!(

@@ -161,7 +161,7 @@ struct Window {
 }
 
 impl Window {
-    /// Return an excerpt of a line with at most `width` characters, which includes `column`.
+    /// Return an excerpt of a line that includes `column` and has at most `width` characters.
     fn new(line: &str, column: usize, width: usize) -> Self {
         // `column` may be one past the last character of the line.
         let fits = line.chars().nth(width).is_none();

@@ -113,23 +113,23 @@ impl Difference {
 pub struct Comparison {
     /// Number of pairs of outputs.
     pub outputs: usize,
-    /// Times of outputs that only the first or only the second result has, s.
+    /// Times of the outputs of each result that the other result lacks, s.
     pub single_outputs: [Vec<f64>; 2],
     /// Number of pairs of points in all outputs.
     pub points: u64,
-    /// Number of points that only the first or only the second result has, in all pairs of outputs.
+    /// Number of points of each result that the other result lacks, in all pairs of outputs.
     pub single_points: [u64; 2],
     /// The common fields.
     pub fields: Vec<Difference>,
-    /// Fields that only the first or only the second result has, or has in another unit or shape.
+    /// Fields of each result that the other result lacks, or has in another unit or shape.
     pub single_fields: [Vec<String>; 2],
     /// Number of pairs of history rows.
     pub rows: usize,
-    /// Number of history rows that only the first or only the second result has.
+    /// Number of history rows of each result that the other result lacks.
     pub single_rows: [usize; 2],
     /// The common columns of the history.
     pub columns: Vec<Difference>,
-    /// Columns that only the first or only the second result has, or has in another unit.
+    /// Columns of each result that the other result lacks, or has in another unit.
     pub single_columns: [Vec<String>; 2],
 }
 

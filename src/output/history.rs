@@ -42,7 +42,7 @@ pub struct History {
 }
 
 impl History {
-    /// Create the table `/history` and the CSV file, which replaces an existing file. Collective.
+    /// Create the table `/history` and the CSV file. The CSV file replaces an existing file. Collective.
     ///
     /// The header of the CSV file is like `time [s],step [1],kinetic_energy [J]`.
     ///

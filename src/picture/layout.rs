@@ -49,7 +49,7 @@ const LYING_BAR: f64 = 5.4;
 const RIGHT: f64 = 3.0;
 /// Height in text sizes of the legend at the bottom of the picture.
 const LEGEND: f64 = 1.5;
-/// Margin in text sizes without labels.
+/// Margin at a side without labels, in text sizes.
 const EMPTY: f64 = 2.2;
 /// Least height of the frame in text sizes. The least width is twice this.
 const LEAST_HEIGHT: f64 = 3.4;

@@ -24,7 +24,7 @@ pub struct Camera {
     towards: [f64; 3],
 }
 
-/// Length in the picture of a unit vector that counts as along the view.
+/// Largest length in the picture of a unit vector that counts as parallel to the view.
 const ALONG_VIEW: f64 = 1e-6;
 
 impl Camera {

@@ -68,8 +68,8 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
     )
 }
 
-/// Describe the halo exchanges of a force evaluation: the content of each, and its number of values per
-/// ghost.
+/// Describe the halo exchanges of a force evaluation: the content of each exchange, and the number of values
+/// per ghost.
 fn sent<const D: usize>(simulation: &mut Simulation<'_, D>) -> String {
     let is_thermal = simulation.problem.has_temperature();
     let sizes = simulation.forces.halo_sizes(is_thermal).into_iter();

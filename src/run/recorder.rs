@@ -48,7 +48,7 @@ impl<'a> Recorder<'a> {
     /// `rows` rows. Collective.
     ///
     /// # Errors
-    /// If a file cannot be written, or a set of the history or an output is empty.
+    /// If a file cannot be written, or if a set of the history or of an output is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         files: &Files,

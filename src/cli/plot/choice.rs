@@ -33,7 +33,8 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
     value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
 }
 
-/// Return the indices of the outputs to draw; `text` is `all`, or times in s or `last`, separated by commas.
+/// Return the indices of the outputs to draw; `text` is `all`, or a list of times (s) and `last`, separated
+/// by commas.
 ///
 /// # Errors
 /// If there is no output, the text is wrong, or a time is outside of the result.

@@ -17,8 +17,8 @@ use crate::cli::{file_error, outln, result_file};
 /// Draw the requested outputs of each result side by side, with the same axes and range of colours.
 ///
 /// # Errors
-/// If a file is not a result, an argument is wrong, the results do not have the field or have different
-/// dimensions, or the picture is too narrow or cannot be written.
+/// If a file is not a result, if an argument is wrong, if a result lacks the field, if the results have
+/// different dimensions or quantities, or if the picture is too narrow or cannot be written.
 pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity) -> Result<()> {
     if arguments.time == "all" {
         let message = "--time all: writes a picture of each output of one result; of several results, \

@@ -296,7 +296,7 @@ fn words(status: ExitStatus) -> String {
     }
 }
 
-/// Send a signal to processes that have not been waited for.
+/// Send a signal to processes whose end has not been detected yet.
 fn kill(processes: &[Process], signal: i32) {
     for process in processes {
         // SAFETY: the call only sends a signal. The id belongs to the child: the system does not reuse an id

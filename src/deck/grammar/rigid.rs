@@ -13,7 +13,7 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
-    /// `box`, `sphere`, `cylinder`, or `disc` in the plane; or a `half_space`.
+    /// A `box`, `sphere` or `cylinder`, or a `disc` in plane problems; not together with `half_space`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<Spanned<Shape>>,
     /// The half space behind a plane, or behind a line in plane problems.
@@ -34,8 +34,8 @@ pub struct Rigid {
     /// Force at the centre of a free body in N: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Vector>,
-    /// Young's modulus in Pa of the layer between points and surface, which is half a horizon thick. The
-    /// modulus of the points' material if not given.
+    /// Young's modulus in Pa of the layer between points and surface; the modulus of the points' material if
+    /// not given. The layer is half a horizon thick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// As in `[contact]`.
