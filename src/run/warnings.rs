@@ -109,8 +109,8 @@ impl<'a> Job<'a> {
         if fracture < 0.0 {
             let text = format!(
                 "within one step, bonds went from no load to beyond their criterion; the fracture energy, \
-                 {fracture:.3e} J, is therefore wrong; check the units of the toughness and of the velocities, and \
-                 repeat with a shorter time step",
+                 {fracture:.3e} J, is therefore wrong; check the units of the toughness and of the \
+                 velocities, and repeat with a shorter time step",
             );
             self.observer.message(&Message::Warning(text));
             return;
