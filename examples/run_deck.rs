@@ -34,7 +34,7 @@ fn main() -> ExitCode {
 /// Run a deck and write the result into a folder; an earlier result is replaced.
 pub fn run_deck(deck: &Path, folder: &Path, comm: &dyn Communicator) -> Result<Outcome> {
     let deck = agree(comm, deck::read(deck, &[]))?;
-    let problem = agree(comm, deck.problem())?;
+    let problem = deck.problem_on(comm)?;
     let mut options = Options::new(folder);
     options.existing = Existing::Replace;
     options.deck = Some(deck);

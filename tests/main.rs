@@ -6,6 +6,7 @@ mod support;
 mod deck {
     mod decks;
     mod import;
+    mod mean_spacing;
     mod meshes;
     mod messages;
     mod survey;

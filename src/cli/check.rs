@@ -116,7 +116,7 @@ fn simulate(problem: &Problem, request: &Request) -> Result<String> {
     section::heading(&mut report, problem, request.path);
     for (index, body) in problem.bodies.iter().enumerate() {
         section::body(&mut report, problem, body);
-        section::figures(&mut report, body, &survey.bodies[index], dimension);
+        section::figures(&mut report, body, &survey.bodies[index], problem.dimension);
         section::interior(&mut report, problem, interiors[index].as_ref());
         if request.measure {
             section::parting(&mut report, problem, index);

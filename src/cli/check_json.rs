@@ -162,7 +162,11 @@ fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String
     }));
     match figures.shape_volume {
         Some(volume) => entry.insert("shape_volume".to_owned(), json!(volume)),
-        None => entry.insert("distance_of_points".to_owned(), json!(figures.spacing)),
+        None => {
+            let mean = figures.mean_spacing(problem.dimension);
+            entry.insert("mean_spacing".to_owned(), json!(mean));
+            entry.insert("distance_of_points".to_owned(), json!(figures.spacing))
+        }
     };
     if let Some([least, median, most]) = figures.neighbours {
         let range = json!({ "least": least, "median": median, "most": most });

@@ -85,6 +85,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
             }
         }
     }
+    let horizon = si(body.horizon, "m");
     if let PointSource::Lattice { spacing, .. } = body.points {
         let multiples = spacing[..problem.dimension.count()]
             .iter()
@@ -93,17 +94,15 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
         multiples.dedup();
         report.line(
             "horizon",
-            format_args!(
-                "{}, {} spacings",
-                si(body.horizon, "m"),
-                multiples.join(" × ")
-            ),
+            format_args!("{horizon}, {} spacings", multiples.join(" × ")),
         );
+    } else {
+        report.line("horizon", horizon);
     }
 }
 
 /// Append the figures of a body's points.
-pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimension: usize) {
+pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimension: Dimension) {
     report.line("points", count(figures.points));
     let of_shape = figures.shape_volume.map(|volume| {
         let share = 100.0 * figures.volume / volume;
@@ -114,6 +113,12 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
         format_args!("{:.4e} m³{}", figures.volume, of_shape.unwrap_or_default()),
     );
     if !matches!(body.points, PointSource::Lattice { .. }) {
+        let mean = figures.mean_spacing(dimension);
+        let multiple = body.horizon / mean;
+        report.line(
+            "mean spacing",
+            format_args!("{}, the horizon is {multiple:.3} of it", si(mean, "m")),
+        );
         report.line("distance of points", si(figures.spacing, "m"));
     }
     if let Some([least, median, largest]) = figures.neighbours {
@@ -124,7 +129,7 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
         );
     }
     report.line("mass", format_args!("{:.4e} kg", figures.mass));
-    report.line("centre", place(&figures.centre[..dimension]));
+    report.line("centre", place(&figures.centre[..dimension.count()]));
 }
 
 /// Format a position, m.

@@ -45,7 +45,7 @@ fn run_deck(
         world,
         deck::read_with(&arguments.deck, &arguments.with, &arguments.set),
     )?;
-    let problem = agree(world, deck.problem())?;
+    let problem = deck.problem_on(world)?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;
     let prints = world.rank() == 0 && verbosity > Verbosity::Quiet;

@@ -1,7 +1,5 @@
 //! Validation of the bodies of a deck.
 
-use std::ops::Range;
-
 use indexmap::IndexMap;
 
 use super::grammar::{self, Deck};
@@ -13,7 +11,7 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::mesh::{Format, GroupKey};
 use crate::message::format_number;
-use crate::points::Columns;
+use crate::points::{BodyPoints, Columns};
 use crate::problem;
 
 /// Largest number of bodies. Each step searches one bond list per pair of bodies, so the cost grows with the
@@ -33,18 +31,7 @@ pub fn bodies(
     materials: &IndexMap<String, problem::Material>,
     damages: &IndexMap<String, problem::Damage>,
 ) -> Result<Vec<problem::Body>> {
-    if deck.body.len() > MOST_BODIES {
-        let message = format!(
-            "[body]: the deck has {} bodies; {MOST_BODIES} at most, each a block with its own \
-             material (a union of shapes is one body)",
-            deck.body.len()
-        );
-        return Err(scope.error(deck.body[MOST_BODIES].span(), message));
-    }
-    if deck.body.is_empty() {
-        let end = scope.source.text.len();
-        return Err(scope.error(end..end, "[body]: the deck needs a body"));
-    }
+    are_possible(scope, deck)?;
     resolve_each(&deck.body, |name, table| {
         let body = table.get_ref();
         let key = format!("[body.{name}]");
@@ -85,20 +72,68 @@ pub fn bodies(
             name: name.to_owned(),
             span: table.span(),
             material_name: body.material.get_ref().clone(),
-            points: point_source(scope, deck, &key, table.span(), body, spacing, horizon)?,
+            points: point_source(scope, deck, name, table, spacing, horizon)?,
             material: materials[material].clone(),
             damage,
             horizon,
             horizon_place,
         })
     })
-    .and_then(|bodies| rows_are_taken_once(scope, bodies.into_values().collect()))
-    .map(|mut bodies| {
+    .map(|bodies| bodies.into_values().collect())
+    .and_then(|mut bodies: Vec<problem::Body>| {
+        rows_are_taken_once(scope, &BodyPoints::of(&bodies))?;
         if deck.grid.get_ref().origin.is_none() {
             anchor(&mut bodies, scope.dimension);
         }
-        bodies
+        Ok(bodies)
     })
+}
+
+/// Validate the sources of the bodies' points without the other keys of the bodies. `spacing` is that of the
+/// grid.
+///
+/// # Errors
+/// As [`bodies`] does for the sources of points, except that spacings are not compared with the horizon.
+pub fn point_sources(
+    scope: &Scope,
+    deck: &Deck,
+    spacing: Option<[f64; 3]>,
+) -> Result<Vec<problem::PointSource>> {
+    are_possible(scope, deck)?;
+    let sources = resolve_each(&deck.body, |name, table| {
+        point_source(scope, deck, name, table, spacing, f64::INFINITY)
+    })?;
+    let sources: Vec<_> = sources.into_values().collect();
+    rows_are_taken_once(scope, &of_sources(deck, &sources))?;
+    Ok(sources)
+}
+
+/// Return the names of the bodies with the sources of their points.
+pub fn of_sources<'a>(deck: &'a Deck, sources: &'a [problem::PointSource]) -> Vec<BodyPoints<'a>> {
+    let bodies = deck.body.iter().zip(sources);
+    let own = bodies.map(|((name, table), points)| BodyPoints {
+        name,
+        span: table.span(),
+        points,
+    });
+    own.collect()
+}
+
+/// Return an error if there is no body, or too many.
+fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
+    if deck.body.len() > MOST_BODIES {
+        let message = format!(
+            "[body]: the deck has {} bodies; {MOST_BODIES} at most, each a block with its own \
+             material (a union of shapes is one body)",
+            deck.body.len()
+        );
+        return Err(scope.error(deck.body[MOST_BODIES].span(), message));
+    }
+    if deck.body.is_empty() {
+        let end = scope.source.text.len();
+        return Err(scope.error(end..end, "[body]: the deck needs a body"));
+    }
+    Ok(())
 }
 
 /// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin,
@@ -178,10 +213,10 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// Return the bodies unchanged, or an error: if rows of a point file or elements of a mesh would belong to
-/// two bodies, or if two bodies name different columns of the same file.
-fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
-    let rows = |body: &problem::Body| match &body.points {
+/// Return an error if rows of a point file or elements of a mesh would belong to two bodies, or if two bodies
+/// name different columns of the same file.
+fn rows_are_taken_once(scope: &Scope, bodies: &[BodyPoints]) -> Result<()> {
+    let rows = |body: &BodyPoints| match body.points {
         problem::PointSource::File {
             path, block, span, ..
         } => {
@@ -216,13 +251,12 @@ fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<
             return Err(scope.error(span, message));
         }
     }
-    columns_agree(scope, &bodies)?;
-    Ok(bodies)
+    columns_agree(scope, bodies)
 }
 
 /// Return an error if two bodies name different columns of the same point file.
-fn columns_agree(scope: &Scope, bodies: &[problem::Body]) -> Result<()> {
-    let file = |body: &problem::Body| match &body.points {
+fn columns_agree(scope: &Scope, bodies: &[BodyPoints]) -> Result<()> {
+    let file = |body: &BodyPoints| match body.points {
         problem::PointSource::File {
             path,
             columns,
@@ -235,7 +269,7 @@ fn columns_agree(scope: &Scope, bodies: &[problem::Body]) -> Result<()> {
         let Some((path, columns, span)) = file(body) else {
             continue;
         };
-        let differs = |other: &&problem::Body| {
+        let differs = |other: &&BodyPoints| {
             file(other).is_some_and(|(other, theirs, _)| other == path && theirs != columns)
         };
         if let Some(other) = bodies[..index].iter().find(differs) {
@@ -249,20 +283,21 @@ fn columns_agree(scope: &Scope, bodies: &[problem::Body]) -> Result<()> {
     Ok(())
 }
 
+/// Validate the source of a body's points. `grid_spacing` and the horizon of the body are in m.
 fn point_source(
     scope: &Scope,
     deck: &Deck,
-    key: &str,
-    span: Range<usize>,
-    body: &grammar::Body,
+    name: &str,
+    table: &Spanned<grammar::Body>,
     grid_spacing: Option<[f64; 3]>,
     horizon: f64,
 ) -> Result<problem::PointSource> {
+    let (body, key) = (table.get_ref(), &format!("[body.{name}]"));
     let given = [
         ("shape", body.shape.as_ref().map(Spanned::span)),
         ("points", body.points.as_ref().map(Spanned::span)),
     ];
-    scope.exactly_one(span, key, &given)?;
+    scope.exactly_one(table.span(), key, &given)?;
     match (&body.shape, &body.points) {
         (Some(shape), _) => {
             let grid = deck.grid.get_ref();

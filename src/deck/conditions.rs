@@ -9,7 +9,7 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{Expression, POSITION, POSITION_AND_TIME};
 use crate::points::value_file;
-use crate::problem::{self, Action};
+use crate::problem::{self, Action, Depth, Selector};
 
 /// Validate the initial values.
 ///
@@ -94,17 +94,17 @@ fn initial_file(
     })
 }
 
-/// Validate the loads, supports and temperatures. `spacing` (m) is the default depth of a traction
-/// or pressure.
+/// Validate the loads, supports and temperatures.
 ///
 /// # Errors
 /// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth`
-/// or `normal` that is missing or has no effect.
+/// or `normal` that is missing or has no effect. Whether the points of a set by position need a
+/// `depth` is only known once there are points.
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,
     sets: &[problem::Set],
-    spacing: Option<f64>,
+    bodies: &[problem::Body],
 ) -> Result<Vec<problem::Condition>> {
     deck.condition
         .iter()
@@ -125,16 +125,25 @@ pub fn conditions(
                 ),
             ];
             let (quantity, place) = &given[scope.exactly_one(table.span(), &key, &given)?];
-            Ok(problem::Condition {
+            let resolved = problem::Condition {
                 name: name.clone(),
                 set: find_set(scope, &condition.set, sets, &format!("{key} set"))?,
                 span: condition.set.span(),
                 quantity,
                 place: place.clone().unwrap_or(table.span()),
-                default_depth: spacing
-                    .filter(|_| on_a_layer(condition) && condition.depth.is_none()),
-                action: action(scope, &key, condition, spacing)?,
-            })
+                depth: depth(scope, &key, condition)?,
+                action: action(scope, &key, condition)?,
+            };
+            let (set, dimension) = (&sets[resolved.set], scope.dimension);
+            let bodies = set.possible_bodies(bodies);
+            let needs_depth = |body: &&problem::Body| resolved.divisor(body, dimension).is_none();
+            let has_all_bodies = matches!(set.selector, Selector::All | Selector::Body(_));
+            match bodies.iter().find(needs_depth) {
+                Some(body) if has_all_bodies || bodies.iter().all(|body| needs_depth(&body)) => {
+                    Err(scope.source.locate(resolved.no_depth(body)))
+                }
+                _ => Ok(resolved),
+            }
         })
         .collect()
 }
@@ -169,31 +178,26 @@ fn on_a_layer(condition: &grammar::Condition) -> bool {
     condition.traction.is_some() || condition.pressure.is_some()
 }
 
-fn action(
-    scope: &Scope,
-    key: &str,
-    condition: &grammar::Condition,
-    spacing: Option<f64>,
-) -> Result<Action> {
-    if let (Some(depth), false) = (&condition.depth, on_a_layer(condition)) {
-        let message = format!("{key} depth: only a traction or a pressure has a depth");
-        return Err(scope.error(depth.span(), message));
+/// Return the thickness of the layer on which a condition acts; `None` if it acts on no layer.
+fn depth(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Option<Depth>> {
+    match &condition.depth {
+        Some(depth) if on_a_layer(condition) => {
+            let depth = scope.positive(depth, &format!("{key} depth"))?;
+            Ok(Some(Depth::Given(depth)))
+        }
+        Some(depth) => {
+            let message = format!("{key} depth: only a traction or a pressure has a depth");
+            Err(scope.error(depth.span(), message))
+        }
+        None => Ok(on_a_layer(condition).then_some(Depth::Spacing)),
     }
+}
+
+fn action(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Action> {
     if let (Some(normal), None) = (&condition.normal, &condition.pressure) {
         let message = format!("{key} normal: only a pressure has a normal");
         return Err(scope.error(normal.span(), message));
     }
-    let depth = |place: std::ops::Range<usize>| match (&condition.depth, spacing) {
-        (Some(depth), _) => scope.positive(depth, &format!("{key} depth")),
-        (None, Some(spacing)) => Ok(spacing),
-        (None, None) => {
-            let message = format!(
-                "{key}: acts on a layer, and these points have no single spacing; give the thickness of the layer as \
-                 `depth`"
-            );
-            Err(scope.error(place, message))
-        }
-    };
     let expressions = |vector, name: &str| -> Result<Vec<Expression>> {
         scope.expressions(vector, &format!("{key} {name}"), &POSITION_AND_TIME)
     };
@@ -222,10 +226,9 @@ fn action(
         return Ok(Action::Temperature(value));
     }
     if let Some(vector) = &condition.traction {
-        let factor = 1.0 / depth(vector.span())?;
         return Ok(Action::BodyForce(
             expressions(vector, "traction")?,
-            vec![factor; scope.dimension],
+            vec![1.0; scope.dimension],
         ));
     }
     let pressure = condition.pressure.as_ref().expect("one quantity is given");
@@ -234,9 +237,8 @@ fn action(
         return Err(scope.error(pressure.span(), message));
     };
     let direction = scope.direction(normal, &format!("{key} normal"))?;
-    let depth = depth(pressure.span())?;
     let value = scope.expression(pressure, &format!("{key} pressure"), &POSITION_AND_TIME)?;
-    let factors = direction[..scope.dimension].iter().map(|n| -n / depth);
+    let factors = direction[..scope.dimension].iter().map(|n| -n);
     Ok(Action::BodyForce(
         vec![value; scope.dimension],
         factors.collect(),

@@ -1,16 +1,16 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Output, Relaxation,
-    Rule, Static, THERMAL_EXPANSION, Table, VolumeCorrection, common_keys,
+    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Material, Output, Relaxation, Rule,
+    Static, THERMAL_EXPANSION, Table, VolumeCorrection, common_keys,
 };
-use super::number::{Edges, Number, Written, default_number};
+use super::number::{Number, Written, default_number};
 use super::resolve::Scope;
 use crate::deck::spanned::Spanned;
 use crate::dimension::{Constraint, Dimension};
 use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
-use crate::problem::{self, CheckpointRule, HorizonRule, Interval, Problem};
+use crate::problem::{self, Body, CheckpointRule, Condition, HorizonRule, Interval, Problem};
 
 /// Return the deck as TOML with every default written out.
 ///
@@ -104,10 +104,13 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     for material in deck.material.values_mut() {
         fill_material(material.get_mut(), problem.dimension);
     }
-    for condition in deck.condition.values_mut().map(|table| table.get_mut()) {
-        if condition.traction.is_some() || condition.pressure.is_some() {
-            condition.depth = condition.depth.take().or_else(|| edge(grid));
-        }
+    let conditions = deck.condition.values_mut().zip(&problem.conditions);
+    for (table, condition) in conditions {
+        table.get_mut().depth = table
+            .get_mut()
+            .depth
+            .take()
+            .or_else(|| depth(problem, condition));
     }
     let time = deck.time.get_mut();
     // Newton's method uses the load steps and the tolerance of the relaxation if `[time.static]` lacks these
@@ -200,13 +203,16 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the grid's spacing if it is one number for all directions; `None` if it is a list or not
-/// given.
-fn edge(grid: &Grid) -> Option<Number> {
-    let spacing = grid.spacing.as_ref()?;
-    match spacing.get_ref() {
-        Edges::Same(edge) => Some(Spanned::new(spacing.span(), edge.clone())),
-        Edges::Each(_) => None,
+/// Return the depth of a traction or pressure, if it is the same for all bodies that may have points
+/// in the set. Otherwise, each body has the depth of its spacing, which no number expresses.
+fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
+    condition.depth?;
+    let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);
+    let dimension = problem.dimension.count();
+    let is_known = |body: &Body| condition.divisor(body, dimension).is_some();
+    match condition.divisors(bodies, dimension)[..] {
+        [depth] if bodies.iter().all(is_known) => Some(default_number(depth)),
+        _ => None,
     }
 }
 

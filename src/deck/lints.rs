@@ -11,7 +11,7 @@ use super::resolve::Scope;
 use crate::error::{Error, Result, Warning};
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::points::file;
+use crate::points::{BodyPoints, file};
 use crate::problem::{PointSource, Problem, Selector, changes_density_scale};
 
 /// Return a warning for each probable mistake. `scope` must be the scope of the validation, which records
@@ -55,15 +55,17 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
 /// Return a warning for each point file with unread columns.
 fn ignored_columns(problem: &Problem) -> Vec<Warning> {
     let mut warnings = Vec::new();
+    let bodies = BodyPoints::of(&problem.bodies);
     for (index, body) in problem.bodies.iter().enumerate() {
         let PointSource::File { path, span, .. } = &body.points else {
             continue;
         };
-        if file::users(problem, path)[0].0 != index {
+        if file::users(&bodies, path)[0].0 != index {
             continue;
         }
         // The error of an unreadable file is reported when its points are read.
-        let Ok(Ok(layout)) = file::layout_of(problem, path) else {
+        let layout = file::layout_of(&bodies, problem.dimension.count(), path);
+        let Ok(Ok(layout)) = layout else {
             continue;
         };
         let key = format!("[body.{}] points file", body.name);

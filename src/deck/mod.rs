@@ -10,6 +10,7 @@ mod explain;
 pub mod grammar;
 mod group_name;
 mod history;
+mod horizon;
 mod interface;
 mod lints;
 mod materials;
@@ -33,11 +34,13 @@ mod toml_error;
 mod validate;
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 pub use difference::{differences, history_differences};
 pub use schema::schema;
 pub use source::Source;
 
+use crate::comm::{Communicator, agree, threads, total};
 use crate::error::{Error, Result, Warning};
 use crate::problem::Problem;
 use resolve::Scope;
@@ -49,6 +52,9 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Deck {
     source: Source,
     grammar: grammar::Deck,
+    /// The grammar with numbers in place of horizons that contain the mean spacing; `None` inside without such
+    /// horizons. Determined once, because meshes and point files may have to be read.
+    with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
 /// Read a deck. `set` has pairs of a name and a value or expression; the name is a parameter, or a key with
@@ -97,7 +103,11 @@ impl Deck {
     pub fn new(source: Source) -> Result<Self> {
         let grammar = toml::from_str(&source.text)
             .map_err(|error| toml_error::toml_error(&source, &error))?;
-        Ok(Self { source, grammar })
+        Ok(Self {
+            source,
+            grammar,
+            with_horizons: OnceLock::new(),
+        })
     }
 
     /// Return the path and the text of the deck.
@@ -116,28 +126,58 @@ impl Deck {
         self.source.locate_warning(warning)
     }
 
-    /// Validate the deck, and return its problem with the warnings about the deck.
+    /// Validate the deck in a single process, and return its problem with the warnings about the deck.
+    ///
+    /// If a horizon contains the mean spacing of points, this process reads all of their files;
+    /// [`Self::problem_on`] shares this work between ranks.
     ///
     /// # Errors
     /// If a value is invalid; the message is as in [`read`].
     pub fn problem(&self) -> Result<Problem> {
-        self.problem_in(&Scope::of(&self.source, &self.grammar)?)
+        self.problem_on(&threads::alone())
     }
 
-    fn problem_in(&self, scope: &Scope) -> Result<Problem> {
-        let mut problem = validate::validate(scope, &self.grammar)?;
+    /// Same as [`Self::problem`], on several ranks with the same deck. Collective.
+    ///
+    /// # Errors
+    /// If a value is invalid; the error is the same on all ranks.
+    pub fn problem_on(&self, comm: &dyn Communicator) -> Result<Problem> {
+        let mut scope = agree(comm, Scope::of(&self.source, &self.grammar))?;
+        let grammar = self.with_horizons(&mut scope, comm)?;
+        agree(comm, self.problem_in(&scope, grammar))
+    }
+
+    fn problem_in(&self, scope: &Scope, grammar: &grammar::Deck) -> Result<Problem> {
+        let mut problem = validate::validate(scope, grammar)?;
+        // Parameters in horizons count as used.
         problem.warnings = lints::lints(scope, &self.grammar, &problem)?;
         Ok(problem)
     }
 
+    /// Return the grammar with numbers in place of horizons that contain the mean spacing. Collective.
+    fn with_horizons(&self, scope: &mut Scope, comm: &dyn Communicator) -> Result<&grammar::Deck> {
+        let known = self.with_horizons.get();
+        // Ranks may be threads that share this deck, so some may find the result of others.
+        let known_on = total(comm, u64::from(known.is_some()));
+        let found = match known {
+            Some(found) if known_on == comm.size() as u64 => found,
+            _ => {
+                let found = horizon::resolve(scope, &self.grammar, comm)?;
+                self.with_horizons.get_or_init(|| found)
+            }
+        };
+        Ok(found.as_ref().unwrap_or(&self.grammar))
+    }
+
     /// Return the deck as TOML with every default written out. Rows of tables replace the paths of their
-    /// files.
+    /// files, and numbers replace horizons that contain the mean spacing of points.
     ///
     /// # Errors
     /// If the deck is invalid, as in [`Self::problem`], or cannot be serialized.
     pub fn explain(&self) -> Result<String> {
-        let scope = Scope::of(&self.source, &self.grammar)?;
-        explain::explain(&scope, &self.grammar, &self.problem_in(&scope)?)
+        let mut scope = Scope::of(&self.source, &self.grammar)?;
+        let grammar = self.with_horizons(&mut scope, &threads::alone())?;
+        explain::explain(&scope, grammar, &self.problem_in(&scope, grammar)?)
     }
 }
 

@@ -58,6 +58,19 @@ impl<'a> Scope<'a> {
         Ok(scope)
     }
 
+    /// Call a function with a scope that has a further parameter.
+    pub fn with_parameter<T>(
+        &mut self,
+        name: &str,
+        value: f64,
+        evaluate: impl FnOnce(&Self) -> T,
+    ) -> T {
+        self.parameters.insert(name.to_owned(), value);
+        let result = evaluate(self);
+        self.parameters.shift_remove(name);
+        result
+    }
+
     /// Return an error at a byte range of the deck.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
         self.source.error(span, message)

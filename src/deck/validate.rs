@@ -1,6 +1,6 @@
 //! Validation of a deck: convert the grammar to the problem, check every value and resolve every name.
 
-use super::grammar::{ConstraintName, Deck, DimensionName, Family, Grid, VolumeCorrection};
+use super::grammar::{ConstraintName, Deck, DimensionName, Family, VolumeCorrection};
 use super::number::{Edges, Number};
 use super::resolve::{Scope, resolve_each};
 use super::{
@@ -41,8 +41,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
     let time = time::time(scope, deck)?;
     let stages = time::stages(scope, deck, &time)?;
-    let spacing = single(&deck.grid, spacing);
-    let conditions = conditions::conditions(scope, deck, &sets, spacing)?;
+    let conditions = conditions::conditions(scope, deck, &sets, &bodies)?;
     conditions::temperatures_act(scope, &conditions, bodies.iter().map(|body| &body.material))?;
     let problem = Problem {
         warnings: Vec::new(),
@@ -86,7 +85,11 @@ fn places(deck: &Deck) -> problem::Places {
     }
 }
 
-fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
+/// Return the dimension of the problem, with thickness or cross-section.
+///
+/// # Errors
+/// On a key that belongs to another dimension, and on an invalid number.
+pub fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
     let name = *deck.dimension.get_ref();
     let plane = matches!(
         name,
@@ -148,14 +151,6 @@ pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -
     Ok(spacing)
 }
 
-/// Return the spacing of the grid, m, if one number applies to all directions.
-fn single(grid: &Spanned<Grid>, spacing: Option<[f64; 3]>) -> Option<f64> {
-    match grid.get_ref().spacing.as_ref()?.get_ref() {
-        Edges::Same(_) => Some(spacing?[0]),
-        Edges::Each(_) => None,
-    }
-}
-
 fn volume_correction(
     scope: &Scope,
     deck: &Deck,
@@ -177,11 +172,10 @@ fn volume_correction(
         problem::PointSource::Lattice { .. } if is_jittered => {
             Some("has points that `jitter` moves")
         }
-        problem::PointSource::Lattice { spacing, .. } => {
-            let edges = &spacing[..scope.dimension];
-            let alike = edges.iter().all(|edge| *edge == edges[0]);
-            (!alike).then_some("has cells with edges of different lengths")
-        }
+        problem::PointSource::Lattice { .. } => body
+            .single_spacing(scope.dimension)
+            .is_none()
+            .then_some("has cells with edges of different lengths"),
     };
     let reason = bodies
         .iter()

@@ -10,18 +10,17 @@ use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result, excerpt};
 use crate::problem::{PointSource, Problem};
 
-use super::Point;
 use super::columns::{Columns, Layout, layout};
 use super::rows::{Part, for_each_row};
+use super::{BodyPoints, Point};
 
 /// The bodies that use a file: index of the body, and the block number that the body selects. Without a block
 /// number, a body selects the rows that no other body selects.
-pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
-    problem
-        .bodies
+pub fn users(bodies: &[BodyPoints], file: &Path) -> Vec<(usize, Option<u32>)> {
+    bodies
         .iter()
         .enumerate()
-        .filter_map(|(index, body)| match &body.points {
+        .filter_map(|(index, body)| match body.points {
             PointSource::File { path, block, .. } if path == file => Some((index, *block)),
             _ => None,
         })
@@ -37,47 +36,57 @@ const SAMPLED: u64 = 256;
 const FARTHEST: f64 = 1e30;
 
 /// The columns that the deck names for a file. They are equal for all bodies that use the file.
-fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
-    match &problem.bodies[user].points {
+fn columns<'a>(bodies: &[BodyPoints<'a>], user: usize) -> Option<&'a Columns> {
+    match bodies[user].points {
         PointSource::File { columns, .. } => columns.as_ref(),
         _ => None,
     }
 }
 
-/// Find the layout of a file.
+/// Find the layout of a file, for points with this number of coordinates.
 ///
 /// # Errors
 /// Same as for [`layout`].
-pub fn layout_of(problem: &Problem, path: &Path) -> std::io::Result<Result<Layout>> {
-    let given = users(problem, path)
+pub fn layout_of(
+    bodies: &[BodyPoints],
+    dimension: usize,
+    path: &Path,
+) -> std::io::Result<Result<Layout>> {
+    let given = users(bodies, path)
         .first()
-        .and_then(|(user, _)| columns(problem, *user));
-    let layout = layout(path, given, problem.dimension.count())?;
+        .and_then(|(user, _)| columns(bodies, *user));
+    let layout = layout(path, given, dimension)?;
     Ok(layout.map_err(|error| {
         let (line, message) = (error.line, error.message);
         Error::input(format!("{}:{line}: {message}", path.display()))
     }))
 }
 
-/// Read this rank's part of a file's points, for all bodies that use the file. Collective.
+/// Read this rank's part of a file's points, for all bodies that use the file, and pass each point to `take`.
+/// Collective.
 ///
 /// # Errors
 /// If the file cannot be read or a row is invalid; the message gives file and line.
-pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Vec<Point>> {
-    let users = users(problem, path);
+pub(super) fn for_each_point(
+    bodies: &[BodyPoints],
+    dimension: usize,
+    path: &Path,
+    comm: &dyn Communicator,
+    take: impl FnMut(Point),
+) -> Result<()> {
+    let users = users(bodies, path);
     let unreadable = |error| {
-        let PointSource::File { span, .. } = &problem.bodies[users[0].0].points else {
+        let PointSource::File { span, .. } = bodies[users[0].0].points else {
             unreachable!("users are bodies with a file");
         };
         let message = format!("cannot read the point file {}: {error}", path.display());
         Error::input(message).at(span)
     };
-    let layout = layout_of(problem, path).map_err(unreadable).flatten();
-    let layout = agree(comm, layout)?;
-    let share = read_share(path, &layout, &users, [comm.rank(), comm.size()]);
-    let (points, part) = agree(comm, share.map_err(unreadable))?;
-    part.check(path, comm)?;
-    Ok(points)
+    let layout = layout_of(bodies, dimension, path);
+    let layout = agree(comm, layout.map_err(unreadable).flatten())?;
+    let part = read_part(path, &layout, &users, [comm.rank(), comm.size()], take);
+    let part = agree(comm, part.map_err(unreadable))?;
+    part.check(path, comm)
 }
 
 /// Sample the points of a file. Return the sampled points, and the number of points that each sample
@@ -86,37 +95,38 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
 /// From a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot be
 /// read or its heading is invalid.
 pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
-    let users = users(problem, path);
-    let layout = layout_of(problem, path).ok()?.ok()?;
+    let bodies = BodyPoints::of(&problem.bodies);
+    let users = users(&bodies, path);
+    let dimension = problem.dimension.count();
+    let layout = layout_of(&bodies, dimension, path).ok()?.ok()?;
+    let mut points = Vec::new();
+    let mut read = |part| read_part(path, &layout, &users, part, |point| points.push(point)).ok();
     let length = std::fs::metadata(path).ok()?.len();
     if length <= SAMPLED * PIECE {
-        let (points, _) = read_share(path, &layout, &users, [0, 1]).ok()?;
+        read([0, 1])?;
         return Some((points, 1.0));
     }
     let pieces = length.div_ceil(PIECE);
-    let mut points = Vec::new();
     for k in 0..SAMPLED {
         let piece = (u128::from(pieces) * u128::from(k) / u128::from(SAMPLED)) as usize;
-        let (piece, _) = read_share(path, &layout, &users, [piece, pieces as usize]).ok()?;
-        points.extend(piece);
+        read([piece, pieces as usize])?;
     }
     Some((points, pieces as f64 / SAMPLED as f64))
 }
 
-/// Split the bytes of a file into equal parts, and read the points of one part. `part_of_parts` is the index
-/// of this part and the number of parts.
-fn read_share(
+/// Split the bytes of a file into equal parts, and pass the points of one part to `take`. `part_of_parts` is
+/// the index of this part and the number of parts.
+fn read_part(
     path: &Path,
     layout: &Layout,
     users: &[(usize, Option<u32>)],
     part_of_parts: [usize; 2],
-) -> std::io::Result<(Vec<Point>, Part)> {
-    let mut points = Vec::new();
-    let part = for_each_row(path, layout.heading, part_of_parts, |entries| {
-        points.push(point(&layout.columns, users, entries)?);
+    mut take: impl FnMut(Point),
+) -> std::io::Result<Part> {
+    for_each_row(path, layout.heading, part_of_parts, |entries| {
+        take(point(&layout.columns, users, entries)?);
         Ok(())
-    })?;
-    Ok((points, part))
+    })
 }
 
 /// Parse the point of a row.
@@ -213,7 +223,12 @@ mod tests {
             span: 0..0,
         };
         let on = |ranks: usize| {
-            let pieces = threads::run(ranks, |comm| piece(&problem, &path, comm));
+            let bodies = BodyPoints::of(&problem.bodies);
+            let pieces = threads::run(ranks, |comm| {
+                let mut piece = Vec::new();
+                for_each_point(&bodies, 2, &path, comm, |point| piece.push(point))?;
+                Ok(piece)
+            });
             let pieces: Result<Vec<Vec<Point>>> = pieces.into_iter().collect();
             let shorten = |error: Error| {
                 let folder = folder.display().to_string();

@@ -12,7 +12,7 @@ use crate::error::{Error, Result, excerpt};
 use crate::mesh::{self, Format, Group, GroupKey, Members, Mesh, Runs};
 use crate::problem::{PointSource, Problem, Selector};
 
-use super::Point;
+use super::{BodyPoints, Point};
 
 /// Value for an element that belongs to no body.
 const NO_BODY: u16 = u16::MAX;
@@ -31,8 +31,8 @@ const MOST_CORNERS: usize = 8;
 const PLANE_SLACK: f64 = 1e-6;
 
 /// A body whose points come from a mesh.
-struct User<'a> {
-    body: usize,
+pub(super) struct User<'a> {
+    pub body: usize,
     block: Option<&'a GroupKey>,
     scale: f64,
     block_span: &'a Range<usize>,
@@ -52,14 +52,14 @@ pub struct Found {
 ///
 /// # Panics
 /// If no body uses the mesh.
-pub fn first_user(problem: &Problem, path: &Path) -> usize {
-    let users = users(problem, path);
+pub fn first_user(bodies: &[BodyPoints], path: &Path) -> usize {
+    let users = users(bodies, path);
     users.first().expect("a body names the mesh").body
 }
 
-fn users<'a>(problem: &'a Problem, file: &Path) -> Vec<User<'a>> {
-    let bodies = problem.bodies.iter().enumerate();
-    let of_file = bodies.filter_map(|(body, description)| match &description.points {
+pub(super) fn users<'a>(bodies: &[BodyPoints<'a>], file: &Path) -> Vec<User<'a>> {
+    let bodies = bodies.iter().enumerate();
+    let of_file = bodies.filter_map(|(body, description)| match description.points {
         PointSource::Mesh {
             path,
             block,
@@ -141,24 +141,12 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
 /// element is invalid, belongs to two bodies or coincides with another. Also if a body's block is no group
 /// with elements of the problem's dimension, or the name of a block or set is ambiguous.
 pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
-    let users = users(problem, path);
-    let Some(format) = Format::of(path) else {
-        let (name, endings) = (path.display(), Format::endings());
-        return Err(Error::input(format!(
-            "{name}: the name of a mesh must end with one of {endings}"
-        )));
-    };
-    let bytes = mesh::load(path).map_err(|error| {
-        let PointSource::Mesh { span, .. } = &problem.bodies[users[0].body].points else {
-            unreachable!("users are bodies with a mesh");
-        };
-        let message = format!("cannot read the mesh {}: {error}", path.display());
-        Error::input(message).at(span)
-    })?;
-    let mesh = mesh::parse(format, path, &bytes)?;
-    drop(bytes);
-    let bodies = bodies_of_elements(problem, &mesh, &users)?;
-    let (points, point_of) = points(problem, &mesh, &users, &bodies)?;
+    let bodies = BodyPoints::of(&problem.bodies);
+    let MeshPoints {
+        mesh,
+        points,
+        point_of,
+    } = read_points(&bodies, problem.dimension, path)?;
     are_apart(&mesh, &points, &point_of)?;
     let dimension = problem.dimension.count();
     let mut marks = vec![false; mesh.nodes.len()];
@@ -187,9 +175,56 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     })
 }
 
+/// A mesh and the points of its elements.
+pub(super) struct MeshPoints {
+    mesh: Mesh,
+    /// The points, with ids from 0.
+    pub points: Vec<Point>,
+    /// The point of each element, or [`NO_POINT`].
+    point_of: Vec<u32>,
+}
+
+/// Read a mesh and generate its points, on one rank. The sets of the deck are not needed.
+///
+/// # Errors
+/// Same as for [`read`], except that coinciding elements are not searched.
+pub(super) fn read_points(
+    bodies: &[BodyPoints],
+    dimension: Dimension,
+    path: &Path,
+) -> Result<MeshPoints> {
+    let users = users(bodies, path);
+    let Some(format) = Format::of(path) else {
+        let (name, endings) = (path.display(), Format::endings());
+        return Err(Error::input(format!(
+            "{name}: the name of a mesh must end with one of {endings}"
+        )));
+    };
+    let bytes = mesh::load(path).map_err(|error| {
+        let PointSource::Mesh { span, .. } = bodies[users[0].body].points else {
+            unreachable!("users are bodies with a mesh");
+        };
+        let message = format!("cannot read the mesh {}: {error}", path.display());
+        Error::input(message).at(span)
+    })?;
+    let mesh = mesh::parse(format, path, &bytes)?;
+    drop(bytes);
+    let of_elements = bodies_of_elements(bodies, dimension.count(), &mesh, &users)?;
+    let (points, point_of) = points(dimension, &mesh, &users, &of_elements)?;
+    Ok(MeshPoints {
+        mesh,
+        points,
+        point_of,
+    })
+}
+
 /// The index of each element's body, or [`NO_BODY`].
-fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<Vec<u16>> {
-    let dimension = problem.dimension.count();
+fn bodies_of_elements(
+    all: &[BodyPoints],
+    dimension: usize,
+    mesh: &Mesh,
+    users: &[User],
+) -> Result<Vec<u16>> {
     let is_solid = |element: usize| mesh.is_solid(element, dimension);
     let mut bodies = vec![NO_BODY; mesh.elements.len()];
     for user in users {
@@ -201,7 +236,7 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
             Members::Nodes(_) => false,
         };
         let ambiguous = |message: String| {
-            let body = &problem.bodies[user.body].name;
+            let body = all[user.body].name;
             let message = format!("[body.{body}] points block: {message}");
             Error::input(message).at(user.block_span)
         };
@@ -211,7 +246,7 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
             None => mesh.find(block, has_solids).map_err(ambiguous)?,
         };
         let Some(group) = group else {
-            let body = &problem.bodies[user.body].name;
+            let body = all[user.body].name;
             let message = if has_single_nodes(mesh, block) {
                 format!("[body.{body}] points block: {block} has {NO_VOLUME}")
             } else {
@@ -234,7 +269,7 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
                 let [a, b] = [usize::from(bodies[element]), user.body];
                 let message = format!(
                     "belongs to [body.{}] and to [body.{}]; give them blocks without common elements",
-                    problem.bodies[a].name, problem.bodies[b].name
+                    all[a].name, all[b].name
                 );
                 return Err(mesh.elements.fault(element, message));
             }
@@ -248,7 +283,7 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
             }
         }
         if let Some(what) = without_volume(mesh, &bodies, rest.body as u16) {
-            let body = &problem.bodies[rest.body].name;
+            let body = all[rest.body].name;
             let message = format!("[body.{body}] points mesh: {what} has {NO_VOLUME}");
             return Err(Error::input(message).at(rest.block_span));
         }
@@ -298,13 +333,14 @@ fn has_single_nodes(mesh: &Mesh, block: &GroupKey) -> bool {
 /// Generate the points of the elements that belong to bodies. Also return the point of each element, or
 /// [`NO_POINT`].
 fn points(
-    problem: &Problem,
+    dimension: Dimension,
     mesh: &Mesh,
     users: &[User],
     bodies: &[u16],
 ) -> Result<(Vec<Point>, Vec<u32>)> {
-    let dimension = problem.dimension.count();
-    let mut scales = vec![1.0; problem.bodies.len()];
+    let (kind, dimension) = (dimension, dimension.count());
+    let last = users.iter().map(|user| user.body).max().unwrap_or(0);
+    let mut scales = vec![1.0; last + 1];
     for user in users {
         scales[user.body] = user.scale;
     }
@@ -328,7 +364,7 @@ fn points(
         }
         let (volume, centroid) = match mesh.volume(element) {
             Some(volume) => (volume * scale.powi(3), nodes[0]),
-            None => solid(mesh, element, &nodes, problem.dimension)?,
+            None => solid(mesh, element, &nodes, kind)?,
         };
         if !(volume > 0.0 && volume.is_finite()) {
             let message = if volume < 0.0 {

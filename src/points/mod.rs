@@ -8,6 +8,7 @@ pub mod crack;
 pub(crate) mod file;
 pub mod id_file;
 pub mod lattice;
+pub mod mean_spacing;
 pub(crate) mod mesh;
 mod polygon;
 mod region;
@@ -20,13 +21,15 @@ pub use columns::Columns;
 pub use lattice::LatticeBody;
 pub use polygon::Polygon;
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::mesh::{Runs, suggestion};
-use crate::problem::{IdFile, Jitter, PointSource, Problem, Selector};
+use crate::problem::{Body, IdFile, Jitter, PointSource, Problem, Selector};
 use crate::scatter::{Scattered, uniform};
 
 /// Maximum number of points per rank.
@@ -62,6 +65,29 @@ impl Point {
     }
 }
 
+/// Name of a body and source of its points.
+#[derive(Debug, Clone)]
+pub struct BodyPoints<'a> {
+    /// Name in the deck.
+    pub name: &'a str,
+    /// Span in the deck.
+    pub span: Range<usize>,
+    /// Source of the points.
+    pub points: &'a PointSource,
+}
+
+impl<'a> BodyPoints<'a> {
+    /// Return names and sources of some bodies.
+    pub fn of(bodies: &'a [Body]) -> Vec<Self> {
+        let own = |body: &'a Body| Self {
+            name: &body.name,
+            span: body.span.clone(),
+            points: &body.points,
+        };
+        bodies.iter().map(own).collect()
+    }
+}
+
 /// Squared distance of two positions, m².
 pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     let difference = Vector3::from(b) - Vector3::from(a);
@@ -77,6 +103,7 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// a lattice are too far from the origin to be numbered, or a rank has too many points. The error is the same
 /// on all ranks.
 pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
+    let bodies = BodyPoints::of(&problem.bodies);
     let mut points = Vec::new();
     let mut total = 0;
     let mut meshes = Vec::new();
@@ -84,13 +111,16 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
         let mut piece = match &body.points {
             PointSource::Lattice { .. } => lattice::piece(problem, index, comm)?,
             PointSource::File { path, .. } => {
-                if file::users(problem, path)[0].0 != index {
+                if file::users(&bodies, path)[0].0 != index {
                     continue;
                 }
-                file::piece(problem, path, comm)?
+                let mut piece = Vec::new();
+                let dimension = problem.dimension.count();
+                file::for_each_point(&bodies, dimension, path, comm, |point| piece.push(point))?;
+                piece
             }
             PointSource::Mesh { path, .. } => {
-                if mesh::first_user(problem, path) != index {
+                if mesh::first_user(&bodies, path) != index {
                     continue;
                 }
                 let mut found = mesh::piece(problem, path, comm)?;
@@ -116,7 +146,12 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
         }
         total += all;
     }
-    check_no_empty_body(problem, comm, &points)?;
+    let mut counts = vec![0; bodies.len()];
+    for point in &points {
+        counts[point.block as usize] += 1;
+    }
+    comm.sum(&mut counts);
+    check_no_empty_body(&bodies, problem.dimension.count(), &counts)?;
     check_set_ids(problem, total)?;
     let resolved = resolve_mesh_sets(problem, &meshes);
     agree(comm, resolved)?;
@@ -221,16 +256,12 @@ fn wrong_number(file: &IdFile, ids: &[u64], id: u64, total: u64) -> String {
     )
 }
 
-fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
-    let mut counts = vec![0; problem.bodies.len()];
-    for point in points {
-        counts[point.block as usize] += 1;
-    }
-    comm.sum(&mut counts);
+/// Return an error if a body has no points. `counts` has the number of points of each body, over all ranks.
+fn check_no_empty_body(bodies: &[BodyPoints], dimension: usize, counts: &[u64]) -> Result<()> {
     match counts.iter().position(|count| *count == 0) {
         None => Ok(()),
         Some(empty) => {
-            let body = &problem.bodies[empty];
+            let body = &bodies[empty];
             let file;
             let why = match &body.points {
                 PointSource::Lattice { .. } => {
@@ -241,7 +272,7 @@ fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Poi
                     columns: None,
                     ..
                 } if matches!(columns::heading(path), Ok(None)) => {
-                    let default = Columns::default_order(problem.dimension.count());
+                    let default = Columns::default_order(dimension);
                     file = format!(
                         "no row of its file belongs to it; the file has no header, so its columns are `{}`; \
                          use `points.columns` to name other columns",

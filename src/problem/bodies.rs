@@ -49,6 +49,19 @@ impl Body {
         self.quadrature() == Quadrature::Gauss
     }
 
+    /// Return the edge of the lattice cells, m; `None` for points from a file or a mesh, and for cells with
+    /// edges of different lengths.
+    pub fn single_spacing(&self, dimension: usize) -> Option<f64> {
+        match &self.points {
+            PointSource::Lattice { spacing, .. } => {
+                let edges = &spacing[..dimension];
+                let are_equal = edges.iter().all(|edge| *edge == edges[0]);
+                are_equal.then_some(edges[0])
+            }
+            PointSource::File { .. } | PointSource::Mesh { .. } => None,
+        }
+    }
+
     /// Return the positions of the points in a cell. Points from a file or a mesh count as centres.
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
@@ -359,6 +372,16 @@ pub struct Set {
     pub span: Range<usize>,
     /// Rule that selects the points.
     pub selector: Selector,
+}
+
+impl Set {
+    /// Return the bodies, among all bodies, that may have points in the set.
+    pub fn possible_bodies<'b>(&self, bodies: &'b [Body]) -> &'b [Body] {
+        match self.selector {
+            Selector::Body(index) => &bodies[index..=index],
+            _ => bodies,
+        }
+    }
 }
 
 /// Rule that selects the points of a set.

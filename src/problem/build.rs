@@ -141,7 +141,7 @@ impl Problem {
             span: 0..0,
             quantity: action.quantity(),
             place: 0..0,
-            default_depth: None,
+            depth: None,
             action,
         });
     }

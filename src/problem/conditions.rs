@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use super::Body;
+use crate::error::Error;
 use crate::expression::Expression;
 use crate::points::value_file::ValueColumns;
 
@@ -55,11 +57,55 @@ pub struct Condition {
     pub quantity: &'static str,
     /// Span of this key in the deck.
     pub place: Range<usize>,
-    /// Default thickness (m) of the layer that carries a traction or pressure: the spacing. `None` if the
-    /// deck gives the thickness, and for other quantities.
-    pub default_depth: Option<f64>,
+    /// Thickness of the layer that carries a traction or pressure; `None` for other quantities.
+    pub depth: Option<Depth>,
     /// The prescribed quantity and its values.
     pub action: Action,
+}
+
+/// Thickness of the layer of points that carries a traction or pressure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Depth {
+    /// The thickness that the deck gives, m.
+    Given(f64),
+    /// The spacing of the body to which a point belongs.
+    Spacing,
+}
+
+impl Condition {
+    /// Return the number by which the load on the points of a body is divided: the thickness of the layer
+    /// (m), or 1 without a layer. `None` if the thickness is the spacing and the body has no single spacing.
+    pub fn divisor(&self, body: &Body, dimension: usize) -> Option<f64> {
+        match self.depth {
+            None => Some(1.0),
+            Some(Depth::Given(depth)) => Some(depth),
+            Some(Depth::Spacing) => body.single_spacing(dimension),
+        }
+    }
+
+    /// Return the different values of [`Self::divisor`] on some bodies.
+    pub fn divisors<'b>(
+        &self,
+        bodies: impl IntoIterator<Item = &'b Body>,
+        dimension: usize,
+    ) -> Vec<f64> {
+        let mut divisors = Vec::new();
+        for body in bodies {
+            let divisor = self.divisor(body, dimension);
+            divisors.extend(divisor.filter(|divisor| !divisors.contains(divisor)));
+        }
+        divisors
+    }
+
+    /// Return the error about a body without a single spacing, which cannot be the thickness of a layer.
+    pub fn no_depth(&self, body: &Body) -> Error {
+        let message = format!(
+            "[condition.{}]: acts on a layer, and the points of [body.{}] have no single spacing; give the thickness of \
+             the layer as `depth`",
+            self.name, body.name
+        );
+        Error::input(message).at(&self.place)
+    }
 }
 
 /// The effect of a condition on its points, by component.
@@ -69,7 +115,8 @@ pub enum Action {
     Displacement(Vec<Option<Expression>>),
     /// Prescribed velocity (m/s); `None` for free components.
     Velocity(Vec<Option<Expression>>),
-    /// Additional force density (N/m³): each expression is multiplied by its factor.
+    /// Additional force density (N/m³): each expression is multiplied by its factor, and divided by the
+    /// [`Condition::depth`] if there is one.
     BodyForce(Vec<Expression>, Vec<f64>),
     /// Additional total force (N), distributed over the points by volume.
     Force(Vec<Expression>),

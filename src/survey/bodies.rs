@@ -2,6 +2,7 @@
 
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
+use crate::dimension::Dimension;
 use crate::error::Warning;
 use crate::points::{LatticeBody, distance_squared};
 use crate::problem::{Body, PointSource, Problem};
@@ -11,8 +12,8 @@ use crate::solver::Simulation;
 /// printed for a larger difference.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// Largest factor between the mean volume of the points of a file or mesh and the volume of a cell with their
-/// mean spacing. A warning is printed if the mean volume is larger or smaller by more than this factor.
+/// Largest factor between the mean volume of the points of a file or mesh and the volume of a cell whose edge is
+/// their mean distance. A warning is printed if the mean volume is larger or smaller by more than this factor.
 const VOLUME_FACTOR: f64 = 10.0;
 
 /// Number, volume, mass, centre and neighbours of a body's points.
@@ -35,6 +36,26 @@ pub struct BodyFigures {
     /// Smallest, median and largest number of neighbours per point, without pre-cracked bonds, for bodies
     /// that do not lie on a lattice.
     pub neighbours: Option<[u64; 3]>,
+}
+
+impl BodyFigures {
+    /// Return the mean spacing of the points, m: the edge of a cell with the mean volume of a point.
+    pub fn mean_spacing(&self, dimension: Dimension) -> f64 {
+        dimension.edge(self.volume / self.points as f64)
+    }
+
+    /// Test whether the mean volume of points from a file or a mesh fits their distances, within a factor of
+    /// [`VOLUME_FACTOR`]; `None` for points without neighbours.
+    pub fn volumes_fit(&self, dimension: Dimension) -> Option<bool> {
+        let cell = self.cell(dimension);
+        let ratio = self.volume / self.points as f64 / cell;
+        (cell > 0.0).then(|| (VOLUME_FACTOR.recip()..=VOLUME_FACTOR).contains(&ratio))
+    }
+
+    /// Return the volume of a cell whose edge is the mean distance to the nearest neighbour, m³.
+    fn cell(&self, dimension: Dimension) -> f64 {
+        self.spacing.powi(dimension.count() as i32) * dimension.out_of_plane_measure()
+    }
 }
 
 /// Collect the figures of all bodies, with warnings about inconsistent volumes. Collective.
@@ -148,7 +169,7 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     found
 }
 
-/// Return a warning if the volume of a body's points does not fit the volume of its shape, or the spacing
+/// Return a warning if the volume of a body's points does not fit the volume of its shape, or the distance
 /// of its points.
 fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
@@ -165,16 +186,14 @@ fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Opt
             100.0 * excess.abs()
         )
     } else {
-        let cell = figures.spacing.powi(problem.dimension.count() as i32)
-            * problem.dimension.out_of_plane_measure();
-        let mean = figures.volume / figures.points as f64;
-        let ratio = mean / cell;
-        if cell == 0.0 || (VOLUME_FACTOR.recip()..=VOLUME_FACTOR).contains(&ratio) {
+        if figures.volumes_fit(problem.dimension) != Some(false) {
             return None;
         }
+        let cell = figures.cell(problem.dimension);
+        let mean = figures.volume / figures.points as f64;
         format!(
-            "[body.{}] points: the mean volume is {mean:.3e} m³, but a cell of the mean spacing, {:.3e} m, has \
-             {cell:.3e} m³; check that volumes are in m³",
+            "[body.{}] points: the mean volume is {mean:.3e} m³, but a cell of the mean distance of the points, {:.3e} m, \
+             has {cell:.3e} m³; check that volumes are in m³",
             body.name, figures.spacing
         )
     };

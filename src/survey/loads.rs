@@ -7,7 +7,7 @@ use crate::comm::{ExactSum, total};
 use crate::error::Warning;
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::problem::{Action, Condition, PointSource, Problem, Stage};
+use crate::problem::{Action, Condition, Depth, Problem, Stage};
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
@@ -36,8 +36,8 @@ pub fn check_conditions<const D: usize>(
     twice_prescribed(simulation, &points, warnings);
     without_effect(simulation, &points, warnings);
     for (condition, points) in problem.conditions.iter().zip(&points) {
-        if let Some(depth) = condition.default_depth {
-            layer(simulation, condition, depth, points, warnings);
+        if condition.depth == Some(Depth::Spacing) {
+            layer(simulation, condition, points, warnings);
         }
     }
     inward_normals(simulation, &points, warnings);
@@ -154,13 +154,12 @@ fn without_effect<const D: usize>(
     }
 }
 
-/// Warn of a traction or pressure whose default depth `depth` (m) differs from the thickness of its layer by
-/// more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked.
-/// Collective.
+/// Warn of a traction or pressure whose default depth, the spacing of a body, differs from the thickness of its
+/// layer by more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not
+/// checked. Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,
-    depth: f64,
     points: &[u32],
     warnings: &mut Vec<Warning>,
 ) {
@@ -172,9 +171,9 @@ fn layer<const D: usize>(
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
         let body = problem.body_of(usize::from(model.block[*point as usize]));
-        let edges = edges(problem, body, depth);
+        let edge = spacing(problem, body, D);
         let position = model.position(*point as usize);
-        let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edges[k]).floor() as i64);
+        let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edge).floor() as i64);
         cells[0].extend_from_slice(bytemuck::cast_slice(&[
             body as i64,
             cell[0],
@@ -187,13 +186,13 @@ fn layer<const D: usize>(
         .chunks_exact(4)
         .map(|cell| [cell[0], cell[1], cell[2], cell[3]])
         .collect();
-    let thickness = thickness::<D>(problem, &cells, depth);
-    let mut packed = thickness.map_or(Vec::new(), |thickness| thickness.to_le_bytes().to_vec());
+    let found = thickness::<D>(problem, &cells);
+    let mut packed = found.map_or(Vec::new(), |found| bytemuck::cast_slice(&found).to_vec());
     comm.broadcast(0, &mut packed);
-    let Ok(bytes) = <[u8; 8]>::try_from(&packed[..]) else {
+    let found = bytemuck::pod_collect_to_vec::<u8, f64>(&packed);
+    let [thickness, depth] = found[..] else {
         return;
     };
-    let thickness = f64::from_le_bytes(bytes);
     if !(MAX_THICKNESS_RATIO.recip()..MAX_THICKNESS_RATIO).contains(&(thickness / depth)) {
         let words = format!(
             "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give the thickness of \
@@ -204,22 +203,16 @@ fn layer<const D: usize>(
     }
 }
 
-/// Return the cell edges of a body, m; `default` for points from a file or mesh.
-fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
-    match &problem.bodies[body].points {
-        PointSource::Lattice { spacing, .. } => *spacing,
-        PointSource::File { .. } | PointSource::Mesh { .. } => [default; 3],
-    }
+/// Return the cell edge of a body in a layer, m.
+fn spacing(problem: &Problem, body: usize, dimension: usize) -> f64 {
+    let spacing = problem.bodies[body].single_spacing(dimension);
+    spacing.expect("the conditions are only valid with a spacing")
 }
 
-/// Return the thickness of a layer, m: the mean length of rows of adjacent cells, in the direction with the
-/// shortest rows. If the layer has points of several bodies, it is the thickness that differs most from
-/// `depth` (m). `None` if there are no cells.
-fn thickness<const D: usize>(
-    problem: &Problem,
-    cells: &HashSet<[i64; 4]>,
-    depth: f64,
-) -> Option<f64> {
+/// Return the thickness of a layer and the cell edge, m. The thickness is the mean length of rows of adjacent
+/// cells, in the direction with the shortest rows. If the layer has points of several bodies, they are the
+/// numbers of the body whose thickness differs most from its cell edge. `None` if there are no cells.
+fn thickness<const D: usize>(problem: &Problem, cells: &HashSet<[i64; 4]>) -> Option<[f64; 2]> {
     let of_body = |body: usize| {
         let own = || cells.iter().filter(move |cell| cell[0] == body as i64);
         let row_length = |k: usize| {
@@ -229,12 +222,14 @@ fn thickness<const D: usize>(
                 !cells.contains(&before)
             };
             let rows = own().filter(begins).count();
-            own().count() as f64 / rows as f64 * edges(problem, body, depth)[k]
+            own().count() as f64 / rows as f64
         };
-        let shortest = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
-        (own().next().is_some()).then_some(shortest)
+        own().next()?;
+        let cells_deep = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
+        let edge = spacing(problem, body, D);
+        Some([cells_deep * edge, edge])
     };
-    let difference = |thickness: &f64| libm::log(thickness / depth).abs();
+    let difference = |[thickness, edge]: &[f64; 2]| libm::log(thickness / edge).abs();
     (0..problem.bodies.len())
         .filter_map(of_body)
         .max_by(|a, b| difference(a).total_cmp(&difference(b)))

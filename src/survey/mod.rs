@@ -154,7 +154,13 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
                 .iter()
                 .copied()
                 .fold(0.0, f64::max),
-            PointSource::File { .. } | PointSource::Mesh { .. } => figures.spacing,
+            // Wrong volumes have their own warning.
+            PointSource::File { .. } | PointSource::Mesh { .. } => {
+                match figures.volumes_fit(problem.dimension) {
+                    Some(true) => figures.mean_spacing(problem.dimension),
+                    Some(false) | None => figures.spacing,
+                }
+            }
         };
         let horizon = body.horizon / spacing;
         if spacing > 0.0 && !USUAL_HORIZONS.contains(&horizon) {

@@ -2,7 +2,7 @@
 
 use crate::dimension::Dimension;
 use crate::error::Result;
-use crate::points::{LatticeBody, file, mesh, set};
+use crate::points::{BodyPoints, LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
@@ -127,13 +127,14 @@ fn from_files(problem: &Problem) -> Vec<Rows> {
         ..Rows::default()
     };
     let mut rows = vec![none; problem.bodies.len()];
+    let bodies = BodyPoints::of(&problem.bodies);
     for (index, body) in problem.bodies.iter().enumerate() {
         // Each file is read once, for its first body.
         let sample = match &body.points {
-            PointSource::File { path, .. } if file::users(problem, path)[0].0 == index => {
+            PointSource::File { path, .. } if file::users(&bodies, path)[0].0 == index => {
                 file::sample(problem, path)
             }
-            PointSource::Mesh { path, .. } if mesh::first_user(problem, path) == index => {
+            PointSource::Mesh { path, .. } if mesh::first_user(&bodies, path) == index => {
                 mesh::read(problem, path)
                     .ok()
                     .map(|found| (found.points, 1.0))

@@ -154,6 +154,33 @@ fn a_deck_with_its_defaults_written_out_has_the_same_grid() {
 }
 
 #[test]
+fn the_default_depth_is_written_out_if_all_bodies_have_it() {
+    let depth = |set: &str, spacing: &str| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.glass.pmb = {{ density = 2440, youngs_modulus = 72e9 }}
+            body.coarse = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [5, 5] }} }}
+            body.fine = {{ material = 'glass', spacing = {spacing}, shape.box = {{ lower = [5, 0], upper = [8, 5] }} }}
+            set.top.where = 'y > 4'
+            condition.pull = {{ set = '{set}', traction = [0, 1] }}
+            time.end = 1e-5
+            "
+        );
+        let full = deck::explain(&Source::new("deck.toml", text)).unwrap();
+        let again = deck::explain(&Source::new("full.toml", full.clone())).unwrap();
+        assert_eq!(full, again);
+        let full: toml::Table = full.parse().unwrap();
+        full["condition"]["pull"].get("depth").cloned()
+    };
+    assert_eq!(depth("coarse", "0.5"), Some(1.0.into()));
+    assert_eq!(depth("fine", "0.5"), Some(0.5.into()));
+    assert_eq!(depth("top", "1"), Some(1.0.into()));
+    assert_eq!(depth("top", "0.5"), None);
+    assert_eq!(depth("all", "0.5"), None);
+}
+
+#[test]
 fn a_direction_has_any_length_but_zero() {
     let force = |direction: &str| {
         let text = format!(

@@ -156,6 +156,16 @@ fn loads_on_a_layer_of_another_depth() {
         ],
     );
     warns(&pulled("x > 9", ", depth = 3"), &[]);
+    let fine = "body.fine = { material = 'glass', spacing = 0.5, shape.box = { lower = [0, 0], upper = [6, 8] } }\n";
+    let of_fine = |set: &str| fine.to_owned() + &pulled(set, "");
+    warns(&of_fine("x > 11 || x < 0.5"), &[]);
+    warns(
+        &of_fine("x > 11 || x < 1.5"),
+        &[
+            "[condition.pull] traction: acts on a layer about 1.50e0 m thick but is divided by the \
+             spacing, 0.5 m; give the thickness of the layer as `depth`",
+        ],
+    );
 }
 
 #[test]

@@ -452,6 +452,44 @@ fn a_pressure_pushes_against_its_normal() {
 }
 
 #[test]
+fn a_load_without_depth_acts_on_one_spacing_of_each_body() {
+    // The load acts on two layers, each one spacing thick. The spacing of the grid is that of no body.
+    let text = "dimension = 'plane-stress'
+        thickness = 0.1
+        grid = { spacing = 2, horizon = 3 }
+        interface.rule = 'none'
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.coarse = { material = 'rubber', spacing = 1, shape.box = { lower = [0, 0], upper = [8, 6] } }
+        body.fine = { material = 'rubber', spacing = 0.5, shape.box = { lower = [8, 0], upper = [12, 6] } }
+        set.top.where = 'y > if(x < 8, 5, 5.5)'
+        condition.pull = { set = 'top', traction = [3, 7] }
+        condition.press = { set = 'top', pressure = 2, normal = [0, 1] }
+        time = { end = 1 }
+        ";
+    for ranks in [1, 3] {
+        let sums = crate::support::simulate_on::<2, _>(ranks, text, |simulation| {
+            let model = &simulation.model;
+            let loads = simulation.fields.external_force.as_ref().unwrap();
+            let mut sums = [[0.0; 2]; 2];
+            for point in 0..model.owned() {
+                let body = simulation.problem.body_of(usize::from(model.block[point]));
+                for (sum, load) in sums[body].iter_mut().zip(loads) {
+                    *sum += load[point] * model.volume[point];
+                }
+            }
+            sums
+        });
+        // Force per area times area, 8 × 0.1 and 4 × 0.1.
+        for (body, area) in [0.8, 0.4].into_iter().enumerate() {
+            for (component, expected) in [3.0 * area, (7.0 - 2.0) * area].into_iter().enumerate() {
+                let found: f64 = sums.iter().map(|sums| sums[body][component]).sum();
+                assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
 fn bonds_that_break_at_the_start_are_counted() {
     let deck = "dimension = '1d'
         grid = { spacing = 1, horizon = 3 }

@@ -54,7 +54,8 @@ pub struct Condition {
     /// Prescribed temperature, in the unit of the materials' `reference_temperature`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Number>,
-    /// Thickness in m of the layer that carries a traction or pressure; the spacing if not given.
+    /// Thickness in m of the layer that carries a traction or pressure; the spacing of the body to which a point
+    /// belongs if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth: Option<Number>,
     /// Outward normal for a pressure, of any length.

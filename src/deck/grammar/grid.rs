@@ -14,7 +14,8 @@ pub struct Grid {
     /// Edge of a lattice cell in m, or a list with one edge for each dimension; for bodies given as shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
-    /// Horizon δ in m: points up to this distance are bonded.
+    /// Horizon δ in m: points up to this distance are bonded. In an expression, `spacing` is the mean spacing of
+    /// the points of each body without its own horizon, such as `"3.015 * spacing"`.
     pub horizon: Number,
     /// Position in m of a corner of a lattice cell. The default is chosen separately for each
     /// spacing. In each direction it follows from the first body with this spacing that is a whole

@@ -60,7 +60,10 @@ pub fn are_finite<const D: usize>(
                 looker.look(&key, &COMPONENTS, place, set, values)?;
             }
             Action::BodyForce(values, factors) => {
-                let values = values.iter().map(Some).zip(factors.iter().copied());
+                let divisors = condition.divisors(&problem.bodies, D);
+                let least = divisors.into_iter().fold(f64::INFINITY, f64::min);
+                let factors = factors.iter().map(|factor| factor / least);
+                let values = values.iter().map(Some).zip(factors);
                 looker.look(&key, &COMPONENTS, place, set, values)?;
             }
             Action::Force(values) => {

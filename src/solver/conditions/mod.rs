@@ -13,7 +13,7 @@ use crate::comm::{Communicator, total};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::set;
-use crate::problem::{Action, Output, Problem};
+use crate::problem::{Action, Body, Condition, Output, Problem};
 use crate::refine::{Grids, SetFractions};
 
 use super::model::Model;
@@ -117,6 +117,49 @@ fn loaded<const D: usize>(
     (points, Some(shares))
 }
 
+/// The body of an owned point.
+fn body_of<'p, const D: usize>(problem: &'p Problem, model: &Model<D>, point: u32) -> &'p Body {
+    problem.block(usize::from(model.block[point as usize])).body
+}
+
+/// Return an input error if a load acts on a layer whose thickness is the spacing, and a point of any rank has
+/// no single spacing. Collective.
+fn have_depths<const D: usize>(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+    condition: &Condition,
+    points: &[u32],
+) -> Result<()> {
+    let dimension = problem.dimension.count();
+    let mut without = vec![0; problem.bodies.len()];
+    for point in points {
+        let body = problem.body_of(usize::from(model.block[*point as usize]));
+        let divisor = condition.divisor(&problem.bodies[body], dimension);
+        without[body] += u64::from(divisor.is_none());
+    }
+    comm.sum(&mut without);
+    let first = without.iter().position(|points| *points > 0);
+    first.map_or(
+        Ok(()),
+        |body| Err(condition.no_depth(&problem.bodies[body])),
+    )
+}
+
+/// Return the loaded points for which `is_chosen` is true, with their fractions.
+fn only(
+    (points, shares): &(Vec<u32>, Option<Vec<f64>>),
+    is_chosen: impl Fn(u32) -> bool,
+) -> (Vec<u32>, Option<Vec<f64>>) {
+    let chosen = |k: &usize| is_chosen(points[*k]);
+    let chosen: Vec<usize> = (0..points.len()).filter(chosen).collect();
+    let shares = shares.as_ref();
+    (
+        chosen.iter().map(|k| points[*k]).collect(),
+        shares.map(|shares| chosen.iter().map(|k| shares[*k]).collect()),
+    )
+}
+
 /// Return the local indices of the owned points that the result contains; `None` for all points. Collective.
 ///
 /// # Errors
@@ -196,9 +239,19 @@ impl<const D: usize> Conditions<D> {
                 Action::Displacement(values) => prescribe(Motion::Displacement, values),
                 Action::Velocity(values) => prescribe(Motion::Velocity, values),
                 Action::BodyForce(values, factors) => {
-                    let factors = std::array::from_fn(|d| factors[d]);
+                    have_depths(problem, comm, model, condition, &points)?;
                     let points = loaded(problem, model, grids, condition.set);
-                    conditions.add_load(model, Load::new(index, values, factors), points);
+                    // All ranks add the same loads, also those without points.
+                    let dimension = problem.dimension.count();
+                    for divisor in condition.divisors(&problem.bodies, dimension) {
+                        let is_divided = |point: u32| {
+                            let body = body_of(problem, model, point);
+                            condition.divisor(body, dimension) == Some(divisor)
+                        };
+                        let factors = std::array::from_fn(|d| factors[d] / divisor);
+                        let points = only(&points, is_divided);
+                        conditions.add_load(model, Load::new(index, values, factors), points);
+                    }
                 }
                 Action::Force(values) => {
                     let mut volume = [ExactSum::default()];
@@ -335,24 +388,28 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sum a weight over some owned points, for each load of the stage. `weight` is a function of a point and
-    /// of the force of the load on this point (N). `points` is sorted. Returns the index of each load's
-    /// condition, and the sums of this rank.
+    /// Sum a weight over some owned points, for each condition with loads in this stage. `weight` is a function
+    /// of a point and of the force of the load on this point (N). `points` is sorted. Returns the indices of
+    /// the conditions, and the sums of this rank.
     pub fn load_sums(
         &self,
         model: &Model<D>,
         points: &[usize],
         weight: impl Fn(usize, [f64; D]) -> f64,
     ) -> (Vec<usize>, Vec<ExactSum>) {
-        let conditions = self.loads.iter().map(Load::condition).collect();
-        let mut sums = vec![ExactSum::ZERO; self.loads.len()];
+        // The loads of a condition are adjacent.
+        let mut conditions: Vec<usize> = self.loads.iter().map(Load::condition).collect();
+        conditions.dedup();
+        let mut sums = vec![ExactSum::ZERO; conditions.len()];
         for (number, part) in self.on_parts.iter().enumerate() {
             for loaded in &part.loads {
+                let condition = self.loads[loaded.load()].condition();
+                let entry = conditions.partition_point(|other| *other < condition);
                 for (point, density) in loaded.densities() {
                     let point = number * PART + point;
                     if points.binary_search(&point).is_ok() {
                         let force = density.map(|density| model.volume[point] * density);
-                        sums[loaded.load()].add(weight(point, force));
+                        sums[entry].add(weight(point, force));
                     }
                 }
             }
