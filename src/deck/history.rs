@@ -400,7 +400,8 @@ fn crack_front(
         if scope.dimension == 2 {
             return Ok(None);
         }
-        let message = format!("{key}: `front`, the direction of the crack front, is required in 3-D");
+        let message =
+            format!("{key}: `front`, the direction of the crack front, is required in 3-D");
         return Err(scope.error(table.span(), message));
     };
     let key = format!("{key} front");

@@ -79,15 +79,17 @@ pub fn front_length<const D: usize>(
     for point in 0..model.owned() {
         let position = model.position(point);
         // At the surface of a refined body, each point fills its cell of level 0.
-        let level = simulation.problem.block(usize::from(model.block[point])).level;
+        let level = simulation
+            .problem
+            .block(usize::from(model.block[point]))
+            .level;
         let edges = edges(simulation, point).map(|edge| libm::scalbn(edge, level as i32));
         let offset: [f64; 3] = std::array::from_fn(|d| position[d] - centre[d]);
         let along: f64 = (0..3).map(|d| offset[d] * front[d]).sum();
         let across = (0..3).map(|d| (offset[d] - along * front[d]).powi(2));
         let edge = edges.into_iter().fold(0.0, f64::max);
-        let is_near_the_box = (0..3).all(|d| {
-            position[d] > rule.lower[d] - edge && position[d] < rule.upper[d] + edge
-        });
+        let is_near_the_box = (0..3)
+            .all(|d| position[d] > rule.lower[d] - edge && position[d] < rule.upper[d] + edge);
         if is_near_the_box && across.sum::<f64>() <= edge.powi(2) {
             let half = 0.5 * extent(edges, front);
             start[0] = start[0].min(along - half);
@@ -121,7 +123,13 @@ fn integral(rule: &JIntegral, centre: [f64; 3], front: [f64; 3], range: Range<f6
         kinks.extend(kinks_of_factor.iter().filter(|kink| range.contains(kink)));
     }
     kinks.sort_by(f64::total_cmp);
-    let at = |along: f64| weight_at(rule, std::array::from_fn(|d| centre[d] + along * front[d]), 3);
+    let at = |along: f64| {
+        weight_at(
+            rule,
+            std::array::from_fn(|d| centre[d] + along * front[d]),
+            3,
+        )
+    };
     let pieces = kinks.windows(2).map(|ends| {
         let (start, end) = (ends[0], ends[1]);
         (end - start) / 6.0 * (at(start) + 4.0 * at(0.5 * (start + end)) + at(end))
