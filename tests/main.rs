@@ -62,6 +62,7 @@ mod fracture {
     mod fracture_energy;
     mod fronts;
     mod j_integral;
+    mod j_integral_in_space;
     mod scatter;
     mod surfaces;
     mod toughness_by_direction;

@@ -155,6 +155,11 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         let threshold = history.damage_threshold.clone();
         tip.threshold = tip.threshold.take().or(threshold);
     }
+    for rule in history.j_integral.values_mut().map(|table| table.get_mut()) {
+        let along_x = [1.0, 0.0, 0.0].map(default_number);
+        let along_x = along_x[..problem.dimension.count()].to_vec();
+        (rule.direction).get_or_insert_with(|| Spanned::new(0..0, along_x));
+    }
 }
 
 /// Return the grid origin of all lattice bodies, m; `None` if their origins differ.

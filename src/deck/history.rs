@@ -353,17 +353,14 @@ fn j_integral(
     horizon: f64,
 ) -> Result<problem::JIntegral> {
     let key = column_name(scope, "j_integral", name, table)?;
-    if scope.dimension != 2 {
-        let message = format!(
-            "{key}: is for plane problems, this one is {}-D",
-            scope.dimension
-        );
+    if scope.dimension == 1 {
+        let message = format!("{key}: is for plane and 3-D problems, this one is 1-D");
         return Err(scope.error(table.span(), message));
     }
     let rule = table.get_ref();
     let [lower, upper] = corners_of_box(scope, &key, &rule.lower, &rule.upper)?;
     let layer = LAYER * horizon;
-    if let Some(k) = (0..2).find(|k| upper[*k] - lower[*k] <= 2.0 * layer) {
+    if let Some(k) = (0..scope.dimension).find(|k| upper[*k] - lower[*k] <= 2.0 * layer) {
         let message = format!(
             "{key}: each edge of the box must be longer than {} m, which is {} horizons, but the edge along {} is {} m \
              long",
@@ -374,12 +371,51 @@ fn j_integral(
         );
         return Err(scope.error(rule.upper.get_ref()[k].span(), message));
     }
+    let direction = match &rule.direction {
+        None => [1.0, 0.0, 0.0],
+        Some(direction) => scope.direction(direction, &format!("{key} direction"))?,
+    };
     Ok(problem::JIntegral {
         name: name.to_owned(),
         span: table.span(),
         lower,
         upper,
-        direction: scope.direction(&rule.direction, &format!("{key} direction"))?,
+        direction,
+        front: crack_front(scope, &key, table, direction)?,
         layer,
     })
+}
+
+/// Largest cosine of the angle between the crack front and the direction of growth.
+const LARGEST_COSINE: f64 = 1e-6;
+
+/// Return the direction of the crack front for a J integral in 3-D, `None` in plane problems.
+fn crack_front(
+    scope: &Scope,
+    key: &str,
+    table: &Spanned<grammar::JIntegral>,
+    direction: [f64; 3],
+) -> Result<Option<[f64; 3]>> {
+    let Some(front) = &table.get_ref().front else {
+        if scope.dimension == 2 {
+            return Ok(None);
+        }
+        let message =
+            format!("{key}: `front`, the direction of the crack front, is required in 3-D");
+        return Err(scope.error(table.span(), message));
+    };
+    let key = format!("{key} front");
+    if scope.dimension == 2 {
+        let message =
+            format!("{key}: is for 3-D problems; a plane problem has a crack tip and no front");
+        return Err(scope.error(front.span(), message));
+    }
+    let unit = scope.direction(front, &key)?;
+    let cosine: f64 = unit.iter().zip(direction).map(|(a, b)| a * b).sum();
+    if cosine.abs() > LARGEST_COSINE {
+        let message =
+            format!("{key}: must be perpendicular to `direction`, which is along x by default");
+        return Err(scope.error(front.span(), message));
+    }
+    Ok(Some(unit))
 }

@@ -195,7 +195,7 @@ pub struct Tip {
     pub threshold: f64,
 }
 
-/// A J integral over a box around a crack tip.
+/// A J integral over a box around a crack tip or a piece of a crack front.
 #[derive(Debug, Clone)]
 pub struct JIntegral {
     /// Name in the deck.
@@ -208,6 +208,8 @@ pub struct JIntegral {
     pub upper: [f64; 3],
     /// Direction in which the crack grows, a unit vector.
     pub direction: [f64; 3],
+    /// Direction of the crack front, a unit vector; in 3-D only.
+    pub front: Option<[f64; 3]>,
     /// Width of the layer inside the faces of the box, over which the weight of the points falls to 0, m.
     pub layer: f64,
 }

@@ -1,26 +1,20 @@
-//! J integrals in the history: equal boxes, closed-form solutions, boxes without a crack tip, equal bits.
+//! J integrals of plane problems in the history: equal boxes, closed-form solutions, boxes without a crack tip, equal bits.
 
 use std::f64::consts::PI;
 
 use crate::support::command::Folder;
-use crate::support::equilibria::to_the_end;
-use crate::support::history::{column, row};
+use crate::support::equilibria::values_at_the_end;
 use crate::support::recorded::record;
 use crate::support::{problem, simulate};
 use fissure::solver::Simulation;
-use fissure::solver::observers::HistoryObserver;
 
 /// Young's modulus of all decks, Pa.
 const YOUNGS_MODULUS: f64 = 3e9;
 
 /// Return the values of the named columns in the last equilibrium of a plane deck.
 fn equilibrium<const N: usize>(deck: &str, names: [&str; N]) -> [f64; N] {
-    simulate(deck, |mut simulation: Simulation<2>| {
-        let observer = HistoryObserver::new(&simulation);
-        let mut observer = observer.unwrap_or_else(|error| panic!("{error}"));
-        to_the_end(&mut simulation);
-        let values = row(&mut observer, &mut simulation).values;
-        names.map(|name| values[column(&observer, name)])
+    simulate(deck, |simulation: Simulation<2>| {
+        values_at_the_end(simulation, names)
     })
 }
 

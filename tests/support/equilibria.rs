@@ -1,8 +1,10 @@
 //! Helpers for relaxation and Newton's method.
 
+use super::history::{column, row};
 use super::saved::{state, whole};
 use super::simulate_on;
 use fissure::solver::Simulation;
+use fissure::solver::observers::HistoryObserver;
 
 /// Advance through all load steps to the end.
 pub fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) {
@@ -10,6 +12,18 @@ pub fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) {
         simulation.advance();
         simulation.check().unwrap_or_else(|error| panic!("{error}"));
     }
+}
+
+/// Advance through all load steps, and return the values of the named columns of the history at the end.
+pub fn values_at_the_end<const D: usize, const N: usize>(
+    mut simulation: Simulation<D>,
+    names: [&str; N],
+) -> [f64; N] {
+    let observer = HistoryObserver::new(&simulation);
+    let mut observer = observer.unwrap_or_else(|error| panic!("{error}"));
+    to_the_end(&mut simulation);
+    let values = row(&mut observer, &mut simulation).values;
+    names.map(|name| values[column(&observer, name)])
 }
 
 /// Return the deck of a notched plate that tears under supports and a load, with further keys of `[time]`.

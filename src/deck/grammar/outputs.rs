@@ -178,7 +178,7 @@ pub struct History {
     /// Crack tips that are tracked, by name.
     #[serde(default)]
     pub tip: Tables<Tip>,
-    /// J integrals over boxes around crack tips, by name; in plane problems.
+    /// J integrals over boxes around crack tips or pieces of crack fronts, by name.
     #[serde(default)]
     pub j_integral: Tables<JIntegral>,
 }
@@ -335,8 +335,8 @@ pub struct Tip {
     pub threshold: Option<Number>,
 }
 
-/// The nonlocal J integral over a box around a crack tip, in plane problems: the energy that the crack
-/// releases per area of its growth.
+/// The nonlocal J integral over a box around a crack tip, in 3-D around a piece of a crack front: the energy
+/// that the crack releases per area of its growth.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JIntegral {
@@ -344,13 +344,13 @@ pub struct JIntegral {
     pub lower: Vector,
     /// Upper corner of the box, m.
     pub upper: Vector,
-    /// Direction in which the crack grows, a vector of any length; `[1, 0]` if not given.
-    #[serde(default = "default_direction")]
-    pub direction: Vector,
-}
-
-fn default_direction() -> Vector {
-    Spanned::new(0..0, [1.0, 0.0].map(default_number).to_vec())
+    /// Direction in which the crack grows, a vector of any length; along x if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Vector>,
+    /// Direction of the crack front, a vector of any length that is perpendicular to `direction`; required in
+    /// 3-D only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub front: Option<Vector>,
 }
 
 #[cfg(test)]

@@ -1,13 +1,14 @@
-//! Nonlocal J integrals over boxes around crack tips: energy released per area of crack growth.
+//! Nonlocal J integrals over boxes around crack tips, in 3-D around pieces of crack fronts: energy released per
+//! area of crack growth.
 //!
 //! A box has a weight q that is 1 inside and falls to 0 over a layer inside the faces. With the unit vector e
-//! in the direction of growth, the strain energy density W, the force states T and the thickness h, the
-//! integral is
+//! in the direction of growth, the strain energy density W and the force states T, the integral is
 //!
-//! J = −(1/h) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
+//! J = −(1/L) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
 //!
-//! In an equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010)
-//! over the boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
+//! L is the thickness in plane problems. In 3-D, it is the integral of q along the crack front. In an
+//! equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010) over the
+//! boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
 
 use crate::comm;
 use crate::comm::sum::{ExactSum, reduce};
@@ -18,6 +19,7 @@ use crate::message::format_number;
 use crate::problem::JIntegral;
 use crate::solver::Simulation;
 
+use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
 /// Relative tolerance of the distance between the box and the ends of the bodies.
@@ -35,24 +37,16 @@ struct WeightedBox {
     /// Index of the direction of growth.
     direction: usize,
     points: Vec<Weight>,
-}
-
-/// Weight of an owned point.
-struct Weight {
-    /// Local index.
-    point: usize,
-    /// q, between 0 and 1.
-    value: f64,
-    /// Mean of ∂q/∂e over the cell of the point, 1/m.
-    slope: f64,
+    /// Thickness in plane problems, integral of q along the crack front in 3-D, m.
+    length: f64,
 }
 
 impl JIntegrals {
     /// Find the points of the boxes. Collective.
     ///
     /// # Errors
-    /// If a box contains no point, or if the bodies end near the box in the direction of growth. The error is
-    /// the same on all ranks.
+    /// If a box contains no point, if the bodies end near the box in the direction of growth, or if no body lies
+    /// on the line that stands for the crack front. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let mut directions = Vec::new();
         let mut boxes = Vec::new();
@@ -66,6 +60,10 @@ impl JIntegrals {
             boxes.push(WeightedBox {
                 direction,
                 points: weights(simulation, rule),
+                length: match rule.front {
+                    None => simulation.problem.dimension.out_of_plane_measure(),
+                    Some(front) => front_length(simulation, rule, front)?,
+                },
             });
         }
         Ok(Self { directions, boxes })
@@ -106,50 +104,9 @@ impl JIntegrals {
             sum
         };
         let mut sums: Vec<ExactSum> = self.boxes.iter().map(sum_of).collect();
-        let thickness = simulation.problem.dimension.out_of_plane_measure();
-        let sums = reduce(comm, &mut sums).into_iter();
-        sums.map(|sum| sum / thickness).collect()
+        let sums = reduce(comm, &mut sums).into_iter().zip(&self.boxes);
+        sums.map(|(sum, weighted)| sum / weighted.length).collect()
     }
-}
-
-/// Weight q at a position: a product with one factor per direction. The factor is the distance to the nearer
-/// face, divided by the thickness of the layer and clamped to the range from 0 to 1.
-fn weight_at(rule: &JIntegral, position: [f64; 3], dimension: usize) -> f64 {
-    let along = |d: usize| {
-        let nearest = (position[d] - rule.lower[d]).min(rule.upper[d] - position[d]);
-        (nearest / rule.layer).clamp(0.0, 1.0)
-    };
-    (0..dimension).map(along).product()
-}
-
-/// Compute the weights of the owned points; points without weight and slope are left out.
-fn weights<const D: usize>(simulation: &Simulation<'_, D>, rule: &JIntegral) -> Vec<Weight> {
-    let model = &simulation.model;
-    let of_point = |point: usize| {
-        let position = model.position(point);
-        let edges = edges(simulation, point);
-        let squares = (0..D).map(|d| (rule.direction[d] * edges[d]).powi(2));
-        let extent = squares.sum::<f64>().sqrt();
-        let at = |distance: f64| {
-            let position = std::array::from_fn(|d| position[d] + distance * rule.direction[d]);
-            weight_at(rule, position, D)
-        };
-        Weight {
-            point,
-            value: at(0.0),
-            slope: (at(0.5 * extent) - at(-0.5 * extent)) / extent,
-        }
-    };
-    let all = (0..model.owned()).map(of_point);
-    all.filter(|weight| weight.value != 0.0 || weight.slope != 0.0)
-        .collect()
-}
-
-/// Edges of the cell of an owned point, m.
-fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f64; 3] {
-    let (problem, model) = (simulation.problem, &simulation.model);
-    let spacing = problem.block(usize::from(model.block[point])).spacing();
-    spacing.unwrap_or([problem.dimension.edge(model.volume[point]); 3])
 }
 
 /// Check that the box contains points, and that the bodies reach at least one horizon beyond it in the

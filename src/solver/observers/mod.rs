@@ -13,6 +13,7 @@ mod fragments;
 mod front;
 pub mod history;
 mod j_integral;
+mod j_weight;
 pub mod nearest;
 mod reach;
 mod row_fields;
