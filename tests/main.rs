@@ -30,6 +30,7 @@ mod laws {
     mod elasticity;
     mod interfaces;
     mod invariants;
+    mod johnson_cook;
     mod ordinary_history;
     mod plasticity;
     mod slender_bodies;

@@ -191,8 +191,9 @@ impl<const D: usize> Law<D> for AnyLaw {
         sums: &[f64],
         numbers: &mut [f64],
         plastic: &mut PlasticState,
+        step: f64,
     ) {
-        with_law!(self, law => Law::<D>::update_point(law, pass, sums, numbers, plastic));
+        with_law!(self, law => Law::<D>::update_point(law, pass, sums, numbers, plastic, step));
     }
 
     fn counts(&self) -> Counts {

@@ -200,13 +200,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the
     /// values that only the law reads ([`Self::OWN_NUMBERS`]). A plastic state that plastic flow has changed
-    /// is stored only at the end of a step.
+    /// is stored only at the end of a step. `step` is the time since the plastic state (s); 0 if no time has
+    /// passed.
     fn update_point(
         &self,
         _pass: usize,
         _sums: &[f64],
         _numbers: &mut [f64],
         _plastic: &mut PlasticState,
+        _step: f64,
     ) {
     }
 

@@ -258,7 +258,14 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     #[inline(always)]
-    fn update_point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(
+        &self,
+        _: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
         let [volume_factor, dilatation] = self.dilated(numbers[0], sums[0]);
         numbers[1] = volume_factor;
         numbers[2] = dilatation;

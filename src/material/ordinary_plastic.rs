@@ -150,7 +150,14 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     #[inline(always)]
-    fn update_point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
         let extension_factor = numbers[0];
         match pass {
             0 => {

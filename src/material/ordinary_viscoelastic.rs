@@ -139,7 +139,14 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     }
 
     #[inline(always)]
-    fn update_point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
         if pass == 1 {
             let extension_factor = numbers[0];
             let volume_factor =

@@ -1,13 +1,15 @@
 //! Plastic state of a point, stored from step to step.
 
-/// Plastic strain, equivalent plastic strain, energy of the unreduced control and dissipated energy;
-/// initially 0.
+/// Plastic strain, equivalent plastic strain, change of the yield stress by rate and temperature, energy of the
+/// unreduced control and dissipated energy; initially 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlasticState {
     /// E_p, or C_p⁻¹ − I for logarithmic strains, in the order xx, yy, zz, yz, xz, xy.
     pub strain: [f64; 6],
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,
+    /// Factor of strain rate and temperature on the yield stress in the last step, minus 1.
+    pub yield_change: f64,
     /// Energy that the zero-energy control would have if plastic flow did not reduce the control, J/m³.
     pub control: f64,
     /// Energy that plastic flow and the reduction of the zero-energy control have dissipated, J/m³.
@@ -16,14 +18,15 @@ pub struct PlasticState {
 
 impl PlasticState {
     /// Count of the numbers in a state.
-    pub const COUNT: usize = 9;
+    pub const COUNT: usize = 10;
 
     /// Create a state from its numbers, in the order of the fields.
     pub fn of(numbers: [f64; Self::COUNT]) -> Self {
-        let [strain @ .., equivalent, control, work] = numbers;
+        let [strain @ .., equivalent, yield_change, control, work] = numbers;
         Self {
             strain,
             equivalent,
+            yield_change,
             control,
             work,
         }
@@ -34,9 +37,21 @@ impl PlasticState {
         let Self {
             strain: [xx, yy, zz, yz, xz, xy],
             equivalent,
+            yield_change,
             control,
             work,
         } = *self;
-        [xx, yy, zz, yz, xz, xy, equivalent, control, work]
+        [
+            xx,
+            yy,
+            zz,
+            yz,
+            xz,
+            xy,
+            equivalent,
+            yield_change,
+            control,
+            work,
+        ]
     }
 }

@@ -409,6 +409,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             plastic: plastic_columns(
                 &mut fields.plastic_strain,
                 &mut fields.plastic_strain_equivalent,
+                &mut fields.yield_change,
                 &mut fields.control_energy,
                 &mut fields.plastic_work,
             ),

@@ -529,10 +529,24 @@ fn blocks_of_ordinary_laws_whose_bonds_remember() {
 fn blocks_of_a_law_whose_points_flow() {
     let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, \
                yield_stress = 0.05, hardening_modulus = 0.2 }";
+    flows_alike("flowing", law);
+}
+
+#[test]
+fn blocks_of_a_law_whose_points_harden_by_rate_and_heat() {
+    let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, \
+               yield_stress = 0.03, hardening_modulus = 0.2, hardening_exponent = 0.4, \
+               strain_rate_coefficient = 0.05, reference_strain_rate = 1e-4, \
+               thermal_softening_exponent = 1.1, initial_temperature = 0, melting_temperature = 1, \
+               volumetric_heat_capacity = 0.01 }";
+    flows_alike("johnson-cook", law);
+}
+
+fn flows_alike(name: &str, law: &str) {
     let rule = "brittle.energy]\nfamily_correction = 1";
     let deck = with_one_law(law).replace("brittle.critical_stretch]", rule);
     let deck = deck.replace("'stress'", "'stress', 'plastic_strain_equivalent'");
-    same_with_either_family("flowing", &deck);
+    same_with_either_family(name, &deck);
 }
 
 #[test]

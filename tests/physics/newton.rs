@@ -101,6 +101,9 @@ const CORRESPONDENCE: &str = "correspondence = { density = 1000, youngs_modulus 
                               zero_energy = 'dispersion' }";
 const J2: &str = "correspondence = { density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, yield_stress = 1e6, \
                   hardening_modulus = 5e7, zero_energy = 'silling2017', zero_energy_coefficient = 0.1 }";
+const JOHNSON_COOK: &str = "correspondence = { density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, yield_stress = 8e5, \
+                            hardening_modulus = 5e6, hardening_exponent = 0.5, strain_rate_coefficient = 0.02, \
+                            reference_strain_rate = 1e-3, zero_energy = 'silling2017', zero_energy_coefficient = 0.1 }";
 
 #[test]
 fn elastic_bodies_have_the_equilibria_of_relaxation() {
@@ -115,6 +118,7 @@ fn bodies_that_yield_have_the_equilibria_of_relaxation() {
     compare::<2>(ORDINARY_PLASTIC, "'6e-5*t'");
     compare::<2>(J2, "'1e-4*t'");
     compare::<3>(J2, "'6e-5*t'");
+    compare::<2>(JOHNSON_COOK, "'1e-4*t'");
 }
 
 /// Return the numbers of force evaluations of relaxation and Newton's method for a deck of `inputs/`.

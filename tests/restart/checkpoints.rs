@@ -460,6 +460,12 @@ fn points_that_flow_go_on_as_if_they_had_never_stopped() {
 }
 
 #[test]
+fn points_that_harden_by_rate_and_heat_go_on_as_if_they_had_never_stopped() {
+    let law = "correspondence = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.2, yield_stress = 8e6, hardening_modulus = 50e6, hardening_exponent = 0.4, strain_rate_coefficient = 0.02, reference_strain_rate = 1, thermal_softening_exponent = 1, initial_temperature = 0, melting_temperature = 1, volumetric_heat_capacity = 1e5 }";
+    dissipates(&goes_on("hardening", law, "auto"));
+}
+
+#[test]
 fn a_collision_goes_on_as_if_it_had_never_stopped() {
     collision_goes_on("collision", ["", ""]);
 }

@@ -124,9 +124,11 @@ fn of_points_with_a_dilatation() {
 #[test]
 fn of_points_that_flow_while_bonds_break() {
     let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, yield_stress = 0.03, hardening_modulus = 0.2 }";
+    let by_rate = ", hardening_exponent = 0.4, strain_rate_coefficient = 0.02, reference_strain_rate = 1e-3 }";
     let stretch = "critical_stretch = { critical_stretch = 0.03";
-    for family in ["lattice", "list"] {
-        let plate = plate(law, 0.0, family).replace(
+    let cases = [("lattice", " }"), ("list", " }"), ("lattice", by_rate)];
+    for (family, more) in cases {
+        let plate = plate(&law.replace(" }", more), 0.0, family).replace(
             stretch,
             "energy = { family_correction = 1, fracture_energy = 0.005",
         );

@@ -213,7 +213,14 @@ impl<const D: usize> Law<D> for BondAssociated {
         sum
     }
 
-    fn update_point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
         let (direct, inverse) = (Places::direct::<D>(), Places::inverse::<D>());
         let singular = Places::singular::<D>();
         if pass == 0 {

@@ -67,14 +67,16 @@ impl Trial {
 }
 
 /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
-/// state. `None` if det F ≤ 0 or b_e is not positive definite.
+/// state in a step of this length (s). `None` if det F ≤ 0 or b_e is not positive definite.
 pub fn at<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
     state: &mut PlasticState,
+    step: f64,
 ) -> Option<(SMatrix<f64, D, D>, f64)> {
     let mut trial = Trial::of(gradient, state)?;
-    let flow = law.flow(&law.stress(&Matrix3::from_diagonal(&trial.strains)), state);
+    let stress = law.stress(&Matrix3::from_diagonal(&trial.strains));
+    let flow = law.flow(&stress, state, step);
     if let Some(flow) = flow {
         let change = flow.diagonal().map(|flow| libm::expm1(-2.0 * flow));
         let change = trial.tensor(&change.component_mul(&trial.squares));
@@ -196,7 +198,7 @@ mod tests {
         state: &mut PlasticState,
     ) -> (Matrix3<f64>, f64, Matrix3<f64>) {
         let (piola, energy) = law
-            .at(&(deformation - Matrix3::identity()), state)
+            .at(&(deformation - Matrix3::identity()), state, 0.0)
             .expect("F is positive");
         (piola, energy, piola * deformation.transpose())
     }
@@ -358,7 +360,7 @@ mod tests {
             for step in 1..=20 {
                 let t = size * f64::from(step) / 20.0;
                 let gradient = Matrix2::new(t, 1.3 * t, 0.2 * t, -0.4 * t);
-                let [a, b] = [0, 1].map(|k| laws[k].at(&gradient, &mut states[k]).unwrap().0);
+                let [a, b] = [0, 1].map(|k| laws[k].at(&gradient, &mut states[k], 0.0).unwrap().0);
                 largest = largest.max((a - b).norm() / b.norm());
                 let [a, b] = [0, 1].map(|k| laws[k].across(&gradient, &states[k]).unwrap());
                 largest = largest.max((a - b).abs() / b.abs());
@@ -375,7 +377,7 @@ mod tests {
         let gradient = Matrix3::from_diagonal(&Vector3::new(-2.5, 0.0, 0.0));
         assert!(
             in_space()
-                .at(&gradient, &mut PlasticState::default())
+                .at(&gradient, &mut PlasticState::default(), 0.0)
                 .is_none()
         );
     }

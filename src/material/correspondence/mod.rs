@@ -21,6 +21,7 @@ mod bond_associated;
 mod control;
 mod family;
 mod hooke;
+mod johnson_cook;
 mod logarithmic;
 mod plastic;
 mod stress;
@@ -47,13 +48,23 @@ use stress::Stress;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correspondence {
-    stress: Stress,
+    response: Response,
     /// [`Stress::largest_modulus`], Pa.
     modulus: f64,
     control: Control,
-    plastic: Option<Plastic>,
     /// Trace of the shape tensor of an untruncated family, m⁵.
     whole: f64,
+}
+
+/// Dependence of the stress on the deformation gradient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one per law, not one per point"
+)]
+enum Response {
+    Elastic(Stress),
+    Plastic(Plastic),
 }
 
 const STRESS: Key = Key {
@@ -72,6 +83,14 @@ const KEYS: &[Key] = hooke::keys_with_hooke![
     STRESS,
     plastic::YIELD_STRESS,
     plastic::HARDENING,
+    johnson_cook::EXPONENT,
+    johnson_cook::RATE_COEFFICIENT,
+    johnson_cook::REFERENCE_RATE,
+    johnson_cook::SOFTENING_EXPONENT,
+    johnson_cook::MELTING_TEMPERATURE,
+    johnson_cook::INITIAL_TEMPERATURE,
+    johnson_cook::HEAT_CAPACITY,
+    johnson_cook::TAYLOR_QUINNEY,
     plastic::STRAIN_MEASURE,
     control::KIND,
     control::COEFFICIENT,
@@ -94,6 +113,9 @@ impl Declared for Correspondence {
             "poisson_ratio = 0.35, zero_energy = 'wan2019'",
             "poisson_ratio = 0.3, yield_stress = 0.12, hardening_modulus = 0.5, \
              zero_energy = 'silling2017'",
+            "poisson_ratio = 0.3, yield_stress = 0.12, hardening_modulus = 0.5, hardening_exponent = 0.4, \
+             strain_rate_coefficient = 0.05, reference_strain_rate = 1e-3, thermal_softening_exponent = 1.1, \
+             initial_temperature = 293, melting_temperature = 393, volumetric_heat_capacity = 1e-3",
         ],
         fault: Some(|values, dimension| {
             hooke::fault(values, dimension)
@@ -137,21 +159,22 @@ fn build(given: &Given) -> Built {
     let hooke = Hooke::of(given).expect("the constants have been looked at");
     let stress = Stress::of(given.values.word(STRESS.name), given, hooke);
     Built::plain(Correspondence {
-        stress,
+        response: Plastic::of(given).map_or(Response::Elastic(stress), Response::Plastic),
         modulus: stress.largest_modulus(),
         control: Control::of(given, hooke),
-        plastic: Plastic::of(given),
         whole: Influence::Constant.weighted_volume(given.dimension, given.horizon),
     })
 }
 
 impl Described for Correspondence {
     fn described(&self) -> Vec<(&'static str, Property)> {
-        let mut facts = vec![("stress", Property::Text(self.stress.name()))];
+        let (stress, plastic) = match &self.response {
+            Response::Elastic(stress) => (stress.name(), Vec::new()),
+            Response::Plastic(plastic) => (Stress::OF_PLASTIC, plastic.described()),
+        };
+        let mut facts = vec![("stress", Property::Text(stress))];
         facts.extend(self.control.described());
-        if let Some(plastic) = &self.plastic {
-            facts.extend(plastic.described());
-        }
+        facts.extend(plastic);
         facts
     }
 }
@@ -222,21 +245,22 @@ struct Family<const D: usize> {
 }
 
 impl Correspondence {
-    /// Compute K⁻¹, H, P and W of a point, and update its plastic state. `sums` are the sums of the first
-    /// pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if K is nearly singular,
+    /// Compute K⁻¹, H, P and W of a point, and update its plastic state in a step of this length (s). `sums`
+    /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if K is nearly singular,
     /// the intact part of the family is too stiff, or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],
         whole: f64,
         state: &mut PlasticState,
+        step: f64,
     ) -> Option<Family<D>> {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let inverse = shape.inverse_of_rest(self.modulus, whole)?;
         let gradient = from_rows::<D>(&sums[2 * D..]) * inverse;
-        let (stress, energy) = match &self.plastic {
-            Some(plastic) => plastic.at(&gradient, state)?,
-            None => self.stress.at(&gradient)?,
+        let (stress, energy) = match &self.response {
+            Response::Elastic(stress) => stress.at(&gradient)?,
+            Response::Plastic(plastic) => plastic.at(&gradient, state, step)?,
         };
         Some(Family {
             inverse,
@@ -246,9 +270,17 @@ impl Correspondence {
         })
     }
 
+    /// Return the plastic law; `None` if the body is elastic.
+    fn plastic(&self) -> Option<&Plastic> {
+        match &self.response {
+            Response::Elastic(_) => None,
+            Response::Plastic(plastic) => Some(plastic),
+        }
+    }
+
     /// Test whether points have a control that decreases with plastic flow.
     fn control_yields(&self) -> bool {
-        self.plastic.is_some() && self.control != Control::None
+        self.plastic().is_some() && self.control != Control::None
     }
 }
 
@@ -337,11 +369,12 @@ impl<const D: usize> Law<D> for Correspondence {
         sums: &[f64],
         numbers: &mut [f64],
         state: &mut PlasticState,
+        step: f64,
     ) {
         let (constants, found) = numbers.split_at_mut(CONSTANTS);
         let own = D * D + 2 * D;
         let left = |state: &PlasticState| {
-            let plastic = self.plastic.as_ref();
+            let plastic = self.plastic();
             plastic.map_or(1.0, |plastic| plastic.control_left(state))
         };
         if pass == 1 {
@@ -359,7 +392,7 @@ impl<const D: usize> Law<D> for Correspondence {
         let control_yields = self.control_yields();
         found[..own + if control_yields { OWN } else { OWN_OF_ELASTIC }].fill(0.0);
         let before = left(state);
-        let Some(family) = self.family::<D>(sums, constants[0], state) else {
+        let Some(family) = self.family::<D>(sums, constants[0], state, step) else {
             found[own + 1] = 1.0;
             return;
         };
@@ -432,7 +465,7 @@ impl<const D: usize> Law<D> for Correspondence {
         state: &PlasticState,
     ) -> Option<FamilyStress<D>> {
         let mut plastic = *state;
-        let family = self.family::<D>(sums, numbers[0], &mut plastic)?;
+        let family = self.family::<D>(sums, numbers[0], &mut plastic, 0.0)?;
         Some(FamilyStress {
             gradient: family.gradient,
             piola: family.stress,
@@ -455,7 +488,7 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     fn has_plasticity(&self) -> bool {
-        self.plastic.is_some()
+        self.plastic().is_some()
     }
 
     fn is_singular(&self, numbers: &[f64]) -> bool {
@@ -468,16 +501,16 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     fn stress_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
-        match &self.plastic {
-            Some(plastic) => plastic.across(gradient, state),
-            None => self.stress.across(gradient),
+        match &self.response {
+            Response::Elastic(stress) => stress.across(gradient),
+            Response::Plastic(plastic) => plastic.across(gradient, state),
         }
     }
 
     fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
-        match &self.plastic {
-            Some(plastic) => plastic.stretch_across(gradient, state),
-            None => self.stress.stretch_across(gradient),
+        match &self.response {
+            Response::Elastic(stress) => stress.stretch_across(gradient),
+            Response::Plastic(plastic) => plastic.stretch_across(gradient, state),
         }
     }
 

@@ -14,6 +14,8 @@
 //! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the final stress, where x
 //! solves a scalar equation (§3.4).
 //!
+//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain, by rate and temperature.
+//!
 //! The whole plastic work ∫ q dε̄ is dissipated.
 
 use std::ops::AddAssign;
@@ -22,6 +24,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::super::{Given, Key, Kind, LawFault, PlasticState, Property, Values, Word};
 use super::hooke;
+use super::johnson_cook::{self, JohnsonCook, Modes};
 use super::logarithmic;
 use super::stress::{green_strain, stretch_of};
 use super::tensor::{matrix, rows};
@@ -32,8 +35,7 @@ use crate::dimension::Dimension;
 pub struct Plastic {
     /// Yield stress σ_y, Pa.
     yield_stress: f64,
-    /// Hardening modulus H, Pa.
-    hardening: f64,
+    hardening: Hardening,
     /// Lamé's λ, Pa; in plane stress that of the sheet.
     lambda: f64,
     /// Shear modulus G, Pa.
@@ -42,6 +44,14 @@ pub struct Plastic {
     is_sheet: bool,
     /// Whether the elastic strain is logarithmic.
     is_logarithmic: bool,
+}
+
+/// Dependence of the yield stress on the plastic state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Hardening {
+    /// σ_y + H ε̄ with the hardening modulus H, Pa.
+    Linear(f64),
+    JohnsonCook(JohnsonCook),
 }
 
 pub const YIELD_STRESS: Key = Key {
@@ -57,7 +67,7 @@ pub const YIELD_STRESS: Key = Key {
 pub const HARDENING: Key = Key {
     name: "hardening_modulus",
     meaning: "hardening modulus H, Pa: slope of the yield stress over the equivalent plastic \
-              strain; 0 if not given",
+              strain; with `hardening_exponent` its factor; 0 if not given",
     kind: Kind::Optional {
         range: 0.0..f64::INFINITY,
         words: "at least 0",
@@ -75,9 +85,10 @@ pub const STRAIN_MEASURE: Key = Key {
 /// been returned to the yield surface could flow again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// Tolerance of the yield surface for logarithmic strains. After a return to the yield surface, the round-off
-/// of b_e is larger, because it scales with the square of the stretches.
-const LOGARITHMIC_SURFACE: f64 = 1e-9;
+/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. After a return
+/// to the yield surface, the round-off of b_e is larger, because it scales with the square of the stretches.
+/// Heating can make the yield stress small compared with the round-off of the stress.
+const WIDE_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys; `None` if there is no error.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
@@ -92,8 +103,9 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
         if is_logarithmic {
             return fault(&STRAIN_MEASURE, "`\"logarithmic\"` needs `yield_stress`");
         }
-        values.get(HARDENING.name)?;
-        return fault(&HARDENING, "needs `yield_stress`");
+        let hardening = values.get(HARDENING.name).map(|_| &HARDENING);
+        let key = hardening.or_else(|| johnson_cook::first_given(values))?;
+        return fault(key, "needs `yield_stress`");
     }
     if is_logarithmic && matches!(dimension, Dimension::PlaneStress { .. }) {
         return fault(
@@ -113,7 +125,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
             "a body that yields has `stress = \"st-venant-kirchhoff\"`",
         );
     }
-    None
+    johnson_cook::fault(values)
 }
 
 impl Plastic {
@@ -127,7 +139,10 @@ impl Plastic {
         let is_sheet = matches!(given.dimension, Dimension::PlaneStress { .. });
         Some(Self {
             yield_stress: number(&YIELD_STRESS)?,
-            hardening: number(&HARDENING).unwrap_or(0.0),
+            hardening: JohnsonCook::of(given.values).map_or_else(
+                || Hardening::Linear(number(&HARDENING).unwrap_or(0.0)),
+                Hardening::JohnsonCook,
+            ),
             lambda: if is_sheet {
                 2.0 * shear * ratio / (1.0 - ratio)
             } else {
@@ -140,34 +155,42 @@ impl Plastic {
     }
 
     /// Return the properties for display.
-    pub fn described(&self) -> [(&'static str, Property); 3] {
+    pub fn described(&self) -> Vec<(&'static str, Property)> {
         let strain = if self.is_logarithmic {
             "logarithmic"
         } else {
             "Green–Lagrange"
         };
-        [
+        let (modulus, more) = match &self.hardening {
+            Hardening::Linear(modulus) => (*modulus, Vec::new()),
+            Hardening::JohnsonCook(law) => (law.modulus(), law.described()),
+        };
+        let mut facts = vec![
             ("yield stress", Property::Number(self.yield_stress, "Pa")),
-            ("hardening", Property::Number(self.hardening, "Pa")),
-            ("strain measure", Property::Text(strain)),
-        ]
+            ("hardening", Property::Number(modulus, "Pa")),
+        ];
+        facts.extend(more);
+        facts.push(("strain measure", Property::Text(strain)));
+        facts
     }
 
     /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
-    /// state. `None` if the logarithmic strain does not exist.
+    /// state in a step of this length (s); 0 if no time passes. `None` if the logarithmic strain does not
+    /// exist.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
         state: &mut PlasticState,
+        step: f64,
     ) -> Option<(SMatrix<f64, D, D>, f64)> {
         if self.is_logarithmic {
-            return logarithmic::at(self, gradient, state);
+            return logarithmic::at(self, gradient, state, step);
         }
         let mut strain = Matrix3::zeros();
         let in_plane = matrix(&green_strain(&rows(gradient)));
         strain.view_mut((0, 0), (D, D)).copy_from(&in_plane);
         let trial = self.stress(&(strain - tensor_of(&state.strain)));
-        if let Some(flow) = self.flow(&trial, state) {
+        if let Some(flow) = self.flow(&trial, state, step) {
             logarithmic::add(&mut state.strain, &flow);
         }
         let elastic = strain - tensor_of(&state.strain);
@@ -223,7 +246,7 @@ impl Plastic {
 
     /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))² with the current yield stress σ. This
     /// factor is the square of the ratio of the secant shear modulus to G. It is 1 before any flow and never
-    /// grows.
+    /// grows, because σ does not contain the factor of rate and temperature.
     ///
     /// The deviation z grows with ε̄. With the ratio instead of its square, the energy of the control would
     /// grow with the plastic work, and limit loads would contain a part of this energy.
@@ -233,51 +256,107 @@ impl Plastic {
         (limit / (limit + 3.0 * self.shear * state.equivalent)).powi(2)
     }
 
-    /// Return the current yield stress of this state, Pa.
+    /// Return the current yield stress of this state without the factor of rate and temperature, Pa.
     fn limit(&self, state: &PlasticState) -> f64 {
-        self.yield_stress + self.hardening * state.equivalent
-    }
-
-    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄ and the plastic work.
-    /// `None` if the stress is inside the yield surface or not finite.
-    pub fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) -> Option<Matrix3<f64>> {
-        let (limit, most) = (self.limit(state), equivalent(trial));
-        let surface = if self.is_logarithmic {
-            LOGARITHMIC_SURFACE
-        } else {
-            SURFACE
-        };
-        // A stress of NaN or infinity is ignored here; the check for finite fields reports such values.
-        let flows = most > limit * (1.0 + surface) && most.is_finite();
-        if !flows {
-            return None;
+        match &self.hardening {
+            Hardening::Linear(modulus) => self.yield_stress + modulus * state.equivalent,
+            Hardening::JohnsonCook(law) => law.by_strain(state.equivalent),
         }
-        let (growth, change) = if self.is_sheet {
-            self.in_a_sheet(trial, limit)
-        } else {
-            let growth = (most - limit) / (3.0 * self.shear + self.hardening);
-            (growth, deviator(trial) * (1.5 * growth / most))
-        };
-        state.equivalent += growth;
-        state.work += (limit + 0.5 * self.hardening * growth) * growth;
-        Some(change)
     }
 
-    /// Return Δε̄ and ΔE_p = x S_d in plane stress.
+    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄, the plastic work and the
+    /// factor of rate and temperature. `step` is the length of the step (s), 0 if no time passes. `None` if
+    /// the stress is inside the yield surface or not finite.
+    pub fn flow(
+        &self,
+        trial: &Matrix3<f64>,
+        state: &mut PlasticState,
+        step: f64,
+    ) -> Option<Matrix3<f64>> {
+        let most = equivalent(trial);
+        // A stress of NaN or infinity is ignored here; the check for finite fields reports such values.
+        let flows = |allowed: f64| most > allowed && most.is_finite();
+        match &self.hardening {
+            Hardening::Linear(modulus) => {
+                let limit = self.limit(state);
+                let surface = if self.is_logarithmic {
+                    WIDE_SURFACE
+                } else {
+                    SURFACE
+                };
+                if !flows(limit * (1.0 + surface)) {
+                    return None;
+                }
+                let (growth, change) = if self.is_sheet {
+                    self.in_a_sheet(trial, limit, *modulus)
+                } else {
+                    let growth = (most - limit) / (3.0 * self.shear + modulus);
+                    (growth, deviator(trial) * (1.5 * growth / most))
+                };
+                state.equivalent += growth;
+                state.work += (limit + 0.5 * modulus * growth) * growth;
+                Some(change)
+            }
+            Hardening::JohnsonCook(law) => {
+                let surface = law.surface(state, step);
+                if !flows(surface.limit + WIDE_SURFACE * surface.by_strain) {
+                    law.rest(&surface, state);
+                    return None;
+                }
+                let doubled = 2.0 * self.shear;
+                Some(if self.is_sheet {
+                    let x = law.flow(&self.modes_of_sheet(trial), &surface, state);
+                    deviator(&self.shrunk_in_sheet(trial, x)) * x
+                } else {
+                    let modes = Modes {
+                        squares: [0.0, most * most],
+                        stiffnesses: [doubled; 2],
+                    };
+                    let x = law.flow(&modes, &surface, state);
+                    deviator(trial) * (x / (1.0 + x * doubled))
+                })
+            }
+        }
+    }
+
+    /// Return the parts of a trial stress (Pa) in plane stress.
     ///
     /// The final stress is S = S_trial − x C Π S, with the stiffness C in plane stress and the projection Π
     /// to the deviator, S_d = Π S. C and Π have the same eigenvectors. Each eigencomponent of the trial
     /// stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of C Π.
-    /// q then decreases with x and is convex, so Newton's method converges to the root from one side.
-    fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64) -> (f64, Matrix3<f64>) {
+    fn modes_of_sheet(&self, trial: &Matrix3<f64>) -> Modes {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
-        let even = 2.0 * (self.lambda + self.shear) / 3.0;
-        let uneven = 2.0 * self.shear;
-        let hardening = 2.0 / 3.0 * self.hardening;
-        let squares = [
-            0.25 * (xx + yy) * (xx + yy),
-            0.75 * (xx - yy) * (xx - yy) + 3.0 * xy * xy,
-        ];
+        Modes {
+            squares: [
+                0.25 * (xx + yy) * (xx + yy),
+                0.75 * (xx - yy) * (xx - yy) + 3.0 * xy * xy,
+            ],
+            stiffnesses: [2.0 * (self.lambda + self.shear) / 3.0, 2.0 * self.shear],
+        }
+    }
+
+    /// Return the stress (Pa) in plane stress from a trial stress and x (1/Pa).
+    fn shrunk_in_sheet(&self, trial: &Matrix3<f64>, x: f64) -> Matrix3<f64> {
+        let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
+        let [even, uneven] = self.modes_of_sheet(trial).stiffnesses;
+        let sum = 0.5 * (xx + yy) / (1.0 + x * even);
+        let difference = 0.5 * (xx - yy) / (1.0 + x * uneven);
+        let shear = xy / (1.0 + x * uneven);
+        let mut stress = Matrix3::from_diagonal(&[sum + difference, sum - difference, 0.0].into());
+        stress[(0, 1)] = shear;
+        stress[(1, 0)] = shear;
+        stress
+    }
+
+    /// Return Δε̄ and ΔE_p = x S_d in plane stress with a hardening modulus (Pa).
+    ///
+    /// q decreases with x and is convex, so Newton's method converges to the root from one side.
+    fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64, modulus: f64) -> (f64, Matrix3<f64>) {
+        let Modes {
+            squares,
+            stiffnesses: [even, uneven],
+        } = self.modes_of_sheet(trial);
+        let hardening = 2.0 / 3.0 * modulus;
         let mut x = 0.0;
         for _ in 0..100 {
             let shrunk = [1.0 + x * even, 1.0 + x * uneven];
@@ -294,12 +373,7 @@ impl Plastic {
                 break;
             }
         }
-        let sum = 0.5 * (xx + yy) / (1.0 + x * even);
-        let difference = 0.5 * (xx - yy) / (1.0 + x * uneven);
-        let shear = xy / (1.0 + x * uneven);
-        let mut stress = Matrix3::from_diagonal(&[sum + difference, sum - difference, 0.0].into());
-        stress[(0, 1)] = shear;
-        stress[(1, 0)] = shear;
+        let stress = self.shrunk_in_sheet(trial, x);
         (2.0 / 3.0 * x * equivalent(&stress), deviator(&stress) * x)
     }
 }
@@ -341,11 +415,36 @@ mod tests {
         }
     }
 
-    fn law(dimension: Dimension) -> Plastic {
+    /// Keys of hardening by strain, strain rate and heating. The temperature rises by about half of the melting
+    /// range.
+    const JOHNSON_COOK: [(&str, f64); 8] = [
+        ("hardening_modulus", 0.02),
+        ("hardening_exponent", 0.3),
+        ("strain_rate_coefficient", 0.04),
+        ("reference_strain_rate", 1e-3),
+        ("thermal_softening_exponent", 1.1),
+        ("initial_temperature", 300.0),
+        ("melting_temperature", 1300.0),
+        ("volumetric_heat_capacity", 5e-5),
+    ];
+
+    fn law_with(dimension: Dimension, more: &[(&str, f64)]) -> Plastic {
         let mut values = Values::defaults(super::super::KEYS);
         values.set(YIELD_STRESS.name, YIELD.into());
         values.set(HARDENING.name, HARDENING_MODULUS.into());
+        for (key, value) in more {
+            values.set(key, (*value).into());
+        }
         Plastic::of(&given(dimension, &values)).unwrap()
+    }
+
+    fn law(dimension: Dimension) -> Plastic {
+        law_with(dimension, &[])
+    }
+
+    /// Length of a step of the random walk, s. Rates are both below and above the reference strain rate.
+    fn duration(number: usize) -> f64 {
+        [0.01, 1e4, 1.0, 100.0][number % 4]
     }
 
     /// Generate displacement gradients of a random walk, with some large steps.
@@ -364,9 +463,14 @@ mod tests {
 
     fn check<const D: usize>(law: &Plastic) {
         let mut state = PlasticState::default();
-        for gradient in walk::<D>() {
+        let (mut hardened, mut hottest) = (0, 0.0_f64);
+        let tolerance = match law.hardening {
+            Hardening::Linear(_) => 1e-12,
+            Hardening::JohnsonCook(_) => 1e-11,
+        };
+        for (number, gradient) in walk::<D>().enumerate() {
             let before = state;
-            law.at(&gradient, &mut state);
+            law.at(&gradient, &mut state, duration(number));
             let strain = matrix(&green_strain(&rows(&gradient)));
             let mut elastic = -tensor_of(&state.strain);
             for a in 0..D {
@@ -375,13 +479,15 @@ mod tests {
                 }
             }
             let stress = law.stress(&elastic);
-            let over = equivalent(&stress) / law.limit(&state) - 1.0;
-            assert!(over < 1e-12, "{over}");
+            let over = equivalent(&stress) / law.limit(&state) - 1.0 - state.yield_change;
+            assert!(over < tolerance, "{over}");
             assert!(state.work >= before.work && state.equivalent >= before.equivalent);
             let flow = tensor_of(&state.strain) - tensor_of(&before.strain);
             assert!(flow.trace().abs() < 1e-16);
-            if state != before {
-                assert!(over > -1e-12, "{over}");
+            hottest = hottest.min(state.yield_change);
+            if state.equivalent > before.equivalent {
+                hardened += usize::from(state.yield_change > 0.0);
+                assert!(over > -tolerance, "{over}");
                 // The increment of the plastic strain is along the deviator; its length gives the increment
                 // of the equivalent strain.
                 let growth = state.equivalent - before.equivalent;
@@ -390,26 +496,38 @@ mod tests {
             }
             // A stress that has been returned to the yield surface does not flow again.
             let after = state;
-            law.at(&gradient, &mut state);
+            law.at(&gradient, &mut state, 0.0);
             assert_eq!(state, after);
         }
         assert!(state.equivalent > 0.1, "{state:?}");
+        if let Hardening::JohnsonCook(_) = law.hardening {
+            assert!(hardened > 20 && hottest < -0.1, "{hardened} {hottest}");
+        }
     }
 
     #[test]
     fn the_yield_surface_is_not_left_and_flow_dissipates() {
-        check::<3>(&law(Dimension::Space));
-        check::<2>(&law(Dimension::PlaneStrain { thickness: 1.0 }));
-        check::<2>(&law(Dimension::PlaneStress { thickness: 1.0 }));
+        for more in [&[][..], &JOHNSON_COOK] {
+            check::<3>(&law_with(Dimension::Space, more));
+            check::<2>(&law_with(Dimension::PlaneStrain { thickness: 1.0 }, more));
+            check::<2>(&law_with(Dimension::PlaneStress { thickness: 1.0 }, more));
+        }
     }
 
     #[test]
     fn a_sheet_flows_as_the_solid_that_is_free_across_it() {
-        let sheet = law(Dimension::PlaneStress { thickness: 1.0 });
-        let solid = law(Dimension::Space);
+        for more in [&[][..], &JOHNSON_COOK] {
+            sheet_as_solid(more);
+        }
+    }
+
+    fn sheet_as_solid(more: &[(&str, f64)]) {
+        let sheet = law_with(Dimension::PlaneStress { thickness: 1.0 }, more);
+        let solid = law_with(Dimension::Space, more);
         let [mut of_sheet, mut of_solid] = [PlasticState::default(); 2];
-        for gradient in walk::<2>() {
-            let (stress, energy) = sheet.at(&gradient, &mut of_sheet).unwrap();
+        for (number, gradient) in walk::<2>().enumerate() {
+            let step = duration(number);
+            let (stress, energy) = sheet.at(&gradient, &mut of_sheet, step).unwrap();
             let mut whole = Matrix3::zeros();
             whole.fixed_view_mut::<2, 2>(0, 0).copy_from(&gradient);
             // Find by bisection the displacement gradient across the sheet at which the stress across the
@@ -417,14 +535,14 @@ mod tests {
             let [mut low, mut high] = [-0.3, 0.3];
             for _ in 0..80 {
                 whole[(2, 2)] = 0.5 * (low + high);
-                let (stress, _) = solid.at(&whole, &mut of_solid.clone()).unwrap();
+                let (stress, _) = solid.at(&whole, &mut of_solid.clone(), step).unwrap();
                 if stress[(2, 2)] > 0.0 {
                     high = whole[(2, 2)];
                 } else {
                     low = whole[(2, 2)];
                 }
             }
-            let (wanted, wanted_energy) = solid.at(&whole, &mut of_solid).unwrap();
+            let (wanted, wanted_energy) = solid.at(&whole, &mut of_solid, step).unwrap();
             let wanted: Matrix2<f64> = wanted.fixed_view::<2, 2>(0, 0).into_owned();
             assert!((stress - wanted).norm() < 1e-9 * YIELD, "{stress} {wanted}");
             assert!((energy - wanted_energy).abs() < 1e-9 * YIELD);
@@ -446,7 +564,7 @@ mod tests {
             let elastic = super::super::Stress::of("st-venant-kirchhoff", &given, hooke);
             let gradient = Matrix2::new(1e-3, 2e-3, -5e-4, 1e-3);
             let mut state = PlasticState::default();
-            let (stress, energy) = law.at(&gradient, &mut state).unwrap();
+            let (stress, energy) = law.at(&gradient, &mut state, 0.0).unwrap();
             let (wanted, wanted_energy) = elastic.at(&gradient).unwrap();
             assert_eq!(state, PlasticState::default());
             assert!((stress - wanted).norm() < 1e-14 * wanted.norm());

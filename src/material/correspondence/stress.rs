@@ -60,10 +60,13 @@ impl Stress {
         }
     }
 
+    /// Name for display of the stress of bodies that yield.
+    pub const OF_PLASTIC: &'static str = "St. Venant–Kirchhoff";
+
     /// Return the name for display.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::StVenantKirchhoff(_) => "St. Venant–Kirchhoff",
+            Self::StVenantKirchhoff(_) => Self::OF_PLASTIC,
             Self::Willberg2022(_) => "C:E as Cauchy stress (Willberg et al. 2022)",
             Self::NeoHooke(_) => "neo-Hooke",
         }

@@ -173,7 +173,14 @@ impl<const D: usize> Law<D> for Pals {
     }
 
     #[inline(always)]
-    fn update_point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(
+        &self,
+        _: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
         let d = self.ordinary.dimension();
         let [dilatation, extension, square] = [sums[0], sums[1], sums[2]];
         let mean = dilatation / d;

@@ -76,7 +76,6 @@ impl<const D: usize> Forces<D> {
         comm: &dyn Communicator,
         model: &Model<D>,
         mut acting: Acting<'_, D>,
-        bond_update: BondUpdate,
         times: &mut ForceTimes,
     ) {
         self.broken.sort_by_key(|broken| broken.point);
@@ -104,7 +103,7 @@ impl<const D: usize> Forces<D> {
         let halo_before = times.halo;
         let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
         for points in self.ranges(own.iter().copied()) {
-            self.find_numbers(points, model, &mut acting, bond_update);
+            self.find_numbers(points, model, &mut acting);
         }
         let changed = self.send_numbers(comm, model, own, times);
         for points in self.ranges(changed.into_iter()) {
@@ -115,13 +114,9 @@ impl<const D: usize> Forces<D> {
 
     /// Recompute the point numbers of some points. Record the energy that the points lose by this change,
     /// except the part that plastic flow dissipates.
-    fn find_numbers(
-        &mut self,
-        points: Range<usize>,
-        model: &Model<D>,
-        acting: &mut Acting<'_, D>,
-        bond_update: BondUpdate,
-    ) {
+    fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
+        // The states of the points have already advanced over the step.
+        let bond_update = BondUpdate::Step(0.0);
         let Acting { force, plastic, .. } = acting;
         let before = self.held(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {

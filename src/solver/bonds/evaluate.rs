@@ -165,7 +165,7 @@ impl<const D: usize> Forces<D> {
                 force,
                 plastic,
             };
-            self.settle(comm, model, acting, bond_update, times);
+            self.settle(comm, model, acting, times);
         }
     }
 
@@ -395,13 +395,12 @@ impl<const D: usize> Forces<D> {
                     });
             }
             Pass::PointSum(number) => {
-                let keeps = bond_update.is_stored();
                 if number == 0 {
                     let rotations = &mut self.limits.rotations;
                     (self.numbers).find_rotations(points.clone(), model, blocks, rotations);
                 }
                 self.numbers
-                    .finish(number, points, model, blocks, plastic, keeps);
+                    .finish(number, points, model, blocks, plastic, bond_update);
             }
             Pass::Force => {}
         }

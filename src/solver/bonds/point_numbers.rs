@@ -9,6 +9,7 @@ use crate::lanes::Column;
 use crate::material::{Counts, Law, MOST, PlasticState};
 use crate::solver::model::Model;
 
+use super::force::BondUpdate;
 use super::interaction::BlockLaws;
 
 /// Number of points that one task processes.
@@ -156,8 +157,8 @@ impl PointNumbers {
         });
     }
 
-    /// Compute the point numbers of some owned points from the sums of a pass. If `keeps`, store plastic flow
-    /// in `plastic`.
+    /// Compute the point numbers of some owned points from the sums of a pass. If `bond_update` stores changes,
+    /// store plastic flow in `plastic`.
     pub fn finish<const D: usize>(
         &mut self,
         pass: usize,
@@ -165,8 +166,9 @@ impl PointNumbers {
         model: &Model<D>,
         blocks: &[BlockLaws],
         plastic: &mut PlasticColumns<'_>,
-        keeps: bool,
+        bond_update: BondUpdate,
     ) {
+        let step = bond_update.history_step().unwrap_or(0.0);
         let mut columns: [&mut [f64]; COLUMNS] = std::array::from_fn(|_| &mut [][..]);
         for (place, column) in self.columns.iter_mut().enumerate() {
             columns[place] = &mut column[points.clone()];
@@ -196,11 +198,12 @@ impl PointNumbers {
                 }
                 let before = PlasticState::of(std::array::from_fn(|p| get(PLASTIC + p)));
                 let mut after = before;
-                Law::<D>::update_point(law, pass, &sums[..counts.sum], &mut numbers, &mut after);
+                let sums = &sums[..counts.sum];
+                Law::<D>::update_point(law, pass, sums, &mut numbers, &mut after, step);
                 for (column, number) in columns.iter_mut().zip(numbers).take(found) {
                     column[k] = number;
                 }
-                if keeps && after != before {
+                if bond_update.is_stored() && after != before {
                     for (column, number) in columns[PLASTIC..].iter_mut().zip(after.numbers()) {
                         column[k] = number;
                     }

@@ -237,6 +237,14 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
+    /// Factor of strain rate and temperature on the yield stress of a point in the last step, minus 1; none
+    /// without plasticity.
+    yield_change: Option<Vec<f64>> = Description {
+        name: "yield_change",
+        unit: "1",
+        birth: Birth::Mixed,
+        ..STATE
+    };
     /// Energy density of the zero-energy control that the point would have if plastic flow did not reduce the
     /// control, J/m³; none without plasticity.
     control_energy: Option<Vec<f64>> = Description {
@@ -396,10 +404,11 @@ pub struct Needs {
 pub fn plastic_columns<'a>(
     strain: &'a mut Option<[Vec<f64>; 6]>,
     equivalent: &'a mut Option<Vec<f64>>,
+    yield_change: &'a mut Option<Vec<f64>>,
     control: &'a mut Option<Vec<f64>>,
     work: &'a mut Option<Vec<f64>>,
 ) -> PlasticColumns<'a> {
-    let fields: [&mut dyn Columns; 4] = [strain, equivalent, control, work];
+    let fields: [&mut dyn Columns; 5] = [strain, equivalent, yield_change, control, work];
     let mut columns = fields.into_iter().flat_map(Columns::columns_mut);
     std::array::from_fn(|_| columns.next().map(Vec::as_mut_slice).unwrap_or_default())
 }
@@ -520,6 +529,7 @@ impl<const D: usize> Fields<D> {
             overshoot_energy: needs.damage.then(scalar),
             plastic_strain: needs.plasticity.then(|| std::array::from_fn(|_| scalar())),
             plastic_strain_equivalent: needs.plasticity.then(scalar),
+            yield_change: needs.plasticity.then(scalar),
             control_energy: needs.plasticity.then(scalar),
             plastic_work: needs.plasticity.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
