@@ -27,6 +27,7 @@ mod laws {
     mod correspondence_plastic;
     mod declarations;
     mod elasticity;
+    mod fatigue;
     mod interfaces;
     mod invariants;
     mod ordinary_history;

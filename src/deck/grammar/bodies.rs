@@ -14,8 +14,8 @@ use crate::deck::spanned::Spanned;
 pub struct Body {
     /// Name of the material.
     pub material: Text,
-    /// Name of the damage law. Without one, bonds never break. Exceptions are bonds of `softening_pmb`, and
-    /// pairs of bodies with their own damage law.
+    /// Name of the damage law. Without one, bonds never break. Exceptions are bonds of `softening_pmb` and
+    /// `fatigue_pmb`, and pairs of bodies with their own damage law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
