@@ -28,6 +28,7 @@ mod laws {
     mod correspondence_plastic;
     mod declarations;
     mod elasticity;
+    mod fatigue;
     mod interfaces;
     mod invariants;
     mod johnson_cook;

@@ -57,6 +57,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
         report.line(name, value);
     }
     match laws.damage {
+        None if laws.wears_out => report.line("damage", "fatigue"),
         None => report.line("damage", "none"),
         Some(damage) => {
             match damage {

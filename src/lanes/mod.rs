@@ -1,6 +1,6 @@
 //! Vectors of eight numbers: the same quantity of eight bonds or points.
 //!
-//! The operations are IEEE operations on plain arrays without contraction, and the exponential of `libm`.
+//! The operations are IEEE operations on plain arrays without contraction, and functions of `libm`.
 //! Therefore all instruction sets give bitwise the same results. Operations that depend on the instruction
 //! set, such as fused multiply-adds, are in [`simd`].
 
@@ -67,6 +67,13 @@ impl Lanes {
     #[inline(always)]
     pub fn exp(self) -> Self {
         self.map(libm::exp)
+    }
+
+    /// Power with the same exponent in all lanes. Each lane is a call of a function that gives the same result
+    /// on every processor.
+    #[inline(always)]
+    pub fn pow(self, exponent: f64) -> Self {
+        self.map(|base| libm::pow(base, exponent))
     }
 
     /// The smaller of each pair of lanes. If either is NaN, the result is the lane of `other`.

@@ -174,6 +174,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     type Force = [Lanes; D];
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const FORCE_READS_STRETCH: bool = true;
+    const WEARS_OUT: bool = true;
 
     #[inline(never)]
     fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
@@ -291,6 +292,11 @@ impl<const D: usize> Law<D> for AnyLaw {
     #[inline(never)]
     fn lost_stiffness(&self, history: &Self::BondHistory) -> Lanes {
         with_law!(self, law => Law::<D>::lost_stiffness(law, &first(history)))
+    }
+
+    #[inline(never)]
+    fn is_worn_out<S: Simd>(&self, simd: S, history: &Self::BondHistory) -> u8 {
+        with_law!(self, law => Law::<D>::is_worn_out(law, simd, &first(history)))
     }
 
     #[inline(never)]

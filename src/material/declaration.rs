@@ -44,6 +44,9 @@ pub struct Declaration {
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
     /// `None` if a damage law breaks the bonds.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
+    /// Whether the law also breaks bonds by their history, beside a damage law. Bonds of such a law break
+    /// without a damage law too.
+    pub wears_out: bool,
     /// Check the horizon, and return an error message if it is wrong; `None` if every horizon is allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
     /// Whether the law, with these values of its keys, scales a critical stretch that follows from a fracture
@@ -74,6 +77,7 @@ impl Declaration {
             breaks_by_stress: false,
             critical_stretch: None,
             own_critical_stretch: None,
+            wears_out: false,
             horizon_fault: None,
             scales_thresholds: |_| false,
             build,

@@ -18,6 +18,7 @@ pub mod bond;
 mod correspondence;
 mod declaration;
 mod elastic_plastic_pmb;
+mod fatigue_pmb;
 mod force_state;
 mod influence;
 mod linear_microelastic;
@@ -53,6 +54,7 @@ registration::register! {
     pmb::Pmb,
     elastic_plastic_pmb::ElasticPlasticPmb,
     softening_pmb::SofteningPmb,
+    fatigue_pmb::FatiguePmb,
     normalised::Normalised,
     tensor_pmb::TensorPmb,
     linear_microelastic::LinearMicroelastic,
@@ -172,6 +174,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Whether the law overrides [`Self::lost_stiffness`].
     const SOFTENS: bool = false;
+
+    /// Whether the law overrides [`Self::is_worn_out`].
+    const WEARS_OUT: bool = false;
+
+    /// Whether [`Self::force`] or [`Self::bond_energy`] reads the bond history. Otherwise the history is
+    /// computed only in evaluations that store it.
+    const FORCE_READS_HISTORY: bool = true;
 
     /// Whether the stress of a point is the mean of the stresses of its bonds, so that
     /// [`Self::bond_stress_across`] replaces [`Self::stress_across`].
@@ -369,6 +378,14 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
+    }
+
+    /// Return one bit per bond that breaks by its history at one end, beside the damage law. The bond breaks
+    /// if this bit is set at an end whose force state acts on the bond. Checked after each step that stores
+    /// the history.
+    #[inline(always)]
+    fn is_worn_out<S: Simd>(&self, _simd: S, _history: &Self::BondHistory) -> u8 {
+        0
     }
 
     /// Return a spring constant k (N/m⁷) per bond that bounds the energy of one end: W ≤ ½ Σ k (|Y| − |ξ|)²

@@ -79,12 +79,15 @@ macro_rules! register {
             DECLARATIONS.iter().copied().flatten()
         }
 
-        // `Declaration::linear` must agree with `Law::LINEAR`.
+        // `Declaration::linear` and `Declaration::wears_out` must agree with `Law::LINEAR` and
+        // `Law::WEARS_OUT`.
         $(
             const _: () = {
                 let mut k = 0;
                 while k < <$law as Declared>::DECLARATIONS.len() {
-                    assert!(<$law as Declared>::DECLARATIONS[k].linear == <$law as Law<3>>::LINEAR);
+                    let declared = &<$law as Declared>::DECLARATIONS[k];
+                    assert!(declared.linear == <$law as Law<3>>::LINEAR);
+                    assert!(declared.wears_out == <$law as Law<3>>::WEARS_OUT);
                     k += 1;
                 }
             };

@@ -36,7 +36,8 @@ pub struct Body {
 impl Body {
     /// Test whether bonds of the body can break, by a damage law or by the law of its material.
     pub fn can_break(&self) -> bool {
-        self.damage.is_some() || self.material.law.declaration.breaks_by_itself()
+        let law = self.material.law.declaration;
+        self.damage.is_some() || law.breaks_by_itself() || law.wears_out
     }
 
     /// Test whether the points are the centres or Gauss points of the cells of a lattice.

@@ -29,7 +29,7 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     // Only the points at the ends of bonds across the cut matter; for state-based laws, the families of these
     // points matter too.
     let reach = f64::from(ratio);
-    let alone = ["pmb", "elastic_plastic_pmb", "softening_pmb"];
+    let alone = ["pmb", "elastic_plastic_pmb", "softening_pmb", "fatigue_pmb"];
     let wide = if alone.iter().any(|name| law.starts_with(name)) {
         reach
     } else {
@@ -251,6 +251,15 @@ fn of_the_softening_law() {
         let costs = [2, 3].map(|ratio| cost::<3>("3d", ratio, &law, "", 0.05));
         compare(&format!("3d {curve}"), costs, 1.0, [0.06, 0.03]);
     }
+}
+
+#[test]
+fn of_the_law_with_fatigue() {
+    // Without cycles, bonds break by the damage law only.
+    let law = "fatigue_pmb = { density = 1, youngs_modulus = 3e3, cycles_per_second = 1, fatigue_coefficient = 1, \
+               fatigue_exponent = 1 }";
+    in_a_bar(law);
+    in_the_plane(law, 1.0);
 }
 
 #[test]

@@ -565,6 +565,15 @@ fn blocks_of_a_law_whose_bonds_soften() {
 }
 
 #[test]
+fn blocks_of_a_law_whose_bonds_wear_out() {
+    let law = "fatigue_pmb = { density = 2, youngs_modulus = 5, cycles_per_second = 1, \
+               fatigue_coefficient = 1e4, fatigue_exponent = 1.7, fatigue_limit = 0.001 }";
+    let deck = with_one_law(law);
+    same_with_either_family("fatigue", &deck);
+    same_everywhere("fatigue-balance", &(deck + "\n" + RESTLESS), true);
+}
+
+#[test]
 fn scattered_points_from_a_file() {
     same_everywhere("block", BLOCK, true);
     let law = "[material.rubber.elastic_plastic_pmb]\nyield_stretch = 0.02";

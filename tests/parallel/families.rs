@@ -241,6 +241,14 @@ fn bonds_that_soften() {
     }
 }
 
+#[test]
+fn bonds_that_wear_out() {
+    let keys = ", cycles_per_second = 1, fatigue_coefficient = 10, fatigue_exponent = 1.7";
+    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
+    compare::<3>(&deck(SOLID, "fatigue_pmb", keys, grid, "0"));
+    compare::<2>(&deck(PLANE, "fatigue_pmb", keys, grid, "0.25"));
+}
+
 /// Return a point file of a plate, written with few digits. The points are regular, except for the map
 /// `place` of x.
 fn plate_from_file(place: impl Fn(f64) -> f64) -> String {

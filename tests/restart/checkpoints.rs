@@ -454,6 +454,21 @@ fn bonds_that_soften_go_on_as_if_they_had_never_stopped() {
 }
 
 #[test]
+fn bonds_that_wear_out_go_on_as_if_they_had_never_stopped() {
+    let law = "fatigue_pmb = { density = 2440, youngs_modulus = 72e9, cycles_per_second = 1e6, \
+               fatigue_coefficient = 1e6, fatigue_exponent = 2 }";
+    for (name, family) in [("worn", "lattice"), ("worn-listed", "list")] {
+        let broken = &goes_on(name, law, family)["history broken_bonds"];
+        let broken: Vec<f64> = broken.iter().map(|bits| f64::from_bits(*bits)).collect();
+        let middle = broken[broken.len() / 2];
+        assert!(
+            middle > 0.0 && broken[broken.len() - 1] > middle,
+            "{broken:?}"
+        );
+    }
+}
+
+#[test]
 fn points_that_flow_go_on_as_if_they_had_never_stopped() {
     let law = "correspondence = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.2, yield_stress = 10e6, hardening_modulus = 1e9 }";
     dissipates(&goes_on("flowing", law, "auto"));

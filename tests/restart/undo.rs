@@ -158,3 +158,13 @@ fn of_bonds_that_soften_and_break() {
         });
     }
 }
+
+#[test]
+fn of_bonds_that_wear_out_and_break() {
+    let law = "fatigue_pmb = { density = 2, youngs_modulus = 5, cycles_per_second = 1, fatigue_coefficient = 1e4, \
+               fatigue_exponent = 2 }";
+    for family in ["lattice", "list"] {
+        let deck = plate(law, 0.0, family).replace("damage = 'brittle', ", "");
+        undone_and_made_again(&deck, breaks);
+    }
+}

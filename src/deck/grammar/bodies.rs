@@ -15,7 +15,7 @@ pub struct Body {
     /// Name of the material.
     pub material: Text,
     /// Name of the damage law. Without a damage law, bonds never break. Exceptions are bonds of
-    /// `softening_pmb`, and pairs of bodies with their own damage law.
+    /// `softening_pmb` and `fatigue_pmb`, and pairs of bodies with their own damage law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.

@@ -157,6 +157,7 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
         damage: own_critical_stretch(problem, body, constants)
             .map(softened)
             .or_else(|| damage.map(|damage| damage_law(problem, body, damage, constants))),
+        wears_out: body.material.law.declaration.wears_out,
         weibull: damage.and_then(|damage| damage.weibull),
         direction: damage.and_then(|damage| damage.direction),
         pairs: pair_reads(problem, body),
@@ -311,7 +312,7 @@ fn criterion(
     // A critical stretch in the deck is used as given, for any horizon.
     let is_given = ends.map(|block| match &problem.block(block).body.damage {
         Some(damage) => matches!(damage.toughness, Toughness::CriticalStretch(_)),
-        None => problem.block(block).body.can_break(),
+        None => (problem.block(block).body.material.law.declaration).breaks_by_itself(),
     });
     let stretch_ratios: HorizonRatios = horizons.map(|horizon| {
         let ratio = |k: usize| (problem.block(ends[k]).horizon / horizon).sqrt();
@@ -384,6 +385,13 @@ pub fn assign<const D: usize>(
             }
         });
         weigh(problem, model, &mut bonds, &ends)?;
+        let wears_out = |block: &Block| block.body.material.law.declaration.wears_out;
+        if *pair_damage == InterfaceDamage::Unbreakable
+            && [&here, &there].into_iter().any(wears_out)
+        {
+            // The law breaks bonds by their history whatever the criterion.
+            bonds.protect(|_| true);
+        }
         let stiffness = ends.each_ref().map(|end| end.stiffness);
         let criterion = match (pair_damage, ends.each_ref().map(|end| end.pair_damage)) {
             (InterfaceDamage::Unbreakable, _) => Criterion::Never,

@@ -173,7 +173,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let of_other_kind = problem.bodies.iter().find(|other| {
         let of_other = match &other.damage {
             Some(damage) => breaks(other, damage),
-            None if other.can_break() => Breaks::Stretch,
+            None if other.material.law.declaration.breaks_by_itself() => Breaks::Stretch,
             None => return false,
         };
         of_other != own && meets(other)

@@ -111,6 +111,34 @@ impl<L> Force<L> {
         weights.sum(i, j)
     }
 
+    /// Time increment of the bond history that the evaluation computes, s; `None` if it computes no history.
+    #[inline(always)]
+    fn advances_history<const D: usize>(&self) -> Option<f64>
+    where
+        L: Law<D>,
+    {
+        if L::BondHistory::COUNT > 0 && (L::FORCE_READS_HISTORY || self.bond_update.is_stored()) {
+            self.bond_update.history_step()
+        } else {
+            None
+        }
+    }
+
+    /// Return a bit for each bond that breaks by its history at an end that acts on it.
+    #[inline(always)]
+    fn worn_out<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> u8
+    where
+        L: Law<D>,
+    {
+        if !L::WEARS_OUT || !self.bond_update.is_stored() {
+            return 0;
+        }
+        let [law_i, law_j] = &self.laws;
+        let [acts_i, acts_j] = group.weights.acting();
+        let [history_i, history_j] = &group.history;
+        law_i.is_worn_out(simd, history_i) & acts_i | law_j.is_worn_out(simd, history_j) & acts_j
+    }
+
     /// Return a bit for each bond that breaks.
     #[inline(always)]
     fn breaks<S: Simd, const D: usize>(
@@ -124,7 +152,7 @@ impl<L> Force<L> {
     {
         let breaking =
             (self.criterion).breaking::<S, L, D>(simd, &group.bond, self.ends(group), work);
-        group.intact & group.breakable & breaking
+        group.intact & group.breakable & (breaking | self.worn_out(simd, group))
     }
 
     #[inline(always)]
@@ -173,9 +201,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
-        if L::BondHistory::COUNT > 0
-            && let Some(step) = self.bond_update.history_step()
-        {
+        if let Some(step) = self.advances_history() {
             let [own, far] = &self.laws;
             let [here, there] = group.points();
             group.history = [

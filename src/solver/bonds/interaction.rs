@@ -26,6 +26,8 @@ pub struct BlockLaws {
     pub law: AnyLaw,
     /// Damage law of the block, if it has one.
     pub damage: Option<DamageLaw>,
+    /// Whether the law also breaks bonds by their history.
+    pub wears_out: bool,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
     /// Factor of the critical work by the direction of a bond; `None` if it is 1 in all directions.
@@ -64,9 +66,10 @@ impl PairReads {
 }
 
 impl BlockLaws {
-    /// Whether bonds of the points can break by the damage law of the block or of a pair of bodies.
+    /// Whether bonds of the points can break by the damage law of the block or of a pair of bodies, or by
+    /// their history.
     pub fn has_breakable_bonds(&self) -> bool {
-        self.damage.is_some() || self.pairs.breaks
+        self.damage.is_some() || self.pairs.breaks || self.wears_out
     }
 
     /// Whether thresholds differ between points and are stored per point.
