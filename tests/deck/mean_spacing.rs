@@ -181,7 +181,7 @@ fn errors_of_meshes_and_files_are_those_of_a_deck_with_a_number() {
         (
             "block = 2",
             "block = 1",
-            "[body.fine] points mesh: [body.coarse] takes these elements already",
+            "[body.fine] points mesh: [body.coarse] already uses these elements",
         ),
     ] {
         let deck = folder.write("changed.toml", &text.replace(old, new));

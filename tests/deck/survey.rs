@@ -228,8 +228,8 @@ fn numbers_that_no_solid_has() {
             "material = 'glass', damage = 'brittle',",
         ) + &format!("damage.brittle.critical_stretch.critical_stretch = {stretch}\n")
     };
-    let expected = "[body.plate] damage: its bonds break at a stretch of 2.500, at 3.500 times their \
-                    length";
+    let expected = "[body.plate] damage: its bonds break at a stretch of 2.500, that is, at 3.500 times \
+                    their initial length";
     let timid = brittle(2.5).replace("time.end = 1", "time = { end = 1, safety = 0.7 }");
     assert_eq!(warnings(&timid), [expected]);
     assert!(warnings(&brittle(0.5)).is_empty());
