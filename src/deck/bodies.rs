@@ -313,8 +313,14 @@ fn point_source(
             let edges = &spacing[..scope.dimension];
             let longest = edges.iter().copied().fold(0.0, f64::max);
             if let (Some(number), true) = (&body.horizon, longest > horizon) {
+                // A horizon of the grid that contains the mean spacing has been copied to the bodies.
+                let key = if number.span() == grid.horizon.span() {
+                    "[grid]"
+                } else {
+                    key
+                };
                 let message = format!(
-                    "{key} horizon: {} m is smaller than the spacing {} m, so no point would have \
+                    "{key} horizon: {} m is smaller than the spacing of [body.{name}], {} m, so no point would have \
                      a neighbour",
                     format_number(horizon),
                     format_number(longest)

@@ -135,11 +135,12 @@ pub fn conditions(
                 action: action(scope, &key, condition)?,
             };
             let (set, dimension) = (&sets[resolved.set], scope.dimension);
-            let bodies = set.possible_bodies(bodies);
+            let possible = set.possible_bodies(bodies);
             let needs_depth = |body: &&problem::Body| resolved.divisor(body, dimension).is_none();
-            let has_all_bodies = matches!(set.selector, Selector::All | Selector::Body(_));
-            match bodies.iter().find(needs_depth) {
-                Some(body) if has_all_bodies || bodies.iter().all(|body| needs_depth(&body)) => {
+            let has_points_of_each = matches!(set.selector, Selector::All | Selector::Body(_));
+            let without: Vec<_> = possible.iter().filter(needs_depth).collect();
+            match without.first() {
+                Some(body) if has_points_of_each || without.len() == possible.len() => {
                     Err(scope.source.locate(resolved.no_depth(body)))
                 }
                 _ => Ok(resolved),

@@ -1,16 +1,15 @@
 //! Fatigue of microelastic bonds: f = c s e, until the remaining life λ of the bond is used up.
 //!
-//! Silling & Askari 2014, SAND2014-18590. In a cyclic load with the load ratio R, a bond with the stretch s at
-//! the peak of the load has the cyclic strain ε = (1 − R) s. Its remaining life begins at 1 and decreases with
-//! the number N of cycles:
+//! Silling & Askari 2014, SAND2014-18590. In a cyclic load with the load ratio R, a bond has the stretches s and R s
+//! at the largest and the smallest load. If one of them is positive, the cyclic strain of the bond is
+//! ε = (1 − R) |s|, otherwise it is 0. Its remaining life begins at 1 and decreases with the number N of cycles:
 //!
 //! dλ/dN = −A (ε − ε∞)^m for ε > ε∞, otherwise 0.
 //!
 //! The bond breaks when λ reaches 0. In a constant cyclic strain this is after 1/(A (ε − ε∞)^m) cycles.
 //! In the field of a crack with ε∞ = 0, the crack grows by da/dN ∝ ΔK^m.
 //!
-//! The law stores the used life 1 − λ. A time step Δt is a block of ν Δt cycles with the stretches at its end,
-//! where ν is the number of cycles per second. λ does not change the force of an intact bond.
+//! The law stores the used life 1 − λ. A time step is a block of cycles with the stretches at its end. λ does not change the force of an intact bond.
 //!
 //! The report has separate constants A and m for the nucleation of cracks (phase I) and for their growth
 //! (phase II). This law has one pair of constants for both phases.
@@ -27,7 +26,7 @@ use crate::lanes::{IsaSet, Lanes, Simd};
 pub struct FatiguePmb {
     /// The elastic part.
     pub elastic: Pmb,
-    /// Number of cycles per second ν, 1/s.
+    /// Number of cycles per second, 1/s.
     pub cycles_per_second: f64,
     /// Load ratio R: smallest load divided by largest load of a cycle.
     pub load_ratio: f64,
@@ -41,7 +40,7 @@ pub struct FatiguePmb {
 
 const CYCLES_PER_SECOND: Key = Key {
     name: "cycles_per_second",
-    meaning: "number ν of load cycles per unit of the time t, 1/s",
+    meaning: "number of load cycles per unit of the time t, 1/s",
     kind: Kind::POSITIVE,
 };
 
@@ -96,7 +95,7 @@ impl Declared for FatiguePmb {
         ],
         ..Declaration::new(
             "fatigue_pmb",
-            "f = c s e; a bond with the cyclic strain ε = (1 − R) s also breaks after \
+            "f = c s e; a bond with the cyclic strain ε = (1 − R) |s| also breaks after \
              1/(A (ε − ε∞)^m) load cycles",
             build,
         )
@@ -152,13 +151,21 @@ impl<const D: usize> Law<D> for FatiguePmb {
         [used]: &[Lanes; 1],
         step: f64,
     ) -> [Lanes; 1] {
-        let strain = bond.stretch * (1.0 - self.load_ratio);
+        let range = bond.stretch * (1.0 - self.load_ratio);
+        // With a negative load ratio, a bond that the largest load compresses is stretched by the smallest load.
+        let strain = if self.load_ratio < 0.0 {
+            range.abs()
+        } else {
+            range
+        };
         let excess = (strain - Lanes::splat(self.limit)).max(Lanes::splat(0.0));
-        if excess.above(0.0) == 0 {
+        if step == 0.0 || excess.above(0.0) == 0 {
             return [*used];
         }
-        let cycles = self.cycles_per_second * step;
-        [*used + excess.pow(self.exponent) * (self.coefficient * cycles)]
+        // The product of 0 and infinity would be NaN, and bonds with this used life would never break.
+        let factor = self.coefficient * self.cycles_per_second * step;
+        let factor = factor.clamp(f64::MIN_POSITIVE, f64::MAX);
+        [*used + excess.pow(self.exponent) * factor]
     }
 
     #[inline(always)]

@@ -171,7 +171,10 @@ fn layer<const D: usize>(
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
         let body = problem.body_of(usize::from(model.block[*point as usize]));
-        let edge = spacing(problem, body, D);
+        // The set of a condition that acts in no stage may have points without a single spacing.
+        let Some(edge) = problem.bodies[body].single_spacing(D) else {
+            continue;
+        };
         let position = model.position(*point as usize);
         let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edge).floor() as i64);
         cells[0].extend_from_slice(bytemuck::cast_slice(&[
@@ -203,12 +206,6 @@ fn layer<const D: usize>(
     }
 }
 
-/// Return the cell edge of a body in a layer, m.
-fn spacing(problem: &Problem, body: usize, dimension: usize) -> f64 {
-    let spacing = problem.bodies[body].single_spacing(dimension);
-    spacing.expect("the conditions are only valid with a spacing")
-}
-
 /// Return the thickness of a layer and the cell edge, m. The thickness is the mean length of rows of adjacent
 /// cells, in the direction with the shortest rows. If the layer has points of several bodies, they are the
 /// numbers of the body whose thickness differs most from its cell edge. `None` if there are no cells.
@@ -226,7 +223,7 @@ fn thickness<const D: usize>(problem: &Problem, cells: &HashSet<[i64; 4]>) -> Op
         };
         own().next()?;
         let cells_deep = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
-        let edge = spacing(problem, body, D);
+        let edge = problem.bodies[body].single_spacing(D)?;
         Some([cells_deep * edge, edge])
     };
     let difference = |[thickness, edge]: &[f64; 2]| libm::log(thickness / edge).abs();

@@ -567,6 +567,24 @@ fn steps_follow_the_limits_of_an_adaptive_step() {
 }
 
 #[test]
+fn loads_that_act_in_no_stage_need_no_depth() {
+    let folder = Folder::new("idle-load");
+    let path = folder.write("points.csv", "x,y,volume\n0,20,1\n1,20,1\n");
+    let text = plate(&format!(
+        "body.other = {{ material = 'glass', points.file = '{}' }}
+        set.low.where = 'y < 1 || y > 15'
+        condition.press = {{ set = 'low', traction = [0, 1] }}
+        stage = [{{ end = 0.5, off = ['press'] }}, {{ off = ['press'] }}]",
+        path.display()
+    ));
+    let found = warnings(&text);
+    assert!(
+        found.iter().all(|text| !text.contains("depth")),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn points_of_two_bodies_at_one_position_are_told() {
     let folder = Folder::new("coincident");
     let mut points = String::from("x,y,volume,block\n");

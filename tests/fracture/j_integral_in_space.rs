@@ -95,8 +95,8 @@ fn a_crack_through_a_thick_strip_releases_the_energy_ahead_of_it() {
 
 /// With u_z = 0, a slab is in plane strain. Energy and integrals of the slab are 0.5 % smaller than in the plane
 /// problem. J also agrees with the energy of the slab. J of the two outer layers of points, whose families are
-/// incomplete, is 4 % smaller than J of the two inner layers. The box `outermost` has a weight in one outer layer only. The box `part` has the weights 0.75, 1, 0.5
-/// and 0 in the four layers.
+/// incomplete, is 4 % smaller than J of the two inner layers. The box `outermost` has a weight in one outer layer
+/// only. The box `part` has the weights 0.75, 1, 0.5 and 0 in the four layers.
 #[test]
 fn a_slab_without_strain_across_it_has_the_integral_of_plane_strain() {
     let law = "correspondence = { poisson_ratio = 0.3";
@@ -275,6 +275,38 @@ fn the_integral_has_equal_bits_on_any_ranks_and_threads() {
                 recorded.datasets[name] == *bits,
                 "{ranks} {threads}: {name}"
             );
+        }
+    }
+}
+
+/// Integrals that differ only in `front` are inversely proportional to the lengths of the fronts. The points need
+/// not lie at the centres of their cells, and the surfaces need not be perpendicular to the front.
+#[test]
+fn a_front_is_as_long_as_the_body() {
+    for grid in ["", ", quadrature = 'gauss'", ", jitter = 0.3"] {
+        let deck = format!(
+            "dimension = '3d'
+            grid = {{ spacing = 1, horizon = 2{grid} }}
+            material.glass.correspondence = {{ density = 2, youngs_modulus = 5, poisson_ratio = 0.2 }}
+            body.plate = {{ material = 'glass', shape.box = {{ lower = [-8, -2, -8], upper = [8, 2, 8] }} }}
+            initial.opening.displacement = ['1e-4*x*z*z', '1e-4*y*x', '1e-5*z*x']
+            time = {{ end = 1e-3, step = 1e-3 }}
+            [history.j_integral]
+            x = {{ lower = [-11, -11, -5], upper = [11, 11, 5], direction = [0, 0, 1], front = [1, 0, 0] }}
+            y = {{ lower = [-11, -11, -5], upper = [11, 11, 5], direction = [0, 0, 1], front = [0, 1, 0] }}
+            xy = {{ lower = [-11, -11, -5], upper = [11, 11, 5], direction = [0, 0, 1], front = [1, 2, 0] }}
+            "
+        );
+        let [x, y, xy] = simulate(&deck, |mut simulation: Simulation<3>| {
+            let mut history = HistoryObserver::new(&simulation).unwrap();
+            let values = row(&mut history, &mut simulation).values;
+            ["x", "y", "xy"].map(|name| values[column(&history, &format!("j_integral_{name}"))])
+        });
+        assert!(x != 0.0, "{grid}");
+        let lengths = [16.0, 4.0, 20_f64.sqrt()];
+        for (integral, length) in [x, y, xy].into_iter().zip(lengths) {
+            let ratio = integral * length / (x * 16.0);
+            assert!((ratio - 1.0).abs() < 1e-9, "{grid}: {length} {ratio}");
         }
     }
 }

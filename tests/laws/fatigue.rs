@@ -123,6 +123,31 @@ fn a_bond_below_the_limit_or_in_compression_lives_forever() {
 }
 
 #[test]
+fn with_reversed_loads_both_signs_use_up_the_same_life() {
+    let keys =
+        "cycles_per_second = 1, fatigue_coefficient = 1e4, fatigue_exponent = 2, load_ratio = -1";
+    let found = [0.01, -0.01].map(|stretch| {
+        simulate::<1, _>(&pair(&law(keys), ""), |mut simulation| {
+            blocks(&mut simulation, stretch, [0.03, 20.0])
+        })
+    });
+    // A block uses 0.03 · 1e4 · 0.02² = 0.12 of the life.
+    assert_eq!(found, [Some(9.0); 2]);
+}
+
+#[test]
+fn a_step_of_length_zero_uses_up_no_life() {
+    // The cyclic strain overflows when it is squared.
+    let keys = "cycles_per_second = 1e300, fatigue_coefficient = 1e300, fatigue_exponent = 2, load_ratio = -1e300";
+    simulate::<1, _>(&pair(&law(keys), ""), |mut simulation| {
+        displace(&mut simulation, |x| x.map(|x| x * 1.01));
+        simulation.evaluate(BondUpdate::Step(0.0));
+        assert_eq!(simulation.fields.broken_bonds.as_ref().unwrap(), &[0.0; 2]);
+        assert_eq!(blocks(&mut simulation, 0.01, [1.0, 3.0]), Some(1.0));
+    });
+}
+
+#[test]
 fn the_damage_law_breaks_bonds_too() {
     let keys = "cycles_per_second = 1, fatigue_coefficient = 1, fatigue_exponent = 1";
     let damage = "damage.brittle.critical_stretch.critical_stretch = 0.05";

@@ -46,8 +46,8 @@ pub const EXPONENT: Key = Key {
     name: "hardening_exponent",
     meaning: "exponent n of the hardening σ_y + H ε̄ⁿ (Johnson & Cook 1983); 1 if not given",
     kind: Kind::Optional {
-        range: f64::MIN_POSITIVE..f64::INFINITY,
-        words: "above 0",
+        range: f64::MIN_POSITIVE..1_f64.next_up(),
+        words: "above 0 and at most 1",
     },
 };
 
@@ -186,6 +186,11 @@ pub fn fault(values: &Values) -> Option<LawFault> {
             format!("must be above `{initial_name}` = {initial}, is {melting}"),
         );
     }
+    let to_melt = values.number(HEAT_CAPACITY.name) * (melting - initial);
+    if !to_melt.is_normal() || !to_melt.recip().is_normal() {
+        let message = "times the range of temperatures must be a finite number above 0";
+        return fault(&HEAT_CAPACITY, message.to_owned());
+    }
     None
 }
 
@@ -215,9 +220,10 @@ impl Modes {
 pub struct Surface {
     /// A + B ε̄ⁿ at the start of the step, Pa.
     pub by_strain: f64,
-    /// Yield stress at the start of the step, below the reference strain rate, Pa.
+    /// Yield stress at the start of the step, below the reference strain rate, Pa. If no time passes, it contains
+    /// the factor of the strain rate of the last step.
     pub limit: f64,
-    /// Factor on A + B ε̄ⁿ below the reference strain rate.
+    /// Ratio of `limit` to `by_strain`.
     factor: f64,
     /// Increment of ε̄ at the reference strain rate. Infinite if the yield stress does not depend on the rate.
     threshold: f64,
@@ -254,9 +260,9 @@ impl JohnsonCook {
             facts.push(("reference strain rate", rate));
         }
         if self.heating > 0.0 {
-            facts.push(("thermal softening", number(self.softening_exponent)));
+            facts.push(("softening exponent", number(self.softening_exponent)));
             let melting = Property::Number(1.0 / self.heating, "J/m³");
-            facts.push(("dissipated energy to melt", melting));
+            facts.push(("energy to melt", melting));
         }
         facts
     }
@@ -297,7 +303,7 @@ impl JohnsonCook {
         if self.heating == 0.0 {
             return 1.0;
         }
-        let temperature = (self.heating * work).min(1.0);
+        let temperature = (self.heating * work).clamp(0.0, 1.0);
         (1.0 - libm::pow(temperature, self.softening_exponent)).max(MOLTEN)
     }
 
@@ -326,7 +332,9 @@ impl JohnsonCook {
         let [trial, ..] = modes.at(0.0);
         // q is at most trial/(1 + x soft), so q is below the limit here.
         let most = (trial / surface.limit - 1.0) / soft;
-        let [mut low, mut high] = [0.0, most / (1.0 + most * stiff)];
+        // x must stay finite, also if the yield stress is below the round-off of the trial stress.
+        let largest = (1.0 - f64::EPSILON) / stiff;
+        let [mut low, mut high] = [0.0, (most / (1.0 + most * stiff)).min(largest)];
         let mut u: f64 = high;
         let mut found = [0.0; 3];
         for _ in 0..MOST_ITERATIONS {
@@ -622,6 +630,32 @@ mod tests {
                 "{case}: {hardened} {q}"
             );
         }
+    }
+
+    #[test]
+    fn a_yield_stress_below_the_round_off_of_the_stress_gives_finite_flow() {
+        let law = JohnsonCook {
+            yield_stress: 1e-12,
+            modulus: 0.0,
+            exponent: 0.5,
+            rate_coefficient: 0.0,
+            reference_rate: 1.0,
+            softening_exponent: 1.0,
+            heating: 0.0,
+        };
+        let state = PlasticState::default();
+        let surface = law.surface(&state, 1.0);
+        let modes = Modes {
+            squares: [0.0, 1e16],
+            stiffnesses: [60e9, 93e9],
+        };
+        let found = law.root(&modes, &surface, 0.0);
+        assert!(found.iter().all(|value| value.is_finite()), "{found:?}");
+        // The whole strain is plastic.
+        assert!(
+            (found[1] / (2.0 / 3.0 * 1e8 / 93e9) - 1.0).abs() < 1e-9,
+            "{found:?}"
+        );
     }
 
     #[test]

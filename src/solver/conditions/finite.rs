@@ -60,9 +60,11 @@ pub fn are_finite<const D: usize>(
                 looker.look(&key, &COMPONENTS, place, set, values)?;
             }
             Action::BodyForce(values, factors) => {
-                let divisors = condition.divisors(&problem.bodies, D);
-                let least = divisors.into_iter().fold(f64::INFINITY, f64::min);
-                let factors = factors.iter().map(|factor| factor / least);
+                // The smallest divisor gives the largest load.
+                let bodies = problem.sets[set].possible_bodies(&problem.bodies);
+                let divisors = condition.divisors(bodies, D);
+                let smallest_divisor = divisors.into_iter().fold(f64::INFINITY, f64::min);
+                let factors = factors.iter().map(|factor| factor / smallest_divisor);
                 let values = values.iter().map(Some).zip(factors);
                 looker.look(&key, &COMPONENTS, place, set, values)?;
             }

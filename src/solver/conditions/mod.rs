@@ -13,7 +13,7 @@ use crate::comm::{Communicator, total};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::set;
-use crate::problem::{Action, Body, Condition, Output, Problem};
+use crate::problem::{Action, Body, Condition, Depth, Output, Problem};
 use crate::refine::{Grids, SetFractions};
 
 use super::model::Model;
@@ -131,6 +131,9 @@ fn have_depths<const D: usize>(
     condition: &Condition,
     points: &[u32],
 ) -> Result<()> {
+    if condition.depth != Some(Depth::Spacing) {
+        return Ok(());
+    }
     let dimension = problem.dimension.count();
     let mut without = vec![0; problem.bodies.len()];
     for point in points {
@@ -243,7 +246,8 @@ impl<const D: usize> Conditions<D> {
                     let points = loaded(problem, model, grids, condition.set);
                     // All ranks add the same loads, also those without points.
                     let dimension = problem.dimension.count();
-                    for divisor in condition.divisors(&problem.bodies, dimension) {
+                    let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);
+                    for divisor in condition.divisors(bodies, dimension) {
                         let is_divided = |point: u32| {
                             let body = body_of(problem, model, point);
                             condition.divisor(body, dimension) == Some(divisor)

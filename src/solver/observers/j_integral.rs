@@ -22,7 +22,8 @@ use crate::solver::Simulation;
 use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
-/// Relative tolerance of the distance between the box and the ends of the bodies.
+/// Tolerance of the distance between the box and the ends of the bodies, relative to the margin, and of the
+/// components of the direction of growth.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.
@@ -117,7 +118,7 @@ fn is_in_the_bodies<const D: usize>(
 ) -> Result<()> {
     let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
     let key = format!("[history.j_integral.{}]", rule.name);
-    let grows_along = |d: usize| rule.direction[d] != 0.0;
+    let grows_along = |d: usize| rule.direction[d].abs() > ROUND_OFF;
     let is_within = |position: [f64; 3], margin: f64| {
         (0..D).all(|d| {
             let margin = if grows_along(d) { margin } else { 0.0 };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::comm;
 use crate::error::{Error, Result};
-use crate::problem::JIntegral;
+use crate::problem::{JIntegral, PointSource};
 use crate::solver::Simulation;
 
 /// Weight of an owned point.
@@ -63,6 +63,65 @@ fn extent(edges: [f64; 3], direction: [f64; 3]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
+/// Return the centre and the edges of the cell that an owned point fills, m, and whether the cells of its body fill
+/// the body without gaps.
+fn cell<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    point: usize,
+) -> ([f64; 3], [f64; 3], bool) {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let block = problem.block(usize::from(model.block[point]));
+    let position = model.position(point);
+    let PointSource::Lattice {
+        spacing, origin, ..
+    } = block.body.points
+    else {
+        return (position, edges(simulation, point), false);
+    };
+    // At the surface of a refined body, each point fills a cell of level 0. Gauss points, and points that
+    // `jitter` has moved, do not lie at the centres of their cells.
+    let middle = |d: usize| {
+        let number = ((position[d] - origin[d]) / spacing[d]).floor();
+        origin[d] + (number + 0.5) * spacing[d]
+    };
+    let middle = match block.level {
+        0 => std::array::from_fn(middle),
+        _ => position,
+    };
+    (middle, spacing, true)
+}
+
+/// Tolerance for a line parallel to a face of a cell, relative to the edge of the cell. With it, a line along a
+/// face between two cells lies in both.
+const FACE: f64 = 1e-9;
+
+/// Return the range of the line {a · `direction`} in a box with this centre and these edges (m), by a (m).
+fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
+    let mut range = f64::NEG_INFINITY..f64::INFINITY;
+    for d in 0..3 {
+        let half = 0.5 * edges[d];
+        if direction[d] == 0.0 {
+            if centre[d].abs() > half * (1.0 + FACE) {
+                return None;
+            }
+            continue;
+        }
+        let ends = [-half, half].map(|side| (centre[d] + side) / direction[d]);
+        range.start = range.start.max(ends[0].min(ends[1]));
+        range.end = range.end.min(ends[0].max(ends[1]));
+    }
+    (range.start < range.end).then_some(range)
+}
+
+/// Return the range of the line {a · `direction`} that belongs to a point at most one edge beside the line, by
+/// a (m).
+fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
+    let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
+    let across = (0..3).map(|d| (position[d] - along * direction[d]).powi(2));
+    let half = 0.5 * extent(edges, direction);
+    (across.sum::<f64>() <= edges[0].powi(2)).then_some(along - half..along + half)
+}
+
 /// Integrate q along the part of a line that lies in the bodies, m. The line passes through the centre of the
 /// box along the crack front. Collective.
 ///
@@ -77,23 +136,21 @@ pub fn front_length<const D: usize>(
     let centre: [f64; 3] = std::array::from_fn(|d| 0.5 * (rule.lower[d] + rule.upper[d]));
     let (mut start, mut end) = ([f64::INFINITY], [f64::NEG_INFINITY]);
     for point in 0..model.owned() {
-        let position = model.position(point);
-        // At the surface of a refined body, each point fills its cell of level 0.
-        let level = simulation
-            .problem
-            .block(usize::from(model.block[point]))
-            .level;
-        let edges = edges(simulation, point).map(|edge| libm::scalbn(edge, level as i32));
-        let offset: [f64; 3] = std::array::from_fn(|d| position[d] - centre[d]);
-        let along: f64 = (0..3).map(|d| offset[d] * front[d]).sum();
-        let across = (0..3).map(|d| (offset[d] - along * front[d]).powi(2));
-        let edge = edges.into_iter().fold(0.0, f64::max);
+        let (middle, edges, is_of_lattice) = cell(simulation, point);
         let is_near_the_box = (0..3)
-            .all(|d| position[d] > rule.lower[d] - edge && position[d] < rule.upper[d] + edge);
-        if is_near_the_box && across.sum::<f64>() <= edge.powi(2) {
-            let half = 0.5 * extent(edges, front);
-            start[0] = start[0].min(along - half);
-            end[0] = end[0].max(along + half);
+            .all(|d| middle[d] > rule.lower[d] - edges[d] && middle[d] < rule.upper[d] + edges[d]);
+        if !is_near_the_box {
+            continue;
+        }
+        let offset: [f64; 3] = std::array::from_fn(|d| middle[d] - centre[d]);
+        let covered = if is_of_lattice {
+            part_in_box(offset, edges, front)
+        } else {
+            part_near(offset, edges, front)
+        };
+        if let Some(covered) = covered {
+            start[0] = start[0].min(covered.start);
+            end[0] = end[0].max(covered.end);
         }
     }
     comm::min(comm, &mut start);
