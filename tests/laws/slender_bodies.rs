@@ -42,18 +42,17 @@ impl Load {
 /// Return the stiffness of the middle of a square bar divided by the stiffness of the beam. `across` is the
 /// number of points across, with unit spacing. The difference of the strain energies of two lengths
 /// eliminates the ends.
-fn stiffness((law, correction): (&str, &str), horizon: f64, across: u32, load: Load) -> f64 {
-    let held = horizon.ceil() as u32;
+fn stiffness((law, correction): (&str, &str), across: u32, load: Load) -> f64 {
     let curvature = 1e-4 / f64::from(across);
     let energy = |length: u32| {
         let (half_length, half) = (f64::from(length) / 2.0, f64::from(across) / 2.0);
         let text = format!(
             "dimension = '3d'
             parameters.k = {curvature}
-            grid = {{ spacing = 1, horizon = {horizon}, volume_correction = '{correction}', origin = [-{half_length}, -{half}, -{half}] }}
+            grid = {{ spacing = 1, horizon = 3.015, volume_correction = '{correction}', origin = [-{half_length}, -{half}, -{half}] }}
             material.solid.{law}
             body.bar = {{ material = 'solid', shape.box = {{ lower = [-{half_length}, -{half}, -{half}], upper = [{half_length}, {half}, {half}] }} }}
-            set.ends.where = 'abs(x) > {half_length} - {held}'
+            set.ends.where = 'abs(x) > {half_length} - 4'
             condition.ends = {{ set = 'ends', displacement = {} }}
             time = {{ end = 1, method = 'relaxation', relaxation = {{ load_steps = 1, tolerance = 1e-5 }} }}
             ",
@@ -68,7 +67,7 @@ fn stiffness((law, correction): (&str, &str), horizon: f64, across: u32, load: L
             row(&mut history, &mut simulation).energies.strain
         })
     };
-    let lengths = [3, 5].map(|times| times * across + 2 * held);
+    let lengths = [3 * across + 8, 5 * across + 8];
     let [short, long] = lengths.map(energy);
     let by_length = (long - short) / f64::from(lengths[1] - lengths[0]);
     by_length / (0.5 * load.stiffness(f64::from(across)) * curvature * curvature)
@@ -81,7 +80,7 @@ fn check(across: u32, rows: &[(&str, [f64; 2])]) {
             "correspondence = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, {control} }}"
         );
         for (load, wanted) in [Load::Torsion, Load::Bending].into_iter().zip(wanted) {
-            let found = stiffness((&law, "none"), 3.015, across, load);
+            let found = stiffness((&law, "none"), across, load);
             println!("{across} {control} {load:?}: {found:.3}");
             assert!(
                 (found - wanted).abs() < 0.011,
@@ -133,32 +132,12 @@ fn surface_corrections_of_bars() {
             "{law} = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, surface_correction = '{correction}' }}"
         );
         for (load, wanted) in [Load::Tension, Load::Bending].into_iter().zip(wanted) {
-            let found = stiffness((&table, "exact"), 3.015, across, load);
+            let found = stiffness((&table, "exact"), across, load);
             println!("{law} {across} {correction} {load:?}: {found:.3}");
             assert!(
                 (found - wanted).abs() < 0.011,
                 "{law} {across} {correction} {load:?}: {found}"
             );
         }
-    }
-}
-
-/// The conditions of `pals` for strains across a thin bar depend on few bonds. They must not be dropped.
-#[test]
-fn pals_in_bars_thinner_than_a_horizon() {
-    let law = format!(
-        "ordinary = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, surface_correction = 'pals' }}"
-    );
-    for (horizon, across) in [
-        (3.015, 2),
-        (3.015, 3),
-        (4.0, 2),
-        (4.0, 3),
-        (5.0, 3),
-        (5.0, 4),
-    ] {
-        let found = stiffness((&law, "none"), horizon, across, Load::Tension);
-        println!("{horizon} {across}: {found:.3}");
-        assert!((found - 1.0).abs() < 0.03, "{horizon} {across}: {found}");
     }
 }

@@ -9,15 +9,15 @@ use crate::material::symmetric::mixed;
 /// at a corner of a block is about 0.4.
 const SMALLEST: f64 = 0.1;
 
-/// Largest allowed σ/σ₀. Without a limit, σ/σ₀ reaches 1.8 at edges of a block. In sheets of two layers, it
-/// reaches 31 for a horizon of 3 spacings, and 224 for 5 spacings.
-const LARGEST: f64 = 500.0;
+/// Largest allowed σ/σ₀. Without a limit and for a horizon of 3 spacings, σ/σ₀ reaches 1.8 at edges of a
+/// block, 12 in bars of three points across, and 30 in sheets of two layers.
+const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest are dropped; their multipliers stay 0.
 ///
-/// The smallest ratio is 0.08 at a corner of a block and 0 in a single layer. In a sheet of two layers, it is
-/// 0.006 for a horizon of 3 spacings, and 0.0004 for 6 spacings.
-const RANK: f64 = 1e-4;
+/// For a horizon of 3 spacings, the smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two
+/// layers, and 0 in a single layer.
+const RANK: f64 = 5e-3;
 
 /// The exponents and the coefficient of a monomial of degree 2 in the components of n or N.
 type Monomial = ([usize; 3], f64);
