@@ -268,7 +268,7 @@ impl Expression {
         evaluate::evaluate(&self.code, &self.tables, self.stack_size, [x, y, z, time])
     }
 
-    /// Compute the change of the value from a time over a step, which may be negative. For most operations,
+    /// Compute the change of the value from `time` to `time + step`; `step` may be negative. For most operations,
     /// round-off is relative to the change, not to the value.
     pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
         let [x, y, z] = position;

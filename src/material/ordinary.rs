@@ -145,9 +145,7 @@ impl Declared for Ordinary {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
         keys: &[INFLUENCE, SURFACE_CORRECTION],
         any_poisson_ratio: true,
-        no_line: Some(
-            "`ordinary` has no 1-D form; use `pmb`, which is the same law in 1-D for ν = 0.25",
-        ),
+        no_line: Some("`ordinary` has no 1-D form; use `pmb`"),
         breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
         scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",

@@ -22,7 +22,7 @@
 //! σ_y²/(6G²).
 //! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
 //! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
-//! Mitchell's plane value 75σ_y²/(8πhδ⁴) belongs to A = 15G, whereas the plane law here has A = 8G.
+//! With the thickness h, Mitchell's plane value is 75σ_y²/(8πhδ⁴). It belongs to A = 15G, whereas the plane law here has A = 8G.
 
 use super::ordinary::{Ordinary, eased_force};
 use super::{

@@ -1,4 +1,4 @@
-//! Prototype microelastic material: f = c s e, w = c s² |ξ| / 2; each end exerts half of the force.
+//! Prototype microelastic material: f = c s Y/|Y|, w = c s² |ξ| / 2; each end exerts half of the force.
 //!
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6.
 //! The micromodulus c follows from equal strain energy under isotropic expansion. Without failure this is the

@@ -180,7 +180,8 @@ impl<const D: usize> Law<D> for TensorPmb {
             * (0.5 * self.micromodulus)
     }
 
-    /// Return the spring constant with the largest absolute row sum of H, an upper bound on the eigenvalues.
+    /// Return an upper bound on the spring constant of a bond. It contains the largest absolute row sum of H, which
+    /// is at least the largest eigenvalue of H.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;

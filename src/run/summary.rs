@@ -14,7 +14,8 @@ pub struct Summary {
     pub bonds: u64,
     /// Number of steps of this run.
     pub steps: u64,
-    /// Number of force evaluations: one per explicit step, and one or more per iteration of a load step.
+    /// Number of force evaluations: one per explicit step and per repeat of a step, and one or more per iteration
+    /// of a load step.
     pub evaluations: u64,
     /// Time step of the last stage, s.
     pub step: f64,

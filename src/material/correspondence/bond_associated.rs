@@ -56,9 +56,7 @@ impl Declared for BondAssociated {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
         keys: KEYS,
         any_poisson_ratio: true,
-        no_line: Some(
-            "`bond_associated_correspondence` has no 1-D form; use `pmb`, which is the same law in 1-D for ν = 0.25",
-        ),
+        no_line: Some("`bond_associated_correspondence` has no 1-D form; use `pmb`"),
         breaks_by_energy: true,
         examples: &[
             "poisson_ratio = 0.4",

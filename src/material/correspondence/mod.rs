@@ -100,9 +100,7 @@ impl Declared for Correspondence {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
         keys: KEYS,
         any_poisson_ratio: true,
-        no_line: Some(
-            "`correspondence` has no 1-D form; use `pmb`, which is the same law in 1-D for ν = 0.25",
-        ),
+        no_line: Some("`correspondence` has no 1-D form; use `pmb`"),
         breaks_by_energy: true,
         breaks_by_stress: true,
         examples: &[
