@@ -45,7 +45,7 @@ impl BodyFigures {
     }
 
     /// Test whether the mean volume of points from a file or a mesh fits their distances, within a factor of
-    /// [`VOLUME_FACTOR`]; `None` for points without neighbours.
+    /// `VOLUME_FACTOR`; `None` for points without neighbours.
     pub fn volumes_fit(&self, dimension: Dimension) -> Option<bool> {
         let cell = self.cell(dimension);
         let ratio = self.volume / self.points as f64 / cell;
