@@ -8,8 +8,8 @@ use super::format::{count, si};
 /// Print the figures of a run with at least one step. For rank 0.
 pub fn print(outcome: &Outcome, threads: usize) {
     let summary = &outcome.summary;
-    let (energies, broken) = match &outcome.last_row {
-        Some(row) => (row.energies, row.broken),
+    let (energies, largest, broken) = match &outcome.last_row {
+        Some(row) => (row.energies, row.largest_energy(), row.broken),
         None => Default::default(),
     };
     let line = |name: &str, value: String| outln!("  {name:<17}{value}");
@@ -29,11 +29,8 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    // After a refinement, the number of bonds is known for the last points only, so the rate is omitted.
-    // After a rebalance, the rate is omitted too, because the time of a rebalance also counts as
-    // `regridding`.
-    let regrids = summary.seconds.regridding > 0.0;
-    if !regrids {
+    // After a refinement, the number of bonds of earlier steps is not known, so the rate is omitted.
+    if !summary.is_refined {
         line("bond updates", si(bond_updates(summary), "/s"));
     }
     outln!("time by phase");
@@ -49,16 +46,7 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("strain", si(energies.strain, "J"));
     line("fracture", si(energies.fracture, "J"));
     line("external work", si(energies.work, "J"));
-    let largest = [
-        energies.kinetic,
-        energies.strain,
-        energies.fracture,
-        energies.work,
-    ]
-    .map(f64::abs)
-    .into_iter()
-    .fold(f64::MIN_POSITIVE, f64::max);
-    let share = energies.error / largest;
+    let share = energies.error / largest.max(f64::MIN_POSITIVE);
     line(
         "balance error",
         format!("{} ({share:.1e} of the largest)", si(energies.error, "J")),

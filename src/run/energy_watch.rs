@@ -6,7 +6,7 @@ use crate::comm::sum::reduce;
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
 use crate::solver::motion::Clock;
-use crate::solver::observers::{Energies, HistoryRow};
+use crate::solver::observers::HistoryRow;
 
 /// Ratio of energy gain to energy input above which a warning is printed. Near the stable step, the energy of
 /// the shortest waves at full steps oscillates by several times its mean, so smaller gains do not prove
@@ -131,24 +131,8 @@ impl EnergyWatch {
     /// [`Self::check`] has already reported this gain. `is_quasi_static`: whether the last stage has load
     /// steps.
     pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
-        let Energies {
-            kinetic,
-            strain,
-            fracture,
-            overshoot: _,
-            work,
-            dissipated,
-            error,
-        } = row.energies;
-        let all = [
-            kinetic,
-            strain,
-            fracture,
-            work,
-            dissipated,
-            row.first_energy,
-        ];
-        let largest = all.map(f64::abs).into_iter().fold(self.floor, f64::max);
+        let error = row.energies.error;
+        let largest = row.largest_energy().max(self.floor);
         let is_reported = self.warned && error > 0.0;
         if is_reported || error.abs() <= MAX_FINAL_ERROR * largest {
             return None;
@@ -182,6 +166,7 @@ impl EnergyWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::observers::Energies;
 
     fn row(energies: Energies) -> HistoryRow {
         HistoryRow {
@@ -230,6 +215,16 @@ mod tests {
         ] {
             let text = of(2.0, error, is_quasi_static).unwrap();
             assert!(text.contains(words), "{text}");
+        }
+        // Energies of contacts and rigid bodies count.
+        for of_bodies in [true, false] {
+            let mut large = energies(2.0, -0.8);
+            *(if of_bodies {
+                &mut large.rigid
+            } else {
+                &mut large.contact
+            }) = 10.0;
+            assert_eq!(watch.check_end(&row(large), false), None);
         }
         watch.warned = true;
         assert_eq!(watch.check_end(&row(energies(2.0, 0.8)), false), None);

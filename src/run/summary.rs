@@ -4,14 +4,17 @@ use std::time::Duration;
 
 use crate::comm;
 use crate::solver::Simulation;
+use crate::solver::refinement::Refined;
 
 /// Size and times of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Summary {
     /// Number of points.
     pub points: u64,
-    /// Number of bonds, intact or broken.
+    /// Number of bonds at the end, intact or broken.
     pub bonds: u64,
+    /// Whether a refinement has changed the bonds since time 0.
+    pub is_refined: bool,
     /// Number of steps of this run.
     pub steps: u64,
     /// Number of force evaluations: one per explicit step and per repeat of a step, and one or more per iteration
@@ -96,6 +99,7 @@ impl Summary {
         Self {
             points: simulation.model.total,
             bonds: comm::total(simulation.comm, simulation.forces.directed_bonds()) / 2,
+            is_refined: simulation.refined != Refined::default(),
             steps,
             step: simulation.clock.step(),
             evaluations: times.evaluations,

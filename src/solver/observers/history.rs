@@ -69,13 +69,17 @@ pub struct Energies {
     pub fracture: f64,
     /// Part of the fracture energy above the criterion of the bonds when they broke.
     pub overshoot: f64,
+    /// Kinetic energy of rigid bodies.
+    pub rigid: f64,
+    /// Energy stored in contacts.
+    pub contact: f64,
     /// Work done by loads and supports, and by the prescribed forces and motions of rigid bodies.
     pub work: f64,
     /// Energy dissipated by viscous damping, plastic flow, softening, viscoelasticity, friction and contact
     /// damping.
     pub dissipated: f64,
-    /// Error of the energy balance kinetic (including rigid bodies) + strain + contact + fracture +
-    /// dissipated − work; 0 for an exact integrator. The error is the change of this sum since the start.
+    /// Error of the energy balance kinetic + rigid + strain + contact + fracture + dissipated − work; 0 for an
+    /// exact integrator. The error is the change of this sum since the start.
     /// Energy that refinements and changes of the density scale have added is subtracted.
     pub error: f64,
 }
@@ -96,6 +100,28 @@ pub struct HistoryRow {
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
+}
+
+impl HistoryRow {
+    /// Return the largest energy of the balance, J, including the energy at the start.
+    pub fn largest_energy(&self) -> f64 {
+        let Energies {
+            kinetic,
+            strain,
+            fracture,
+            overshoot: _,
+            rigid,
+            contact,
+            work,
+            dissipated,
+            error: _,
+        } = self.energies;
+        let start = self.first_energy;
+        let all = [
+            kinetic, strain, fracture, rigid, contact, work, dissipated, start,
+        ];
+        all.map(f64::abs).into_iter().fold(0.0, f64::max)
+    }
 }
 
 impl HistoryObserver {
@@ -282,9 +308,11 @@ impl HistoryObserver {
 
         let dissipated = dissipated + contact.friction + contact.damping;
         let rigid = contact.rigid.iter();
-        let (mut kinetic, mut work) = (own[0], work);
+        // The order of additions is part of the bits of the results.
+        let (mut kinetic, mut rigid_energy, mut work) = (own[0], 0.0, work);
         for (state, energy) in rigid {
             kinetic += energy;
+            rigid_energy += energy;
             work += state.work;
         }
         let energy = kinetic + own[1] + own[2] + contact.energy + dissipated - work;
@@ -294,6 +322,8 @@ impl HistoryObserver {
             strain: own[1],
             fracture: own[2],
             overshoot,
+            rigid: rigid_energy,
+            contact: contact.energy,
             work,
             dissipated,
             error: energy
