@@ -258,7 +258,7 @@ fn inward_normals<const D: usize>(
         if !is_pressure(condition) {
             continue;
         }
-        // The factors of a pressure are −normal/depth.
+        // The factors of a pressure are −normal.
         let mut sum = [ExactSum::ZERO];
         for point in points {
             let inward = inward[*point as usize];
