@@ -118,7 +118,7 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
         let multiple = body.horizon / mean;
         report.line(
             "mean spacing",
-            format_args!("{}, the horizon is {multiple:.3} of it", si(mean, "m")),
+            format_args!("{}, horizon {multiple:.3} times as long", si(mean, "m")),
         );
         report.line("distance of points", si(figures.spacing, "m"));
     }

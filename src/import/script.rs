@@ -143,7 +143,7 @@ impl Script {
             return Ok(());
         }
         if self.commands.len() >= MOST_NODES {
-            return Err((line, "the commands are too many".to_owned()));
+            return Err((line, format!("has more than {MOST_NODES} commands")));
         }
         // The key of the node is the name of the command.
         let node = Node {

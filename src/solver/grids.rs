@@ -60,8 +60,8 @@ pub fn grids(
         };
         let Some(Cells { centre, edges }) = found else {
             let message = format!(
-                "[body.{}]: its points do not lie on a regular grid with one volume for all, as \
-                 `family = \"lattice\"` wants; take \"auto\" or \"list\"",
+                "[body.{}]: `family = \"lattice\"` needs points of equal volume on a regular grid; use \
+                 \"auto\" or \"list\"",
                 body.name
             );
             let wanted = problem.family == FamilyRule::Lattice;

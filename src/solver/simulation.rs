@@ -570,8 +570,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         } else {
             Error::run(format!(
                 "step {step} (t = {time:.6e} s): the motion of point {id} of body `{}` is not finite; reference \
-                 position {position:?} m. A time step beyond the stable one, or a load that grows without bound? (time \
-                 step {:.3e} s, stable {:.3e} s)",
+                 position {position:?} m. Possible causes: a time step above the stable one (time step {:.3e} s, stable \
+                 {:.3e} s), or a load that grows without bound",
                 body.name,
                 self.clock.step(),
                 self.scaled_stable_step(),

@@ -249,7 +249,7 @@ fn a_run_with_the_mean_spacing_restarts_with_the_same_horizon() {
     assert_eq!(full["body"]["plate"]["horizon"].as_float(), Some(horizon));
 
     let printed = succeed(fissure(1).arg("check").arg(&deck));
-    assert!(printed.contains("the horizon is 3.500 of it"), "{printed}");
+    assert!(printed.contains("horizon 3.500 times as long"), "{printed}");
 
     // With a mesh of another area, the horizon differs from that of the checkpoint.
     let old = String::from_utf8(mesh).unwrap();

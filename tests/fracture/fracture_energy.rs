@@ -396,7 +396,7 @@ fn calibrated_by_opening() {
     assert!(matches!(calibrated(&plain), Ok(Cow::Borrowed(_))));
     let large = problem(&text("3d", 9, CORRESPONDENCE, rule));
     let error = calibrated(&large).unwrap_err();
-    let wanted = "[body.block] damage: what opening this body costs cannot be measured";
+    let wanted = "[body.block] damage: `calibration = \"opening\"` needs a body on a lattice";
     assert!(error.message.starts_with(wanted), "{error}");
     assert_eq!(error.span, Some(large.bodies[0].span.clone()));
     let (unmeasured, comm) = (
@@ -404,7 +404,7 @@ fn calibrated_by_opening() {
         alone(),
     );
     let error = Simulation::<2>::new(&unmeasured, &comm).err().unwrap();
-    assert!(error.message.contains("has not been measured"), "{error}");
+    assert!(error.message.contains("is not known"), "{error}");
 }
 
 /// Return the costs of a law in plane strain: for a slide followed by an opening, and for a slanted motion.

@@ -199,7 +199,7 @@ fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Opt
         ));
     }
     if damage.rule.is_unmeasured() {
-        let message = "what opening the body costs has not been measured: take the problem that \
+        let message = "the energy of opening a crack is not known: use the problem that \
                        `solver::calibration::calibrated` returns";
         return Some(message.to_owned());
     }

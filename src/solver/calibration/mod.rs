@@ -24,8 +24,8 @@ pub fn calibrated(problem: &Problem) -> Result<Cow<'_, Problem>> {
         let ratio = separation_energy_ratio(&calibrated, index, 0.0);
         let Some(ratio) = ratio.filter(|ratio| *ratio > 0.0) else {
             let message = format!(
-                "[body.{}] damage: what opening this body costs cannot be measured: `calibration = \"opening\"` is for \
-                 bodies on a lattice with horizons of at most 3 spacings in space and 10 in the plane; take \"energy\"",
+                "[body.{}] damage: `calibration = \"opening\"` needs a body on a lattice with a horizon of at most 3 \
+                 spacings in 3-D and 10 in 2-D; use \"energy\"",
                 body.name
             );
             return Err(Error::input(message).at(&body.span));
