@@ -61,7 +61,9 @@ registration::register! {
     ordinary::Ordinary,
     pals::Pals,
     ordinary_plastic::OrdinaryPlastic,
+    pals::PalsPlastic,
     ordinary_viscoelastic::OrdinaryViscoelastic,
+    pals::PalsViscoelastic,
     correspondence::Correspondence,
     correspondence::BondAssociated,
 }

@@ -134,7 +134,7 @@ pub(super) const INFLUENCE: Key = Key {
     ]),
 };
 
-const SURFACE_CORRECTION: Key = Key {
+pub(super) const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
     meaning: "what each point's own family corrects: nothing, or the influence functions of the dilatation and of the \
               deviatoric energy",

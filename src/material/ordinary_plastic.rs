@@ -24,10 +24,10 @@
 //! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
 //! With the thickness h, Mitchell's plane value is 75σ_y²/(8πhδ⁴). It belongs to A = 15G, whereas the plane law here has A = 8G.
 
-use super::ordinary::{Ordinary, eased_force};
+use super::ordinary::{Ordinary, SURFACE_CORRECTION, eased_force};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind,
-    Law, PlasticState, Property, Word,
+    Law, LawFault, Pals, PalsPlastic, PlasticState, Property, Values, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::{IsaSet, Lanes};
@@ -58,7 +58,7 @@ const CALIBRATION: Key = Key {
 
 impl Declared for OrdinaryPlastic {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
-        keys: &[YIELD_STRESS, CALIBRATION],
+        keys: &[YIELD_STRESS, CALIBRATION, SURFACE_CORRECTION],
         any_poisson_ratio: true,
         no_line: Some("`ordinary_plastic` has no 1-D form; `elastic_plastic_pmb` has"),
         invariants: |_| Invariants {
@@ -66,9 +66,11 @@ impl Declared for OrdinaryPlastic {
             ..Invariants::ALL
         },
         breaks_by_energy: true,
+        fault: Some(fault),
         examples: &[
             "poisson_ratio = 0.3, yield_stress = 0.3",
             "poisson_ratio = 0.2, yield_stress = 0.4, calibration = 'continuum'",
+            "poisson_ratio = 0.4, yield_stress = 0.3, surface_correction = 'pals'",
         ],
         ..Declaration::new(
             "ordinary_plastic",
@@ -80,6 +82,11 @@ impl Declared for OrdinaryPlastic {
 
 fn build(given: &Given) -> Built {
     let stress = given.values.number(YIELD_STRESS.name);
+    if given.values.word(SURFACE_CORRECTION.name) == "pals" {
+        let elastic = Pals::of(given, Influence::Constant);
+        let shear = given.elastic.shear_modulus();
+        return Built::plain(PalsPlastic::new(elastic, stress, shear));
+    }
     let factor = match given.dimension {
         Dimension::Space => 2.5,
         _ => 4.0 / 3.0,
@@ -90,6 +97,17 @@ fn build(given: &Given) -> Built {
         elastic,
         strength: factor * stress * stress,
         whole: (!of_family).then_some(elastic.whole()),
+    })
+}
+
+/// Return the error if the yield limit of complete families is to hold for points that have their own influence functions.
+fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
+    let is_corrected = values.word(SURFACE_CORRECTION.name) != "none";
+    (is_corrected && values.word(CALIBRATION.name) != "family").then(|| LawFault {
+        key: Some(CALIBRATION.name),
+        message: "with `surface_correction = \"pals\"`, the yield limit is always that of each point's own family; \
+                  use \"family\""
+            .to_owned(),
     })
 }
 

@@ -13,10 +13,12 @@
 //! exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
 //! The elastic constants are those of the instantaneous response. The long-term shear modulus is (1 − λ) G.
 
-use super::ordinary::{INFLUENCE, Ordinary, eased_force, influence};
+use super::ordinary::{
+    INFLUENCE, Ordinary, SURFACE_CORRECTION, eased_force, influence, with_influence,
+};
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
-    PlasticState, Property,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Pals,
+    PalsViscoelastic, PlasticState, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
@@ -24,10 +26,7 @@ use crate::lanes::{IsaSet, Lanes};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrdinaryViscoelastic {
     elastic: Ordinary,
-    /// Relaxation time τ, s.
-    relaxation_time: f64,
-    /// Relaxing fraction λ.
-    relaxing_share: f64,
+    relaxation: Relaxation,
 }
 
 const RELAXATION_TIME: Key = Key {
@@ -48,7 +47,12 @@ const RELAXING_SHARE: Key = Key {
 
 impl Declared for OrdinaryViscoelastic {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
-        keys: &[RELAXATION_TIME, RELAXING_SHARE, INFLUENCE],
+        keys: &[
+            RELAXATION_TIME,
+            RELAXING_SHARE,
+            INFLUENCE,
+            SURFACE_CORRECTION,
+        ],
         any_poisson_ratio: true,
         no_line: Some("`ordinary_viscoelastic` has no 1-D form"),
         invariants: |_| Invariants {
@@ -57,7 +61,11 @@ impl Declared for OrdinaryViscoelastic {
         },
         breaks_by_energy: true,
         critical_stretch: Some(super::ordinary::critical_stretch),
-        examples: &["poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.4"],
+        scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",
+        examples: &[
+            "poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.4",
+            "poisson_ratio = 0.2, relaxation_time = 0.05, relaxing_share = 0.6, surface_correction = 'pals'",
+        ],
         ..Declaration::new(
             "ordinary_viscoelastic",
             "as `ordinary`, but a fraction of the deviatoric force relaxes",
@@ -67,29 +75,61 @@ impl Declared for OrdinaryViscoelastic {
 }
 
 fn build(given: &Given) -> Built {
-    let law = OrdinaryViscoelastic {
-        elastic: Ordinary::of(given, influence(given)),
-        relaxation_time: given.values.number(RELAXATION_TIME.name),
-        relaxing_share: given.values.number(RELAXING_SHARE.name),
+    let relaxation = Relaxation {
+        time: given.values.number(RELAXATION_TIME.name),
+        share: given.values.number(RELAXING_SHARE.name),
     };
-    super::ordinary::with_influence(law, given)
+    let influence = influence(given);
+    match given.values.word(SURFACE_CORRECTION.name) {
+        "pals" => {
+            let elastic = Pals::of(given, influence);
+            with_influence(PalsViscoelastic::new(elastic, relaxation), given)
+        }
+        _ => {
+            let elastic = Ordinary::of(given, influence);
+            let law = OrdinaryViscoelastic {
+                elastic,
+                relaxation,
+            };
+            with_influence(law, given)
+        }
+    }
 }
 
 impl Described for OrdinaryViscoelastic {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
-        let time = Property::Number(self.relaxation_time, "s");
-        facts.push(("relaxation time", time));
-        let share = Property::Number(self.relaxing_share, "");
-        facts.push(("relaxing share", share));
+        facts.extend(self.relaxation.described());
         facts
     }
 }
 
-impl OrdinaryViscoelastic {
+/// Relaxation of the deviatoric force of bonds: back extensions that follow the deviatoric extensions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Relaxation {
+    /// Relaxation time τ, s.
+    time: f64,
+    /// Relaxing fraction λ.
+    share: f64,
+}
+
+impl Relaxation {
+    /// Return the relaxing fraction λ.
+    pub(super) fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// Return the names and values of the constants, for display.
+    pub(super) fn described(&self) -> [(&'static str, Property); 2] {
+        [
+            ("relaxation time", Property::Number(self.time, "s")),
+            ("relaxing share", Property::Number(self.share, "")),
+        ]
+    }
+
     /// Return 1 − a and β of a step (s).
     fn relaxed(&self, step: f64) -> [f64; 2] {
-        let x = step / self.relaxation_time;
+        let x = step / self.time;
         let gone = -libm::expm1(-x);
         let beta = if x < 1e-3 {
             // Series of 1 − (1 − e^−x)/x, which avoids cancellation.
@@ -98,6 +138,32 @@ impl OrdinaryViscoelastic {
             1.0 - gone / x
         };
         [gone, beta]
+    }
+
+    /// Return e_b/|ξ|, ε_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these values
+    /// before the step. `deviatoric` is ε_d/|ξ| after the step. `factor` times ε_d²/|ξ|² is the energy of
+    /// a bond without relaxation times 2, J/m⁶.
+    #[inline(always)]
+    pub(super) fn after(
+        &self,
+        deviatoric: Lanes,
+        [back, before, loss]: &[Lanes; 3],
+        factor: Lanes,
+        step: f64,
+    ) -> [Lanes; 3] {
+        let [gone, beta] = self.relaxed(step);
+        let change = (*before - *back) * gone + (deviatoric - *before) * beta;
+        let now = *back + change;
+        // Energy that the dashpot dissipates, with its force at the middle of the step.
+        let force = (*before - *back + deviatoric - now) * (0.5 * self.share);
+        let taken = factor * force * change;
+        [now, deviatoric, *loss + taken]
+    }
+
+    /// Return λ (e_b² − 2 ε_d e_b)/|ξ|² from ε_d/|ξ| and e_b/|ξ|.
+    #[inline(always)]
+    pub(super) fn released(&self, deviatoric: Lanes, back: Lanes) -> Lanes {
+        (back - deviatoric * 2.0) * back * self.share
     }
 }
 
@@ -151,7 +217,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
             let extension_factor = numbers[0];
             let volume_factor =
                 extension_factor * extension_factor / self.elastic.extensional() * sums[0];
-            numbers[1] += self.relaxing_share * volume_factor;
+            numbers[1] += self.relaxation.share * volume_factor;
             return;
         }
         let [volume_factor, dilatation] = self.elastic.dilated(numbers[0], sums[0]);
@@ -169,17 +235,11 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         &self,
         bond: &Bond<D>,
         [extension_factor, _, even]: &[Lanes; 3],
-        [back, before, loss]: &[Lanes; 3],
+        history: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
-        let [gone, beta] = self.relaxed(step);
-        let deviatoric = bond.stretch - *even;
-        let change = (*before - *back) * gone + (deviatoric - *before) * beta;
-        let now = *back + change;
-        // Energy that the dashpot dissipates, with its force at the middle of the step.
-        let force = (*before - *back + deviatoric - now) * (0.5 * self.relaxing_share);
-        let taken = *extension_factor * (bond.length * bond.length) * force * change;
-        [now, deviatoric, *loss + taken]
+        let factor = *extension_factor * (bond.length * bond.length);
+        (self.relaxation).after(bond.stretch - *even, history, factor, step)
     }
 
     #[inline(always)]
@@ -193,7 +253,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
             bond,
             *extension_factor,
             *volume_factor,
-            *back * self.relaxing_share,
+            *back * self.relaxation.share,
         )
     }
 
@@ -205,7 +265,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
         let deviatoric = bond.stretch - *even;
-        let eased = (*back - deviatoric * 2.0) * *back * self.relaxing_share;
+        let eased = self.relaxation.released(deviatoric, *back);
         let square = bond.stretch * bond.stretch + eased;
         square * (bond.length * bond.length) * *extension_factor * 0.5
     }

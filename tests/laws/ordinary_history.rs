@@ -75,10 +75,12 @@ const SHEAR: f64 = YOUNG / (2.0 * (1.0 + RATIO));
 #[test]
 fn stress_relaxes_as_that_of_a_standard_linear_solid() {
     let (time, share, gamma) = (0.8, 0.6, 1e-5);
-    let law = format!(
-        "ordinary_viscoelastic = {{ density = 1, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, \
-         relaxation_time = {time}, relaxing_share = {share} }}"
-    );
+    let law = |correction: &str| {
+        format!(
+            "ordinary_viscoelastic = {{ density = 1, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, \
+             relaxation_time = {time}, relaxing_share = {share}, surface_correction = '{correction}' }}"
+        )
+    };
     fn check<const D: usize>(mut simulation: Simulation<D>, time: f64, share: f64, gamma: f64) {
         // The shear is applied suddenly and then held.
         shear(&mut simulation, gamma, 0.0);
@@ -106,10 +108,94 @@ fn stress_relaxes_as_that_of_a_standard_linear_solid() {
             );
         }
     }
-    for dimension in ["plane-strain", "plane-stress"] {
-        simulate::<2, _>(&deck(dimension, &law), |s| check(s, time, share, gamma));
+    for law in ["none", "pals"].map(law) {
+        for dimension in ["plane-strain", "plane-stress"] {
+            simulate::<2, _>(&deck(dimension, &law), |s| check(s, time, share, gamma));
+        }
+        simulate::<3, _>(&deck("3d", &law), |s| check(s, time, share, gamma));
     }
-    simulate::<3, _>(&deck("3d", &law), |s| check(s, time, share, gamma));
+}
+
+/// Return the deck of a small block without any complete family.
+fn small_block(dimension: &str, law: &str) -> String {
+    let [lower, upper] = match dimension {
+        "3d" => ["[0, 0, 0]", "[4, 4, 4]"],
+        _ => ["[0, 0]", "[6, 6]"],
+    };
+    format!(
+        "dimension = '{dimension}'
+        grid = {{ spacing = 1, horizon = 3.01, volume_correction = 'exact' }}
+        material.solid.{law}
+        body.block = {{ material = 'solid', shape.box = {{ lower = {lower}, upper = {upper} }} }}
+        time = {{ end = 1 }}
+        "
+    )
+}
+
+/// With the influence functions of its own family, each point has the energies of the solid in shear, also at
+/// edges and corners: of the instantaneous and relaxed response, and at the yield stress.
+#[test]
+fn with_pals_points_at_surfaces_relax_and_yield_as_the_solid_does() {
+    fn energies<const D: usize>(simulation: &mut Simulation<D>) -> Vec<[f64; 2]> {
+        let snapshot = Snapshot::new(simulation);
+        let stored = &snapshot.stored;
+        let pairs = stored.energy.iter().zip(&stored.dissipated);
+        pairs.map(|(energy, lost)| [*energy, *lost]).collect()
+    }
+    fn relax<const D: usize>(mut simulation: Simulation<D>) {
+        let gamma = 1e-5;
+        let elastic = 0.5 * SHEAR * gamma * gamma;
+        shear(&mut simulation, gamma, 0.0);
+        for [energy, _] in energies(&mut simulation) {
+            assert!((energy / elastic - 1.0).abs() < 1e-4, "{energy} {elastic}");
+        }
+        // After 40 relaxation times, the relaxing share 0.6 of the energy is dissipated.
+        for _ in 0..400 {
+            shear(&mut simulation, gamma, 0.1);
+        }
+        for [energy, lost] in energies(&mut simulation) {
+            let left = energy / elastic;
+            assert!((left - 0.4).abs() < 1e-4, "{left}");
+            // Half of the error of the middle of a step of a tenth of the relaxation time.
+            let lost = lost / elastic;
+            assert!((lost - 0.6).abs() < 1e-2, "{lost}");
+        }
+    }
+    fn flow<const D: usize>(mut simulation: Simulation<D>, strength: f64) {
+        // The shear strain at yield, and the energy density there.
+        let yields = strength / 3_f64.sqrt() / SHEAR;
+        let limit = strength * strength / (6.0 * SHEAR);
+        shear(&mut simulation, 0.999 * yields, 0.1);
+        for [energy, lost] in energies(&mut simulation) {
+            assert!((energy / limit - 0.998).abs() < 1e-4, "{energy} {limit}");
+            assert_eq!(lost, 0.0);
+        }
+        let end = 4.0;
+        for step in 1..=60 {
+            let gamma = yields * (1.0 + (end - 1.0) * f64::from(step) / 60.0);
+            shear(&mut simulation, gamma, 0.1);
+        }
+        for [energy, lost] in energies(&mut simulation) {
+            assert!((energy / limit - 1.0).abs() < 1e-3, "{energy} {limit}");
+            // τ_y times the plastic strain.
+            let wanted = 2.0 * limit * (end - 1.0);
+            assert!((lost / wanted - 1.0).abs() < 1e-3, "{lost} {wanted}");
+        }
+    }
+    let elastic = format!(
+        "density = 1, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, surface_correction = 'pals'"
+    );
+    let relaxing = format!(
+        "ordinary_viscoelastic = {{ {elastic}, relaxation_time = 1, relaxing_share = 0.6 }}"
+    );
+    let strength = 1e-4;
+    let plastic = format!("ordinary_plastic = {{ {elastic}, yield_stress = {strength} }}");
+    for dimension in ["plane-strain", "plane-stress"] {
+        simulate::<2, _>(&small_block(dimension, &relaxing), relax);
+        simulate::<2, _>(&small_block(dimension, &plastic), |s| flow(s, strength));
+    }
+    simulate::<3, _>(&small_block("3d", &relaxing), relax);
+    simulate::<3, _>(&small_block("3d", &plastic), |s| flow(s, strength));
 }
 
 #[test]
@@ -221,7 +307,11 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
         )
     };
     // The weighted volume of the lattice differs from the weighted volume of a ball by some per cent.
-    for (more, bound) in [("", 0.01), (", calibration = 'continuum'", 0.05)] {
+    for (more, bound) in [
+        ("", 0.01),
+        (", calibration = 'continuum'", 0.05),
+        (", surface_correction = 'pals'", 0.01),
+    ] {
         let law = law(more);
         for way in [&shear, &pull_in_the_plane] {
             for dimension in ["plane-strain", "plane-stress"] {
@@ -287,6 +377,8 @@ fn a_plate_that_is_torn_while_it_flows_keeps_its_energy() {
         "ordinary_plastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, yield_stress = 1.5e6 }",
         "ordinary_plastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, yield_stress = 20e6 }",
         "ordinary_viscoelastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, relaxation_time = 1e-5, relaxing_share = 0.8 }",
+        "ordinary_plastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, yield_stress = 1.5e6, surface_correction = 'pals' }",
+        "ordinary_viscoelastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, relaxation_time = 1e-5, relaxing_share = 0.8, surface_correction = 'pals' }",
     ] {
         let [coarse, fine] = [0.8, 0.2].map(|safety| torn(law, safety));
         // At long steps, bonds break late, and the released energy may decrease by less than 1e-4 of the

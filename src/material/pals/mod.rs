@@ -25,6 +25,11 @@
 //! an untruncated family. This keeps the energy of breaking the bond.
 
 mod fit;
+mod plastic;
+mod viscoelastic;
+
+pub use plastic::PalsPlastic;
+pub use viscoelastic::PalsViscoelastic;
 
 use super::monomials::write_monomials;
 use super::ordinary::Ordinary;
@@ -72,9 +77,24 @@ impl Pals {
     fn whole(&self) -> f64 {
         self.ordinary.extensional() / self.ordinary.whole()
     }
+
+    /// Return k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa), θ/d and θ, from the sums of [`Law::pass_contribution`].
+    fn dilated(&self, sums: &[f64]) -> [f64; 3] {
+        let d = self.ordinary.dimension();
+        let [dilatation, extension, square] = [sums[0], sums[1], sums[2]];
+        let mean = dilatation / d;
+        let pressure = self.bulk_modulus() * dilatation - (extension - mean * square) / d;
+        [pressure, mean, dilatation]
+    }
+
+    /// Return the energy density of the dilatation, ½ k′θ², J/m³.
+    fn dilatation_energy(&self, dilatation: f64) -> f64 {
+        0.5 * self.bulk_modulus() * dilatation * dilatation
+    }
 }
 
-/// No deck name: decks write `ordinary` with `surface_correction = "pals"`.
+/// No deck name: decks write `ordinary` with `surface_correction = "pals"`, as for the plastic and the
+/// viscoelastic law.
 impl Declared for Pals {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
@@ -85,6 +105,9 @@ impl Described for Pals {
         vec![("forces", Property::Text(value))]
     }
 }
+
+/// Λ and S of a point.
+type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 
 /// Return N_a = n_a² of eight bonds.
 #[inline(always)]
@@ -111,7 +134,7 @@ fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
 impl<const D: usize> Law<D> for Pals {
     /// Constants: Λ (1/m⁵), S (N/m⁷), and a spring constant (N/m⁷) that bounds the energy. Then k′θ − (1/d) Σ
     /// σ|ξ| ε Ṽ (Pa) and θ/d.
-    type Point = ((Symmetric<D>, Symmetric<D>), [Lanes; OTHERS + 2]);
+    type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
     type ReferenceSum = [Lanes; 2 * MONOMIALS];
@@ -181,13 +204,8 @@ impl<const D: usize> Law<D> for Pals {
         _: &mut PlasticState,
         _: f64,
     ) {
-        let d = self.ordinary.dimension();
-        let [dilatation, extension, square] = [sums[0], sums[1], sums[2]];
-        let mean = dilatation / d;
         let changing = &mut numbers[4 * D + OTHERS..];
-        changing[0] = self.bulk_modulus() * dilatation - (extension - mean * square) / d;
-        changing[1] = mean;
-        changing[2] = dilatation;
+        changing[..3].copy_from_slice(&self.dilated(sums));
     }
 
     /// Return t/|Y|, with |ξ|/|Y| = 1 − P and e/|Y| = P.
@@ -216,8 +234,7 @@ impl<const D: usize> Law<D> for Pals {
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
-        let dilatation = numbers[4 * D + OTHERS + 2];
-        0.5 * self.bulk_modulus() * dilatation * dilatation
+        self.dilatation_energy(numbers[4 * D + OTHERS + 2])
     }
 
     fn dilatation(&self, numbers: &[f64]) -> Option<f64> {

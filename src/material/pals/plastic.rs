@@ -1,0 +1,213 @@
+//! Elastic–perfectly plastic solid with the influence functions of [`Pals`].
+//!
+//! Each bond has a plastic extension e_p. Energy and force are those of [`Pals`] at the elastic extensions
+//! e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d Ṽ = 0:
+//!
+//! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//!
+//! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G): twice the deviatoric energy density at the yield stress σ_y of
+//! von Mises. Without surfaces, this is the yield condition of [`super::super::OrdinaryPlastic`].
+//! The return is radial: e_p grows by (1 − r) ε_d, with r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore
+//! does not change θ.
+//!
+//! While all bonds are intact, ε_d is ε of [`Pals`]. If bonds are broken, ε = ε_d + c|ξ|, and flow reduces
+//! the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, so 1 − r is limited to this value.
+
+use super::{
+    Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, Pals,
+    PlasticState, Property, deviatoric, quadratic_form,
+};
+use crate::lanes::{IsaSet, Lanes};
+
+/// The constants of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PalsPlastic {
+    elastic: Pals,
+    /// σ_y²/(3G), Pa.
+    limit: f64,
+}
+
+impl PalsPlastic {
+    /// Create the law from its elastic law, the yield stress (Pa) and the shear modulus (Pa).
+    pub(in super::super) fn new(elastic: Pals, yield_stress: f64, shear_modulus: f64) -> Self {
+        Self {
+            elastic,
+            limit: yield_stress * yield_stress / (3.0 * shear_modulus),
+        }
+    }
+}
+
+/// No deck name: decks write `ordinary_plastic` with `surface_correction = "pals"`.
+impl Declared for PalsPlastic {
+    const DECLARATIONS: &'static [Declaration] = &[];
+}
+
+impl Described for PalsPlastic {
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        let mut facts = self.elastic.described();
+        facts.push(("yields", Property::Text("by each point's own family")));
+        facts
+    }
+}
+
+/// Return a bond with its stretch reduced by the plastic stretch.
+#[inline(always)]
+fn elastic<const D: usize>(bond: &Bond<D>, plastic: Lanes) -> Bond<D> {
+    let mut bond = *bond;
+    bond.stretch = bond.stretch - plastic;
+    bond
+}
+
+impl<const D: usize> Law<D> for PalsPlastic {
+    /// The numbers of [`Pals`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
+    type Point = (Functions<D>, [Lanes; OTHERS + 4]);
+    /// e_p/|ξ|, and the dissipated energy, J/m⁶.
+    type BondHistory = [Lanes; 2];
+    type ReferenceSum = [Lanes; 2 * MONOMIALS];
+    type Sum = [Lanes; 3];
+    type Force = Along;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const CONSTANTS: usize = 4 * D + OTHERS;
+    const PASSES: usize = 3;
+    const LEAST_DIMENSION: usize = 2;
+    /// θ.
+    const OWN_NUMBERS: usize = 1;
+    const SUM_READS_DIRECTION: bool = true;
+    const FORCE_READS_STRETCH: bool = true;
+
+    #[inline(always)]
+    fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
+        self.elastic.reference_contribution(bond)
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        Law::<D>::constants(&self.elastic, sums, numbers);
+    }
+
+    /// Pass 0: Σ ω|ξ| (e − e_p) Ṽ and Σ ω|ξ|² Ṽ. Pass 1: Σ σ ε_d² Ṽ and Σ σ|ξ| ε_d Ṽ, Pa. Pass 2: the sums of
+    /// [`Pals`] after the flow.
+    #[inline(always)]
+    fn pass_contribution<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        (functions, [stiffness, pressure, even, mean, _]): &Self::Point,
+        [plastic, _]: &[Lanes; 2],
+    ) -> [Lanes; 3] {
+        let bond = elastic(bond, *plastic);
+        let square = bond.length * bond.length;
+        let nothing = Lanes::splat(0.0);
+        match S {
+            0 => {
+                let weight = quadratic_form(&bond, &functions.0) * square;
+                [weight * bond.stretch, weight, nothing]
+            }
+            1 => {
+                let part = bond.stretch - *mean;
+                let weighted = deviatoric(&bond, &functions.1) * square * part;
+                [weighted * part, weighted, nothing]
+            }
+            _ => {
+                let point = (*functions, [*stiffness, *pressure, *even]);
+                self.elastic.pass_contribution::<0>(&bond, &point, &[])
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
+        let changing = &mut numbers[4 * D + OTHERS..];
+        let [pressure, even, dilatation] = self.elastic.dilated(sums);
+        match pass {
+            0 => {
+                let [sum, square] = [sums[0], sums[1]];
+                changing[1] = even;
+                changing[2] = if square > 0.0 { sum / square } else { 0.0 };
+            }
+            1 => {
+                let [square, product] = [sums[0], sums[1]];
+                // Without bonds the square is 0, so the point does not yield.
+                changing[3] = if square > self.limit {
+                    let most = 1.0 + (changing[2] - changing[1]) * product / square;
+                    (1.0 - (self.limit / square).sqrt()).min(most).max(0.0)
+                } else {
+                    0.0
+                };
+            }
+            _ => {
+                changing[0] = pressure;
+                changing[1] = even;
+                changing[4] = dilatation;
+            }
+        }
+    }
+
+    fn reads_advanced_history(&self, pass: usize) -> bool {
+        pass == 2
+    }
+
+    #[inline(always)]
+    fn bond_history(
+        &self,
+        bond: &Bond<D>,
+        ((_, sigma), [.., even, mean, shrunk]): &Self::Point,
+        [plastic, loss]: &[Lanes; 2],
+        _: f64,
+    ) -> [Lanes; 2] {
+        let stretch = bond.stretch - *plastic;
+        let change = (stretch - *mean) * *shrunk;
+        let factor = deviatoric(bond, sigma) * (bond.length * bond.length);
+        let taken = factor * (stretch - *even - change) * change;
+        [*plastic + change, *loss + taken]
+    }
+
+    #[inline(always)]
+    fn force(
+        &self,
+        bond: &Bond<D>,
+        (functions, [stiffness, pressure, even, ..]): &Self::Point,
+        [plastic, _]: &[Lanes; 2],
+    ) -> Along {
+        let point = (*functions, [*stiffness, *pressure, *even + *plastic]);
+        self.elastic.force(bond, &point, &[])
+    }
+
+    #[inline(always)]
+    fn bond_energy(
+        &self,
+        bond: &Bond<D>,
+        (functions, [stiffness, pressure, even, ..]): &Self::Point,
+        [plastic, _]: &[Lanes; 2],
+    ) -> Lanes {
+        let point = (*functions, [*stiffness, *pressure, *even + *plastic]);
+        self.elastic.bond_energy(bond, &point, &[])
+    }
+
+    fn point_energy(&self, numbers: &[f64]) -> f64 {
+        self.elastic.dilatation_energy(numbers[4 * D + OTHERS + 4])
+    }
+
+    #[inline(always)]
+    fn dissipated(&self, _: Lanes, [_, loss]: &[Lanes; 2]) -> Lanes {
+        *loss
+    }
+
+    fn dilatation(&self, numbers: &[f64]) -> Option<f64> {
+        Some(numbers[4 * D + OTHERS + 4])
+    }
+
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
+        Law::<D>::truncation_factor(&self.elastic, sums)
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, _: Lanes, (_, [stiffness, ..]): &Self::Point) -> Lanes {
+        *stiffness
+    }
+}

@@ -1,0 +1,172 @@
+//! Standard linear solid with the influence functions of [`Pals`]: the deviatoric part of the force relaxes.
+//!
+//! With the back extension e_b of each bond, which follows the deviatoric extension ε of [`Pals`], and the
+//! relaxing fraction λ ([`Relaxation`]),
+//!
+//! W = ½ k′θ² + ½ Σ σ (ε² + λ (e_b² − 2 ε e_b)) Ṽ,
+//!
+//! t = (k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ) ω|ξ| + σ (ε − λ e_b).
+
+use super::super::ordinary_viscoelastic::Relaxation;
+use super::{
+    Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, Pals,
+    PlasticState, Property, deviatoric,
+};
+use crate::lanes::{IsaSet, Lanes};
+
+/// The constants of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PalsViscoelastic {
+    elastic: Pals,
+    relaxation: Relaxation,
+}
+
+impl PalsViscoelastic {
+    /// Create the law from its elastic law and its relaxation.
+    pub(in super::super) fn new(elastic: Pals, relaxation: Relaxation) -> Self {
+        Self {
+            elastic,
+            relaxation,
+        }
+    }
+}
+
+/// No deck name: decks write `ordinary_viscoelastic` with `surface_correction = "pals"`.
+impl Declared for PalsViscoelastic {
+    const DECLARATIONS: &'static [Declaration] = &[];
+}
+
+impl Described for PalsViscoelastic {
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        let mut facts = self.elastic.described();
+        facts.extend(self.relaxation.described());
+        facts
+    }
+}
+
+impl<const D: usize> Law<D> for PalsViscoelastic {
+    /// The numbers of [`Pals`]; the second changing one is k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ, Pa.
+    type Point = (Functions<D>, [Lanes; OTHERS + 2]);
+    /// e_b/|ξ|, ε/|ξ|, and the dissipated energy, J/m⁶.
+    type BondHistory = [Lanes; 3];
+    type ReferenceSum = [Lanes; 2 * MONOMIALS];
+    type Sum = [Lanes; 3];
+    type Force = Along;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const CONSTANTS: usize = 4 * D + OTHERS;
+    const PASSES: usize = 2;
+    const LEAST_DIMENSION: usize = 2;
+    /// θ.
+    const OWN_NUMBERS: usize = 1;
+    const SUM_READS_DIRECTION: bool = true;
+    const FORCE_READS_STRETCH: bool = true;
+    const SCALED: bool = true;
+
+    #[inline(always)]
+    fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
+        self.elastic.reference_contribution(bond)
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        Law::<D>::constants(&self.elastic, sums, numbers);
+    }
+
+    /// Pass 0: the sums of [`Pals`]. Pass 1: Σ σ|ξ| e_b Ṽ, Pa.
+    #[inline(always)]
+    fn pass_contribution<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        point: &Self::Point,
+        [back, ..]: &[Lanes; 3],
+    ) -> [Lanes; 3] {
+        if S == 0 {
+            return self.elastic.pass_contribution::<0>(bond, point, &[]);
+        }
+        let factor = deviatoric(bond, &point.0.1) * (bond.length * bond.length);
+        let nothing = Lanes::splat(0.0);
+        [factor * *back, nothing, nothing]
+    }
+
+    #[inline(always)]
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        _: &mut PlasticState,
+        _: f64,
+    ) {
+        let changing = &mut numbers[4 * D + OTHERS..];
+        if pass == 0 {
+            changing[..3].copy_from_slice(&self.elastic.dilated(sums));
+        } else {
+            changing[0] += self.relaxation.share() / D as f64 * sums[0];
+        }
+    }
+
+    fn reads_advanced_history(&self, pass: usize) -> bool {
+        pass == 1
+    }
+
+    #[inline(always)]
+    fn bond_history(
+        &self,
+        bond: &Bond<D>,
+        ((_, sigma), [_, _, even]): &Self::Point,
+        history: &[Lanes; 3],
+        step: f64,
+    ) -> [Lanes; 3] {
+        let factor = deviatoric(bond, sigma) * (bond.length * bond.length);
+        (self.relaxation).after(bond.stretch - *even, history, factor, step)
+    }
+
+    #[inline(always)]
+    fn force(
+        &self,
+        bond: &Bond<D>,
+        (functions, [stiffness, pressure, even]): &Self::Point,
+        [back, ..]: &[Lanes; 3],
+    ) -> Along {
+        let eased = *even + *back * self.relaxation.share();
+        (self.elastic).force(bond, &(*functions, [*stiffness, *pressure, eased]), &[])
+    }
+
+    #[inline(always)]
+    fn bond_energy(
+        &self,
+        bond: &Bond<D>,
+        ((_, sigma), [_, _, even]): &Self::Point,
+        [back, ..]: &[Lanes; 3],
+    ) -> Lanes {
+        let part = bond.stretch - *even;
+        let square = part * part + self.relaxation.released(part, *back);
+        square * (bond.length * bond.length) * deviatoric(bond, sigma) * 0.5
+    }
+
+    fn point_energy(&self, numbers: &[f64]) -> f64 {
+        Law::<D>::point_energy(&self.elastic, numbers)
+    }
+
+    #[inline(always)]
+    fn dissipated(&self, _: Lanes, [.., loss]: &[Lanes; 3]) -> Lanes {
+        *loss
+    }
+
+    fn dilatation(&self, numbers: &[f64]) -> Option<f64> {
+        Law::<D>::dilatation(&self.elastic, numbers)
+    }
+
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
+        Law::<D>::truncation_factor(&self.elastic, sums)
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, _: Lanes, (_, [stiffness, ..]): &Self::Point) -> Lanes {
+        *stiffness
+    }
+
+    #[inline(always)]
+    fn toughness_scale(&self, bond: &Bond<D>, points: [&Self::Point; 2], other: &Self) -> Lanes {
+        (self.elastic).toughness_scale(bond, points, &other.elastic)
+    }
+}
