@@ -124,6 +124,25 @@ impl HistoryRow {
     }
 }
 
+/// Sums over the points of this rank, to be added over all ranks in one message.
+#[derive(Default)]
+struct Sums(Vec<ExactSum>);
+
+impl Sums {
+    /// Add a sum and return its position.
+    fn push(&mut self, sum: ExactSum) -> usize {
+        self.0.push(sum);
+        self.0.len() - 1
+    }
+
+    /// Add several sums and return their positions.
+    fn extend(&mut self, sums: impl IntoIterator<Item = ExactSum>) -> Range<usize> {
+        let start = self.0.len();
+        self.0.extend(sums);
+        start..self.0.len()
+    }
+}
+
 impl HistoryObserver {
     /// Find the points of all sets, probes, fronts, cracks, tips and J integrals of the history. Collective.
     ///
@@ -272,27 +291,29 @@ impl HistoryObserver {
             Fragments::default()
         };
         let (model, fields) = (&simulation.model, &simulation.fields);
-        let mut sums = point_sums(simulation, snapshot);
-        sums.push(sum(fields.external_work.as_deref().unwrap_or_default()));
+        let mut sums = Sums::default();
+        let own = sums.extend(point_sums(simulation, snapshot));
+        let work = sums.push(sum(fields.external_work.as_deref().unwrap_or_default()));
         let mut dissipated = sum(fields.damped_energy.as_deref().unwrap_or_default());
         for (density, volume) in snapshot.stored.dissipated.iter().zip(model.volume.iter()) {
             dissipated.add(density * volume);
         }
-        sums.push(dissipated);
-        sums.push(sum(fields.overshoot_energy.as_deref().unwrap_or_default()));
+        let dissipated = sums.push(dissipated);
+        let overshoot = sums.push(sum(fields.overshoot_energy.as_deref().unwrap_or_default()));
         let step = simulation.clock.step();
-        sums.push(simulation.conditions.step_energy(model, fields, step));
+        let step_energy = sums.push(simulation.conditions.step_energy(model, fields, step));
+        let reaction = |members: &Vec<u32>| simulation.conditions.reaction(model, fields, members);
+        let reactions = sums.extend(self.reactions.iter().flat_map(reaction));
         let directed = self.support_forces.iter().map(|(members, _)| members);
-        for members in self.reactions.iter().chain(directed) {
-            sums.extend(simulation.conditions.reaction(model, fields, members));
-        }
-        if simulation.problem.history.angular_momentum {
-            sums.extend(angular_momentum(simulation));
-        }
-        let sums = reduce(comm, &mut sums);
-        let (own, rest) = sums.split_at(3 + D);
-        let (&[work, dissipated, overshoot, step_energy], reactions) =
-            rest.split_first_chunk().expect("four sums");
+        let directed = sums.extend(directed.flat_map(reaction));
+        let angular_momentum = if simulation.problem.history.angular_momentum {
+            sums.extend(angular_momentum(simulation))
+        } else {
+            0..0
+        };
+        let sums = reduce(comm, &mut sums.0);
+        let own = &sums[own];
+        let [mut work, mut dissipated] = [sums[work], sums[dissipated]];
 
         let cracked = Cracked::new(simulation, snapshot);
         let intact = snapshot.intact();
@@ -306,11 +327,11 @@ impl HistoryObserver {
         let [intact, cracked_points, at_start, singular_points] = counts;
         let (lower, upper) = cracked.extent(comm);
 
-        let dissipated = dissipated + contact.friction + contact.damping;
-        let rigid = contact.rigid.iter();
+        dissipated += contact.friction;
+        dissipated += contact.damping;
         // The order of additions is part of the bits of the results.
-        let (mut kinetic, mut rigid_energy, mut work) = (own[0], 0.0, work);
-        for (state, energy) in rigid {
+        let (mut kinetic, mut rigid_energy) = (own[0], 0.0);
+        for (state, energy) in &contact.rigid {
             kinetic += energy;
             rigid_energy += energy;
             work += state.work;
@@ -321,7 +342,7 @@ impl HistoryObserver {
             kinetic: own[0],
             strain: own[1],
             fracture: own[2],
-            overshoot,
+            overshoot: sums[overshoot],
             rigid: rigid_energy,
             contact: contact.energy,
             work,
@@ -335,9 +356,7 @@ impl HistoryObserver {
         let there_were = first_intact as i64 + simulation.refined.bonds;
         let broken = (there_were - intact as i64) as u64 / 2;
         let most_broken = std::mem::take(&mut simulation.step_control.most_broken);
-        let (reactions, rest) = reactions.split_at(D * self.reactions.len());
-        let (directed, angular_momentum) = rest.split_at(D * self.support_forces.len());
-        let support_forces = directed.chunks_exact(D).zip(&self.support_forces);
+        let support_forces = sums[directed].chunks_exact(D).zip(&self.support_forces);
         let support_forces = support_forces.map(|(force, (_, direction))| {
             let products = force.iter().zip(direction).map(|(f, d)| f * d);
             products.sum()
@@ -367,7 +386,7 @@ impl HistoryObserver {
             clock: simulation.clock,
             energies,
             momentum: own[3..].to_vec(),
-            angular_momentum: angular_momentum.to_vec(),
+            angular_momentum: sums[angular_momentum].to_vec(),
             broken,
             cracked_points,
             cracked_extent: [lower, upper],
@@ -379,7 +398,10 @@ impl HistoryObserver {
             density_scale_energy: simulation.density_scale_energy,
             points: simulation.model.total,
             refinement_energy: simulation.refined.energy,
-            reactions: reactions.chunks_exact(D).map(<[f64]>::to_vec).collect(),
+            reactions: sums[reactions]
+                .chunks_exact(D)
+                .map(<[f64]>::to_vec)
+                .collect(),
             support_forces: support_forces.collect(),
             statistics,
             probes,
@@ -395,7 +417,7 @@ impl HistoryObserver {
             number: simulation.clock.number(),
             energies,
             first_energy,
-            step_energy,
+            step_energy: sums[step_energy],
             broken,
         }
     }
