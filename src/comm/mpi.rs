@@ -1,6 +1,6 @@
 //! The communicator of MPI runs: `MPI_COMM_WORLD`.
 //!
-//! Only the thread that created the world may call it (`MPI_THREAD_FUNNELED`).
+//! Only the thread that created the [`World`] may use it (`MPI_THREAD_FUNNELED`).
 
 use std::cell::{RefCell, RefMut};
 use std::ffi::c_void;
@@ -286,7 +286,7 @@ impl Communicator for World {
             self.world.all_gather_varcount_into(own, &mut parts);
             return all;
         }
-        // Displacements of a single call may not fit in 32 bits, so each rank broadcasts its part.
+        // The byte offsets of a single call may not fit in 32 bits, so each rank broadcasts its part.
         let mut rest = &mut all[..];
         for (rank, size) in sizes.into_iter().enumerate() {
             let (part, others) = rest.split_at_mut(size as usize);

@@ -89,7 +89,7 @@ impl ExactSum {
         self.pending = 1;
     }
 
-    /// The sum of the terms, rounded to a number.
+    /// The sum of the terms, rounded to `f64`; NaN if a term was not finite.
     pub fn value(&self) -> f64 {
         if !self.finite {
             return f64::NAN;

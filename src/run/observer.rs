@@ -21,10 +21,11 @@ pub trait Observer {
     /// written.
     fn step(&mut self, _now: &mut dyn RunState) {}
 
-    /// Called after a row of the history has been computed.
+    /// Called after a row of the history has been computed. In a new run, the first row precedes the call of
+    /// [`Self::begin`].
     fn row(&mut self, _now: &mut dyn RunState, _row: &Row) {}
 
-    /// Called after the time loop. `complete` is true at the end of the run, false after a stop.
+    /// Called after the time loop. `complete` is true at the end of the run, false after a stop or a failure.
     fn end(&mut self, _complete: bool) {}
 }
 
@@ -123,13 +124,13 @@ pub trait RunState {
     /// Return the number of the step reached.
     fn number(&self) -> u64;
 
-    /// Return the number of the last step.
+    /// Return the number of the last step of the whole run, if the time step does not change.
     fn last(&self) -> u64;
 
     /// Return the time reached, s.
     fn time(&self) -> f64;
 
-    /// Return the length of a step, s.
+    /// Return the present time step, s.
     fn step(&self) -> f64;
 
     /// Return the dimension of the problem, which is the number of components of vectors.

@@ -12,7 +12,7 @@ use crate::solver::observers::Schedule;
 /// Static bytes per point in a result: position, id, block, volume and VTK cell.
 const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 
-/// Bytes of a result or checkpoint in addition to its points.
+/// Bytes of a result or checkpoint in addition to the data of the points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
 /// Bytes of a bond in a list: an eighth of a compact group of neighbour indices, and one bit.
@@ -43,7 +43,7 @@ const FIELD_COPIES: f64 = 3.0;
 /// messages.
 const CHECKPOINT_COPIES: [f64; 2] = [2.0, 3.0];
 
-/// Measured memory of a process for its points, bytes.
+/// Memory of the points and bonds of a process, measured or estimated, bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// Peak during the set-up.
@@ -120,7 +120,8 @@ impl Cost {
         cost(problem, counts, &simulation.expected_clock())
     }
 
-    /// Estimate the cost of a run from its size, without its points. `clock` gives the number of steps.
+    /// Estimate the cost of a run from its size, before its points are created. `clock` gives the number of
+    /// steps.
     pub fn estimate(problem: &Problem, size: &Size, clock: &Clock) -> Self {
         let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
         let mut bodies = problem.bodies.iter();
@@ -172,7 +173,8 @@ fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     (2 * size_of::<f64>() * numbers) as f64
 }
 
-/// Estimate the memory during and after the set-up.
+/// Estimate the memory during and after the set-up. `bonds` is the memory of the bonds (bytes), and `listed`
+/// is the number of bonds in lists, counted at both ends.
 fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measured {
     let dimension = problem.dimension.count();
     // Position, displacement, velocity and force; energy of broken bonds; palette indices of the volumes of

@@ -32,10 +32,10 @@ impl Banded {
         self.entries.fill(0.0);
     }
 
-    /// Add to an entry of the lower half.
+    /// Add `value` to the entry at `row` and `column` of the lower half.
     ///
     /// # Panics
-    /// If the entry is outside the band.
+    /// If the entry is above the diagonal or outside the band.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         assert!(
             column <= row && row - column <= self.band,
@@ -76,7 +76,7 @@ impl Banded {
         }
     }
 
-    /// Solve L Lᵀ x = b in place, after [`Self::factor`].
+    /// Solve L Lᵀ x = b after [`Self::factor`]. `values` contains b, and then x.
     pub fn solve(&self, values: &mut [f64]) {
         let width = self.band + 1;
         for row in 0..self.size {

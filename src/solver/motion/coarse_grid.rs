@@ -57,7 +57,7 @@ pub struct CoarseGrid<const D: usize> {
     matrix: Banded,
     /// Forces on the nodes in rounding units, one vector per task.
     parts: Vec<Vec<i64>>,
-    /// Sums of these forces over tasks and ranks.
+    /// Sums of `parts` over tasks and ranks.
     words: Vec<u64>,
     /// Displacements of the nodes by component, m.
     values: Vec<f64>,
@@ -66,7 +66,8 @@ pub struct CoarseGrid<const D: usize> {
 /// Contribution of a point to the stiffness of the grid.
 #[derive(Debug, Clone, Copy)]
 pub struct PointStiffness<const D: usize> {
-    /// λ V and G V of the point, N m.
+    /// Lamé's first parameter λ and the shear modulus G, each times the volume V of the point and its
+    /// fraction of intact bonds, N m.
     pub moduli: [f64; 2],
     /// Stiffness of the supported components, N/m; 0 for free components.
     pub springs: [f64; D],
@@ -82,7 +83,8 @@ struct CellPosition<const D: usize> {
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Create a grid that covers all points, with cells of one horizon (m) or more. Collective.
+    /// Create a grid that covers all points. The edges of its cells are at least `horizon` (m), and long
+    /// enough that the matrix is small. Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -210,7 +212,7 @@ impl<const D: usize> CoarseGrid<D> {
         self.matrix.factor();
     }
 
-    /// Compute the displacements of the nodes under forces on the owned points (N/m³, by component).
+    /// Compute the displacements of the nodes under force densities on the owned points (N/m³, by component).
     /// Collective.
     pub fn solve(&mut self, comm: &dyn Communicator, model: &Model<D>, force: &[Vec<f64>; D]) {
         let owned = model.owned();
@@ -285,7 +287,8 @@ impl<const D: usize> CoarseGrid<D> {
         (0..D).map(|d| along(d) * self.node_strides[d]).sum()
     }
 
-    /// Index of a node of a cell, relative to its first node.
+    /// Index of a node of a cell, relative to the first node of the cell. Bit d of `corner` is 1 for nodes on
+    /// the upper face along axis d.
     fn corner(&self, corner: usize) -> usize {
         let strides = self.node_strides.iter().enumerate();
         strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
@@ -324,7 +327,7 @@ impl<const D: usize> CoarseGrid<D> {
 }
 
 impl<const D: usize> CellPosition<D> {
-    /// Interpolation weight of a node of the cell.
+    /// Interpolation weight of a node of the cell at the position of the point.
     fn weight(&self, corner: usize) -> f64 {
         let along = self.along.iter().enumerate();
         along
@@ -332,7 +335,7 @@ impl<const D: usize> CellPosition<D> {
             .product()
     }
 
-    /// Gradient of the weight of a node, 1/m.
+    /// Gradient of the weight of a node, 1/m. `per_length` is the same as in [`CoarseGrid`].
     fn slope(&self, corner: usize, per_length: &[f64; D]) -> [f64; D] {
         std::array::from_fn(|d| {
             let others = (0..D).filter(|other| *other != d);
@@ -345,7 +348,8 @@ impl<const D: usize> CellPosition<D> {
     }
 }
 
-/// Weight of the lower (`end` = 0) or upper (`end` = 1) face of a cell along an axis.
+/// Weight of the lower (`end` = 0) or upper (`end` = 1) face of a cell along an axis, at the coordinate
+/// `along` from 0 to 1.
 fn weight(end: usize, along: f64) -> f64 {
     if end == 1 { along } else { 1.0 - along }
 }

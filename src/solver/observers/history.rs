@@ -54,7 +54,8 @@ pub struct HistoryObserver {
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     j_integrals: JIntegrals,
-    /// Energy (J) in the first row, and number of bonds that were intact before any bond could break.
+    /// Sum of the energy balance in the first row (J), and number of bonds that were intact before any bond
+    /// could break, counted at both ends.
     start: Option<(f64, u64)>,
 }
 
@@ -89,7 +90,7 @@ pub struct HistoryRow {
     pub number: u64,
     /// Energies of the row.
     pub energies: Energies,
-    /// Energy at the start, J; the error of the energy balance is relative to it.
+    /// Sum of the energy balance in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
     /// Kinetic energy, J, that loads and prescribed motions can add in a step without work in the trapezoidal
     /// rule.
@@ -103,8 +104,8 @@ impl HistoryObserver {
     ///
     /// # Errors
     /// If a set is empty, if no point lies along the line of a front, if all points of a tip lie behind its
-    /// start, or if the box of a J integral contains no point or is too near to the end of the bodies. The
-    /// error is the same on all ranks.
+    /// start, if the box of a J integral contains no point or is too near to the end of the bodies, or if no
+    /// body lies on the line of its front. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;
@@ -161,7 +162,7 @@ impl HistoryObserver {
         })
     }
 
-    /// Find the points of the history again after points have migrated. Collective.
+    /// Find the points of the history again after a rebalance or refinement. Collective.
     ///
     /// # Errors
     /// Same as for [`Self::new`].
@@ -180,8 +181,9 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Reference values for all rows: the energy (J) in the first row, and the number of bonds that were
-    /// intact before any bond could break.
+    /// Reference values for all rows: the sum of the energy balance in the first row (J), see
+    /// [`Energies::error`], and the number of bonds that were intact before any bond could break, counted at
+    /// both ends. `None` before the first row.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }

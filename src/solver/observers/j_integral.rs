@@ -22,8 +22,8 @@ use crate::solver::Simulation;
 use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
-/// Tolerance of the distance between the box and the ends of the bodies, relative to the margin, and of the
-/// components of the direction of growth.
+/// Tolerance of the distance between the box and the ends of the bodies, in horizons, and of the components
+/// of the direction of growth.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.
@@ -110,7 +110,7 @@ impl JIntegrals {
     }
 }
 
-/// Check that the box contains points, and that the bodies reach at least one horizon beyond it in the
+/// Check that the box contains points, and that the bodies reach at least one horizon beyond the box in the
 /// directions of the axes along which the crack grows. Collective.
 fn is_in_the_bodies<const D: usize>(
     simulation: &Simulation<'_, D>,

@@ -20,7 +20,7 @@ pub struct Tip {
 pub struct TipNow {
     /// Position, m.
     pub position: [f64; 3],
-    /// Length of the crack, m.
+    /// Length of the crack, m: distance of the tip from the start of the line, along the line.
     pub length: f64,
     /// Speed, m/s.
     pub speed: f64,
@@ -95,8 +95,8 @@ impl Tip {
 /// The length of a crack over time, from which its speed is computed.
 ///
 /// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
-/// latest row in which the crack was at least one horizon shorter. If there is no such row, it begins at the
-/// latest row in which the crack was not longer than at first.
+/// latest row in which the crack was at least one horizon shorter. If there is no such row, the interval
+/// begins at the latest row in which the crack was not longer than at first.
 ///
 /// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
 /// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
@@ -115,7 +115,8 @@ impl Growth {
         }
     }
 
-    /// Speed (m/s) when the length is `length` (m) at a time (s); NaN at the first length.
+    /// Record `length` (m) at `time` (s), and return the speed, m/s. The speed is NaN at the first length,
+    /// and if the length is NaN.
     fn speed(&mut self, time: f64, length: f64) -> f64 {
         if length.is_nan() {
             return f64::NAN;
