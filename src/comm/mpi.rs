@@ -22,7 +22,7 @@ const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
 
-// Cargo does not rebuild `mpi-sys` when the MPI library changes.
+// Cargo does not rebuild `mpi-sys` when the MPI library changes, so check that the bindings fit the library.
 const _: () = assert!(
     OF_OPEN_MPI == cfg!(open_mpi),
     "the target folder holds bindings to another MPI: take one folder for each (--target-dir), or \

@@ -2,7 +2,7 @@
 //!
 //! Every finite `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide fixed-point integer represents any sum
 //! exactly. Integer addition is associative, so the result is bitwise the same for any number of ranks and
-//! threads. It is within one unit in the last place of the exact sum.
+//! threads. The result is within one unit in the last place of the exact sum.
 
 use super::Communicator;
 

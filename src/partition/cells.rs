@@ -40,7 +40,7 @@ pub struct Cells {
 
 /// Costs and owners of the cells before a rebalance.
 pub struct CellLoads {
-    /// Measured time of the points of each cell, ns.
+    /// Measured computing time of the points of each cell, ns.
     pub costs: Vec<u64>,
     /// For each cell, the highest rank that owns points of it; −1 if the cell has no points.
     pub ranks: Vec<f64>,

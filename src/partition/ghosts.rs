@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! If a cell of rank a is adjacent to a cell of rank b, a sends the points of its cell to b. Rank b then
-//! requests as ghosts those of the points that lie within the cutoff of an owned point of b.
+//! If a cell of rank p is adjacent to a cell of rank q, rank p sends the points of its cell to rank q. Rank q
+//! then requests as ghosts the points among them that lie within the cutoff of a point of rank q.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 
 use super::grid_index::GridIndex;
 
-/// Edge of the cube of indices in one word.
+/// Edge of the cube of indices that one 64-bit word represents.
 pub(super) const EDGE: i64 = 4;
 
 /// Indices per word.

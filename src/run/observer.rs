@@ -41,7 +41,7 @@ pub enum Message {
     Started,
     /// The set-up of points and bonds is complete.
     SetUp {
-        /// The time step, s.
+        /// Time step of the first stage, s.
         step: f64,
         /// Stable step of the first stage, with the scaled density of this stage, s.
         stable_step: f64,

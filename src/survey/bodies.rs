@@ -12,8 +12,9 @@ use crate::solver::Simulation;
 /// printed for a larger difference.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// Largest factor between the mean volume of the points of a file or mesh and the volume of a cell whose edge is
-/// their mean distance. A warning is printed if the mean volume is larger or smaller by more than this factor.
+/// Largest factor between the mean volume of the points of a file or mesh, and the volume of a cell whose
+/// edge is the mean distance to the nearest neighbour. A warning is printed if the mean volume is larger or
+/// smaller by more than this factor.
 const VOLUME_FACTOR: f64 = 10.0;
 
 /// Number, volume, mass, centre and neighbours of a body's points.
@@ -44,8 +45,8 @@ impl BodyFigures {
         dimension.edge(self.volume / self.points as f64)
     }
 
-    /// Test whether the mean volume of points from a file or a mesh fits their distances, within a factor of
-    /// `VOLUME_FACTOR`; `None` for points without neighbours.
+    /// Test whether the mean volume of points from a file or a mesh fits their mean distance to the nearest
+    /// neighbour, within a factor of `VOLUME_FACTOR`; `None` for points without neighbours.
     pub fn volumes_fit(&self, dimension: Dimension) -> Option<bool> {
         let cell = self.cell(dimension);
         let ratio = self.volume / self.points as f64 / cell;

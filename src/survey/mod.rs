@@ -31,8 +31,8 @@ use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
-/// A point is weakly bonded if it has fewer intact bonds than this number, by dimension. The numbers are half
-/// the number of neighbours of a complete family with a horizon of two spacings.
+/// Number of intact bonds in 1-D, 2-D and 3-D. A warning is printed for points with fewer intact bonds. The
+/// numbers are half the number of neighbours of a complete family with a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Common horizons, in spacings.

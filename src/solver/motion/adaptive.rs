@@ -5,12 +5,12 @@
 //! the load is redistributed before more bonds break:
 //!
 //! ```text
-//! N_b > most broken, Δt > smallest                    undo the step, Δt ← Δt · reduce
-//! N_b ≤ stable broken in `steps` consecutive steps    Δt ← Δt · raise, up to the largest
+//! N_b > most_broken, Δt > smallest                    undo the step, Δt ← Δt · reduce
+//! N_b ≤ stable_broken in `steps` consecutive steps    Δt ← Δt · raise, up to the largest
 //! ```
 //!
 //! N_b is the largest number of bonds of a point that break in a step, over all ranks. All ranks therefore
-//! make the same decision.
+//! make the same decision. The other names are those of [`Adaptive`] and of the keys of `[time.adaptive]`.
 
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
@@ -38,7 +38,7 @@ pub struct StepControl {
     step: f64,
     /// Smallest and largest step, s.
     limits: [f64; 2],
-    /// Number of consecutive steps in which at most `stable broken` bonds of any point broke.
+    /// Number of consecutive steps in which at most `stable_broken` bonds of any point broke.
     calm: u64,
     /// Number of steps that were rolled back since the start of the run.
     pub undone: u64,

@@ -1,4 +1,4 @@
-//! The clock of a run: time, step and number of steps.
+//! The clock of a run: time, time step and number of steps.
 
 /// Time, time step and number of steps. The time step may change. The time since the last change is a
 /// multiple of the time step, so round-off does not accumulate.
@@ -75,7 +75,7 @@ impl Clock {
         self.number += 1;
     }
 
-    /// Change the step (s) from the present time on.
+    /// Set the time step to `step` (s), from the present time on.
     pub fn set_step(&mut self, step: f64) {
         self.since = (self.time(), self.number);
         self.step = step;

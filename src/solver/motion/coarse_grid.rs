@@ -2,11 +2,11 @@
 //!
 //! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
 //! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
-//! a cell. The cells have the stiffness of the classical solid. The elastic constants of a cell are averages
-//! over its points, weighted by volume and by the fraction of intact bonds. Supported components of points
-//! are springs at their position in the cell. Forces on points are distributed to the nodes of their cells
-//! (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same weights,
-//! so the preconditioner is symmetric.
+//! a cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
+//! averages over its points, weighted by volume and by the fraction of intact bonds. A supported component of
+//! a point acts as a spring at the position of the point in its cell. Forces on points are distributed to the
+//! nodes of their cells (restriction). Displacements of nodes are interpolated to the points (prolongation)
+//! with the same weights, so the preconditioner is symmetric.
 //!
 //! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
 //! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of
@@ -23,7 +23,7 @@ use crate::solver::model::Model;
 use super::banded::Banded;
 use super::load_step::CHUNK;
 
-/// Minimum edge of a cell, horizons.
+/// Minimum edge of a cell, in horizons.
 const EDGE: f64 = 1.0;
 
 /// Factor by which edges grow until the matrix is small enough.
@@ -33,7 +33,7 @@ const GROWTH: f64 = 1.1;
 /// with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// Multiply-adds to solve with the factored matrix that are allowed for any number of points.
+/// Number of multiply-adds to solve with the factored matrix that is always allowed, even with few points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.

@@ -34,11 +34,11 @@ pub enum Birth {
     /// A new point gets the mean. A removed point returns its volume times the difference of its value from
     /// the mean of its parents. This conserves momentum, and fields that are linear in space.
     Conserved,
-    /// A new point gets the mean. A removed point is mixed into its parents by volume, so that no value
-    /// leaves the previous range.
+    /// A new point gets the mean. The value of a removed point is mixed into the values of its parents by
+    /// volume, so that no value leaves the previous range.
     Mixed,
-    /// A new point gets a part by volume, so that the sum over all points is conserved. A removed point
-    /// returns all of its value.
+    /// A new point gets a part of the values of its parents, in proportion to volume, so that the sum over
+    /// all points is conserved. A removed point returns all of its value.
     Shared,
     /// The field is recomputed for a new point; a removed point returns nothing.
     FoundAnew,
@@ -352,8 +352,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Time at which a point was last within the horizon of a trigger of refinement or of a point with
-    /// missing bonds, s; none without coarsening.
+    /// Time at which a point was last within the horizon of a point that triggers refinement or has broken
+    /// bonds, s; none without coarsening.
     last_seen: Option<Vec<f64>> = Description {
         name: "last_seen",
         unit: "s",

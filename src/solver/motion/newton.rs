@@ -8,21 +8,21 @@
 //! η ← | ‖f(u + s x)‖ − ‖f − K x‖ | / ‖f‖   at most 0.1: nonlinearity of the forces
 //! ```
 //!
-//! η follows Eisenstat & Walker 1996, the differences Knoll & Keyes 2004. f includes the reactions, so f is 0
-//! for supported components. All force evaluations use the history that an equilibrium at the displaced
-//! positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that yield. ε is
-//! chosen such that the largest displacement component changes by `SHIFT` times the shortest horizon. The
-//! relative error of the difference is then of the order of `SHIFT` for bonds that rotate, and of the order
-//! of (machine ε)/`SHIFT` from rounding.
+//! η follows Eisenstat & Walker 1996, and the differences of f follow Knoll & Keyes 2004. f includes the
+//! reactions, so f is 0 for supported components. All force evaluations use the history that an equilibrium
+//! at the displaced positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that
+//! yield. ε is chosen such that the largest displacement component changes by `SHIFT` times the shortest
+//! horizon. The relative error of the difference is then of the order of `SHIFT` for bonds that rotate, and
+//! of the order of (machine ε)/`SHIFT` from rounding.
 //!
-//! K is symmetric for laws with an energy. In a body that softens or buckles, K may not be positive
-//! definite. The conjugate gradients then stop at the first direction of negative curvature. The
-//! preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
+//! K is symmetric if the forces of the law derive from an energy. In a body that softens or buckles, K may
+//! not be positive definite. The conjugate gradients then stop at the first direction of negative curvature.
+//! The preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
 //! (`coarse_grid.rs`), for long waves.
 //!
 //! The first iteration of a load step linearizes about the last equilibrium in two cases: the size of the
-//! load step has changed, or bonds broke in the last load step. The prescribed displacements are then part of
-//! the motion. Otherwise, the points first repeat their motion of the last load step.
+//! load step has changed, or bonds broke in the last load step. The change of the prescribed displacements is
+//! then part of x. Otherwise, the points first repeat their motion of the last load step.
 //!
 //! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. A load
 //! step in which bonds have broken is not repeated, because an equilibrium at its full load was then found. A
@@ -187,8 +187,7 @@ struct Vectors<const D: usize> {
     /// bond.
     inverse_diagonal: [Vec<f64>; D],
     coarse: CoarseGrid<D>,
-    /// Whether the preconditioner must be computed: bonds have broken since its last computation, or there
-    /// was none.
+    /// Whether the preconditioner must be computed: at first, and after bonds have broken.
     is_stale: bool,
     /// The shortest horizon, m.
     horizon: f64,

@@ -26,8 +26,8 @@ pub(super) struct Piece {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a column per component over the local points: 0 for points with a nonzero load that can move,
-    /// otherwise 1.
+    /// Return a column per component over the local points: 0 for points that can move and have a nonzero
+    /// load, otherwise 1.
     pub(super) fn unloaded_points(&self) -> [Vec<f64>; D] {
         let mut all = std::array::from_fn(|_| vec![1.0; self.model.volume.len()]);
         // A point that has never had an intact bond does not move in load steps, so its loads are ignored.
@@ -44,8 +44,8 @@ impl<const D: usize> Simulation<'_, D> {
         all
     }
 
-    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]. The
-    /// supports of the present stage apply. Collective.
+    /// Find the pieces of all bodies. `is_unloaded` contains the columns of [`Self::unloaded_points`], at one
+    /// or several times. The supports of the present stage apply. Collective.
     pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {

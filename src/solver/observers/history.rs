@@ -43,7 +43,7 @@ struct Probe {
 pub struct HistoryObserver {
     columns: Columns,
     reactions: Vec<Vec<u32>>,
-    /// Points of each support force, and the direction of the force component.
+    /// For each support force, this rank's points of the set, and the direction of the force component.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
     statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
@@ -103,9 +103,9 @@ impl HistoryObserver {
     /// Find the points of all sets, probes, fronts, cracks, tips and J integrals of the history. Collective.
     ///
     /// # Errors
-    /// If a set is empty, if no point lies along the line of a front, if all points of a tip lie behind its
-    /// start, if the box of a J integral contains no point or is too near to the end of the bodies, or if no
-    /// body lies on the line of its front. The error is the same on all ranks.
+    /// If a set is empty, if no point lies along the line of a front, if all points of the set of a crack tip
+    /// lie behind the start of the line, if the box of a J integral contains no point or is too near to the
+    /// end of the bodies, or if no body lies on the line of its front. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;

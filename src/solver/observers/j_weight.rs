@@ -63,8 +63,8 @@ fn extent(edges: [f64; 3], direction: [f64; 3]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
-/// Return the centre and the edges of the cell that an owned point fills, m, and whether the cells of its body fill
-/// the body without gaps.
+/// Return the centre and the edges (m) of the cell that an owned point fills. Also return whether the cells
+/// of the body fill the body without gaps.
 fn cell<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
@@ -125,7 +125,7 @@ fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
 }
 
 /// Integrate q along the part of a line that lies in the bodies, m. The line passes through the centre of the
-/// box along the crack front. Collective.
+/// box in the direction `front`. Collective.
 ///
 /// # Errors
 /// If no body lies on the line in the box. The error is the same on all ranks.
@@ -171,8 +171,8 @@ pub fn front_length<const D: usize>(
     Err(Error::input(message).at(&rule.span))
 }
 
-/// Integrate q over a range of the line, m. Between the positions at which a factor of q has a kink, q is a product
-/// of up to three linear factors, for which Simpson's rule is exact.
+/// Integrate q over a range of the line, m. Between the positions at which a factor of q has a kink, q is a
+/// product of up to three linear factors. Simpson's rule is exact for such a product.
 fn integral(rule: &JIntegral, centre: [f64; 3], front: [f64; 3], range: Range<f64>) -> f64 {
     let mut kinks = vec![range.start, range.end];
     for d in 0..3 {

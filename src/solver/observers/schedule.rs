@@ -12,7 +12,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Create a schedule with intervals.
+    /// Create a schedule with this interval and without given times.
     pub fn every(interval: Interval) -> Self {
         Self {
             interval: Some(interval),
@@ -55,7 +55,7 @@ impl Schedule {
         }
     }
 
-    /// Number of given times up to a time (s), except for round-off.
+    /// Number of given times that are at most `time` (s), up to round-off.
     fn reached(&self, time: f64) -> usize {
         self.times
             .partition_point(|given| given * (1.0 - ROUNDING) <= time)

@@ -15,7 +15,7 @@ pub struct Tip {
     growth: Growth,
 }
 
-/// State of a crack tip at the time of a row; NaN if no point is above its threshold.
+/// State of a crack tip at the time of a row; NaN if no damage exceeds the threshold of the tip.
 #[derive(Debug, Clone, Copy)]
 pub struct TipNow {
     /// Position, m.
