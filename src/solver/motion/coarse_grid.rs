@@ -3,10 +3,10 @@
 //! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
 //! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
 //! a cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
-//! averages over its points, weighted by volume and by the fraction of intact bonds. A supported component of
-//! a point acts as a spring at the position of the point in its cell. Forces on points are distributed to the
-//! nodes of their cells (restriction). Displacements of nodes are interpolated to the points (prolongation)
-//! with the same weights, so the preconditioner is symmetric.
+//! averages over its points by volume. Each point contributes its constants times its fraction of intact
+//! bonds. A supported component of a point acts as a spring at the position of the point in its cell. Forces
+//! on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
+//! interpolated to the points (prolongation) with the same weights, so the preconditioner is symmetric.
 //!
 //! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
 //! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of
@@ -29,8 +29,8 @@ const EDGE: f64 = 1.0;
 /// Factor by which edges grow until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Allowed multiply-adds per point to solve with the factored matrix: about as many as a force evaluation
-/// with few bonds.
+/// Number of multiply-adds per material point that are allowed to solve with the factored matrix: about as
+/// many as a force evaluation with few bonds needs.
 const SOLUTION: f64 = 16.0;
 
 /// Number of multiply-adds to solve with the factored matrix that is always allowed, even with few points.

@@ -238,7 +238,7 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Factor of strain rate and temperature on the yield stress of a point in the last step, minus 1; none
+    /// Relative change of the yield stress of a point by strain rate and temperature, in the last step; none
     /// without plasticity.
     yield_change: Option<Vec<f64>> = Description {
         name: "yield_change",

@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(due(every(4), &[0.1, 0.45], 0.1, 10), [0, 1, 4, 5, 8, 10]);
         let seconds = Some(Interval::Seconds(0.25));
         assert_eq!(due(seconds, &[0.4, 0.5], 0.1, 10), [0, 3, 4, 5, 8, 10]);
-        // Steps whose multiples are rounded.
+        // Time steps whose multiples are not exact in floating point.
         for step in [0.1, 1e-8 / 3.0, 7.3e-9] {
             let times: Vec<f64> = [3, 10, 700, 99_999].map(|k| f64::from(k) * step).to_vec();
             assert_eq!(

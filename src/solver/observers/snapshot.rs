@@ -219,7 +219,7 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
 }
 
 /// Stretch ratio (deformed over reference length) of an owned point perpendicular to the plane or bar, for
-/// this deformation gradient. The ratio is 1 if the strain in this direction is 0, and in 3-D.
+/// this deformation gradient. The ratio is 1 in plane strain, under uniaxial strain, and in 3-D.
 fn stretch_across<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
