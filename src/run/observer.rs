@@ -151,10 +151,10 @@ pub trait RunState {
 
     /// Return the values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit
     /// of [`Field::unit`]. The values are ordered by point, with [`Field::components`] values per point. A
-    /// request needs one to three passes over the bonds. Collective: all ranks must request the same field.
+    /// request needs one or several passes over the bonds. Collective: all ranks must request the same field.
     fn field(&mut self, field: Field) -> Vec<f64>;
 
-    /// Return the energies of all points, J. A request needs one pass over the bonds. Collective.
+    /// Return the energies of all points, J. A request needs one or two passes over the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
     /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. After a request

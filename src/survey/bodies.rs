@@ -34,8 +34,8 @@ pub struct BodyFigures {
     /// Mean distance to the nearest neighbour for points from a file or mesh, m; 0 if there are no
     /// neighbours.
     pub spacing: f64,
-    /// Smallest, median and largest number of neighbours per point, without pre-cracked bonds, for bodies
-    /// that do not lie on a lattice.
+    /// Smallest, median and largest number of neighbours per point; bonds that pre-cracks cut do not count.
+    /// `None` for bodies on a lattice.
     pub neighbours: Option<[u64; 3]>,
 }
 
@@ -126,8 +126,7 @@ fn is_from_file(body: &Body) -> bool {
     !matches!(body.points, PointSource::Lattice { .. })
 }
 
-/// Return the smallest, median and largest number of neighbours per point of each body that does not lie on a
-/// lattice. Collective.
+/// Return [`BodyFigures::neighbours`] of each body. Collective.
 fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64; 3]>> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let bodies = problem.bodies.iter().enumerate();

@@ -15,10 +15,10 @@ const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 /// Bytes of a result or checkpoint in addition to the data of the points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list: an eighth of a compact group of neighbour indices, and one bit.
+/// Bytes of a bond in a list, at each end: an eighth of a compact group of neighbour indices, and one bit.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
-/// Bytes of a bond in a lattice: one bit.
+/// Bytes of a bond in a lattice, at each end: one bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
 /// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which
@@ -26,8 +26,8 @@ const ON_LATTICE: f64 = 1.0 / 8.0;
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
-/// Estimated bytes per point and per list bond at the peak of the set-up. The set-up of lattices needs less
-/// memory than the time loop.
+/// Estimated bytes per point, and per end of a bond in a list, at the peak of the set-up. The set-up of
+/// lattices needs less memory than the time loop.
 const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 
 /// Estimated bytes per point for contact, from a measurement with a block of 512 000 points without contacts.
@@ -161,8 +161,7 @@ impl Cost {
     }
 }
 
-/// Return the bytes of history per directed bond of a body. Each directed bond stores the history of both
-/// ends.
+/// Return the bytes of history that a body stores at each end of a bond: the history of both ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {

@@ -42,7 +42,7 @@ const FACTORIZATION: f64 = 2e8;
 /// Maximum number of nodes at the corners of a cell.
 const CORNERS: usize = 8;
 
-/// Maximum number of pairs of nodes of a cell.
+/// Maximum number of pairs of nodes of a cell, including the pairs of a node with itself.
 const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 
 /// The grid, and its stiffness matrix as a Cholesky factor.

@@ -643,7 +643,7 @@ fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Exact
     })
 }
 
-/// Compute several exact sums over the points with local index below `count`. `add` adds the terms of a
+/// Compute `width` exact sums over the points with local index below `count`. `add` adds the terms of a
 /// point.
 fn sums_over(
     count: usize,

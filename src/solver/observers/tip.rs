@@ -100,7 +100,7 @@ impl Tip {
 ///
 /// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
 /// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
-/// speed falls as one horizon divided by the duration of the interval.
+/// speed is one horizon divided by the duration of the interval, which then grows from row to row.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.
