@@ -76,7 +76,7 @@ impl Banded {
         }
     }
 
-    /// Solve L Lᵀ x = b after [`Self::factor`]. `values` contains b, and then x.
+    /// Solve L Lᵀ x = b after [`Self::factor`]. `values` contains b at the call and x at the return.
     pub fn solve(&self, values: &mut [f64]) {
         let width = self.band + 1;
         for row in 0..self.size {

@@ -89,7 +89,7 @@ impl<'a, const D: usize> Part<'a, D> {
         self.velocity[0].len()
     }
 
-    /// Blocks of the points of the part.
+    /// Index of the block of each point of the part.
     pub fn blocks(&self) -> &'a [u16] {
         &self.model.block[self.first..self.first + self.count()]
     }
