@@ -75,8 +75,8 @@ impl<'a> Grids<'a> {
         self.coarsest
     }
 
-    /// Refine the regions of the problem permanently. Nodes are suppressed if a pre-crack separates their
-    /// parents. `coarse` are this rank's level-0 points. Collective.
+    /// Refine the regions of the problem permanently. Nodes are suppressed if a pre-crack separates two of
+    /// their parents. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
     /// If a region contains no point of a body given as a shape; the error is the same on all ranks.

@@ -1,4 +1,4 @@
-//! Warnings about loads and supports without the intended effect.
+//! Warnings about loads, supports and temperatures without the intended effect.
 
 use std::collections::HashSet;
 

@@ -74,9 +74,9 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Call `look` at the first and at the last load step of a stage, until `look` returns a value. The
-    /// arguments of `look` are the simulation with the loads and supports of this load step, the pieces, and
-    /// the time, s.
+    /// Call `look` at the first and at the last load step of a stage, until `look` returns a value. Return
+    /// this value. The arguments of `look` are the simulation with the loads and supports of this load step,
+    /// the pieces, and the time, s.
     ///
     /// `look` is not called for explicit stages and for stages without loads. It is not called in runs with
     /// contact either, because contact can hold pieces. Afterwards, the loads and supports of the first stage
@@ -203,8 +203,8 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Find a piece that the present loads rotate. Of several pieces, return the one with the smallest point
-    /// id. Collective.
+    /// Find a piece that the present loads rotate, and that no support holds in the plane of the rotation. Of
+    /// several pieces, return the one with the smallest point id. Collective.
     fn find_unheld_torque(&self, pieces: &Pieces<D>) -> Option<UnheldTorque> {
         const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
         let planes = || (0..3).filter(|axis| PLANES[*axis].iter().all(|d| *d < D));

@@ -337,7 +337,8 @@ impl<const D: usize> Simulation<'_, D> {
         )))
     }
 
-    /// Describe the point with the largest unbalanced force. Collective.
+    /// Return a text for error messages that describes the point with the largest unbalanced force; empty if
+    /// no point has bonds. Collective.
     fn worst_point(&self) -> String {
         let (model, fields) = (&self.model, &self.fields);
         let density = fields.fictitious_density.as_deref().unwrap_or_default();

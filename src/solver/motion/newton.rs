@@ -290,7 +290,7 @@ impl<const D: usize> Vectors<D> {
 
     /// Improve x by conjugate gradients until ‖f − K x‖ is at most η times its initial value, or
     /// `LINEAR_TOLERANCE_SHARE` times `allowed`, or until the iterations are used up. `allowed` is the norm
-    /// ‖f‖ (N) that is accepted as equilibrium. Collective.
+    /// ‖f‖ (N) that is accepted as equilibrium. Returns ‖f − K x‖ before and after. Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };

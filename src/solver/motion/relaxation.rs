@@ -47,7 +47,7 @@ impl<const D: usize> Integrator<D> for DynamicRelaxation {
 /// Upper limit of the damping c; from c = 2 on, the velocity would change its sign.
 const MOST_DAMPING: f64 = 1.9;
 
-/// Sums with the forces before an evaluation: u̇·f and u̇·ρ u̇, J.
+/// Sums of the velocities u̇ of an iteration, before the force evaluation: u̇·f and u̇·ρ u̇, J.
 struct Before {
     power: ExactSum,
     inertia: ExactSum,
@@ -93,7 +93,7 @@ impl<const D: usize> Simulation<'_, D> {
         velocity.for_each(|component| component.fill(0.0));
     }
 
-    /// Move the points by one iteration.
+    /// Move the points by one iteration. Returns the sums of the new velocities and the old forces.
     fn drift(&mut self) -> Before {
         self.load_step.iterations += 1;
         self.load_step.since_breaking += 1;
