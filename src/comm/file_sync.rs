@@ -23,8 +23,8 @@ pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition. It
-/// skips the fsync inside [`without_fsync`].
+/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition. The
+/// override skips the fsync inside [`without_fsync`].
 ///
 /// # Safety
 /// `file` must be open.

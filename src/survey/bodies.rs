@@ -28,8 +28,8 @@ pub struct BodyFigures {
     pub mass: f64,
     /// Centre of mass, m.
     pub centre: [f64; 3],
-    /// Volume of the shape without the parts that later bodies occupy, m³; `None` for points from a file or
-    /// mesh.
+    /// Volume of the shape without the parts that bodies later in the deck occupy, m³; `None` for points from
+    /// a file or mesh.
     pub shape_volume: Option<f64>,
     /// Mean distance to the nearest neighbour for points from a file or mesh, m; 0 if there are no
     /// neighbours.

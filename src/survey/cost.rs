@@ -211,7 +211,7 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Return the number of values per point in a checkpoint.
+/// Return the number of values per point in a checkpoint, without the state of the bonds.
 fn saved_width(problem: &Problem) -> usize {
     fn width<const D: usize>(problem: &Problem) -> usize {
         let mut blocks = problem.blocks();

@@ -42,7 +42,7 @@ pub struct LoadStep {
     /// Number of iterations in this load step. The prediction with which Newton's method begins a load step
     /// does not count.
     pub iterations: u64,
-    /// Number of iterations since bonds last broke in this load step, or since its start.
+    /// Number of iterations since bonds last broke in this load step, or since the start of the load step.
     pub since_breaking: u64,
     /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
     /// point. The residual is 0 if f is round-off, and NaN before the first load step.
@@ -286,8 +286,8 @@ impl<const D: usize> Simulation<'_, D> {
         contact.map_or(ExactSum::ZERO, |contact| contact.rigid_forces().clone())
     }
 
-    /// Raise `scale` to the norms of loads and reactions at the present equilibrium, if they are larger.
-    /// Collective.
+    /// Raise `scale` to the sum of the norms of loads and reactions at the present equilibrium, if this sum
+    /// is larger. Collective.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, mut reactions] = sums(model, fields, |point, _| {

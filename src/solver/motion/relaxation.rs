@@ -18,9 +18,9 @@
 //!
 //! [`super::load_step`] defines the equilibrium and when bonds break.
 //!
-//! Contact is part of the equilibrium. Its repulsion has a potential; neither friction nor damping acts.
-//! While points are in contact, their ρ includes the contact stiffness. Rigid bodies with a prescribed motion
-//! move with time, as supports do. The forces of rigid bodies on the points count as reactions.
+//! Contact is part of the equilibrium. The repulsion has a potential; neither friction nor contact damping
+//! acts. While points are in contact, their ρ includes the contact stiffness. Rigid bodies with a prescribed
+//! motion move with time, as supports do. The forces of rigid bodies on the points count as reactions.
 
 use std::time::Instant;
 

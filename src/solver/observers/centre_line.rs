@@ -250,8 +250,8 @@ fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Ve
         place: from,
         along: 0.0,
     };
-    // The branches begin at the part without a parent that extends farthest. Other parts without parents are
-    // not used.
+    // Of the parts without a parent, the branches begin at the part with the largest `farthest`. The other
+    // parts without a parent are not used.
     let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
     let farther = |a: &usize, b: &usize| {
         let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);

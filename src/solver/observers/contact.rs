@@ -22,8 +22,8 @@ const CELL: f64 = 8.0;
 /// their initial distance.
 const NEARER: f64 = 0.9;
 
-/// If bonds joined two bodies, two of their points are too near if their distance is below this fraction of
-/// their spacing and of their initial distance. Compression alone rarely reaches this distance.
+/// Two points of bodies that bonds joined are too near if their distance is below this fraction of both their
+/// spacing and their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Number of points that one task processes.

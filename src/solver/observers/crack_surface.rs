@@ -63,8 +63,8 @@ pub struct Surface {
     /// Largest distance between the start of the crack and a damaged point of the crack, m; 0 without damaged
     /// points.
     pub reach: f64,
-    /// Positions of the points of the front, moved to the mid-plane of the crack, m. They are in the order of
-    /// the ids of the points.
+    /// Positions of the points of the front, moved to the mid-plane of the crack, m. The positions are in the
+    /// order of the ids of the points.
     pub front: Vec<[f64; 3]>,
 }
 

@@ -294,7 +294,8 @@ fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) 
     -material.elastic.youngs_modulus * material.expansion.coefficient * change
 }
 
-/// Plastic state of an owned point. Only its plastic strain is set, which is 0 without plasticity.
+/// Plastic state of an owned point. Only the plastic strain of this state is set; the strain is 0 without
+/// plasticity.
 fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticState {
     let strain = fields.plastic_strain.as_ref();
     PlasticState {
