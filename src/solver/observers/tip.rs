@@ -63,7 +63,8 @@ impl Tip {
         &self.name
     }
 
-    /// State of the tip for the given damage of the owned points. Collective.
+    /// Return the state of the tip for the given damage of the owned points, and record the length of the
+    /// crack for later speeds. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
