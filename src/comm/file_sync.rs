@@ -1,4 +1,5 @@
-//! Disables the fsync of files written through MPI, because HDF5 calls `MPI_File_sync` at every flush.
+//! Switch for the fsync of files that are written through MPI. HDF5 calls `MPI_File_sync` at every flush,
+//! also if no fsync is needed.
 
 use std::cell::Cell;
 use std::os::raw::c_int;
@@ -9,7 +10,7 @@ thread_local! {
 
 /// Run `work` with fsync disabled on this thread.
 pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
-    /// Restores the previous value, even if `work` panics.
+    /// Guard whose drop restores the previous value of `SKIP_FSYNC`, even if `work` panics.
     struct Restore(bool);
 
     impl Drop for Restore {
@@ -22,8 +23,8 @@ pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition. It
-/// skips the fsync inside [`without_fsync`].
+/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition. The
+/// override skips the fsync inside [`without_fsync`].
 ///
 /// # Safety
 /// `file` must be open.

@@ -113,8 +113,9 @@ pub struct Found<T, const N: usize = 1> {
     pub payload: T,
 }
 
-/// Find the candidate with the smallest key over all ranks. Among equal keys, it is the candidate with the
-/// smallest ids. `None` if there are no candidates. The result is the same on all ranks. Collective.
+/// Find the candidate with the smallest key over all ranks. Among candidates with this key, the ids are
+/// compared in lexicographic order. `None` if there are no candidates. The result is the same on all ranks.
+/// Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,
@@ -166,7 +167,7 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     Err(unpack(&packed))
 }
 
-/// Entry for the span in a packed error that has no span.
+/// Value that is packed as the span of an error without a span.
 const NO_SPAN: [u64; 2] = [u64::MAX; 2];
 
 /// Number of bytes of a packed error before its message: exit code, and start and end of the span.

@@ -1,6 +1,6 @@
 //! The communicator of MPI runs: `MPI_COMM_WORLD`.
 //!
-//! Only the thread that created the world may call it (`MPI_THREAD_FUNNELED`).
+//! Only the thread that created the [`World`] may use it (`MPI_THREAD_FUNNELED`).
 
 use std::cell::{RefCell, RefMut};
 use std::ffi::c_void;
@@ -22,7 +22,7 @@ const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
 
-// Cargo does not rebuild `mpi-sys` when the MPI library changes.
+// Cargo does not rebuild `mpi-sys` when the MPI library changes, so check that the bindings fit the library.
 const _: () = assert!(
     OF_OPEN_MPI == cfg!(open_mpi),
     "the target folder holds bindings to another MPI: take one folder for each (--target-dir), or \
@@ -286,7 +286,7 @@ impl Communicator for World {
             self.world.all_gather_varcount_into(own, &mut parts);
             return all;
         }
-        // Displacements of a single call may not fit in 32 bits, so each rank broadcasts its part.
+        // The byte offsets of a single call may not fit in 32 bits, so each rank broadcasts its part.
         let mut rest = &mut all[..];
         for (rank, size) in sizes.into_iter().enumerate() {
             let (part, others) = rest.split_at_mut(size as usize);

@@ -7,7 +7,7 @@
 /// Number of bits for the magnitude of a sum.
 const BITS: i32 = 62;
 
-/// Largest exponent of the factor, so that the factor and its inverse are finite.
+/// Largest exponent of `Unit::factor`, so that this factor and its inverse are finite.
 const MOST: i32 = 1000;
 
 /// The unit of the terms: a power of 2.

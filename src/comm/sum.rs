@@ -2,7 +2,7 @@
 //!
 //! Every finite `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide fixed-point integer represents any sum
 //! exactly. Integer addition is associative, so the result is bitwise the same for any number of ranks and
-//! threads. It is within one unit in the last place of the exact sum.
+//! threads. The result is within one unit in the last place of the exact sum.
 
 use super::Communicator;
 
@@ -89,7 +89,7 @@ impl ExactSum {
         self.pending = 1;
     }
 
-    /// The sum of the terms, rounded to a number.
+    /// The sum of the terms, rounded to `f64`; NaN if a term was not finite.
     pub fn value(&self) -> f64 {
         if !self.finite {
             return f64::NAN;

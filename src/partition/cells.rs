@@ -24,8 +24,8 @@ pub fn max_cells(ranks: usize) -> usize {
         .min(LARGE_TOTAL.max(MIN_PER_RANK * ranks))
 }
 
-/// A grid of cells over all points, equal on all ranks. Points closer than the cutoff lie in the same
-/// cell or in adjacent cells.
+/// A grid of cells over all points, equal on all ranks. Points closer than the cutoff lie in the same cell or
+/// in adjacent cells. A cell consists of equal boxes.
 #[derive(Debug, Clone)]
 pub struct Cells {
     lower: [f64; 3],
@@ -40,7 +40,7 @@ pub struct Cells {
 
 /// Costs and owners of the cells before a rebalance.
 pub struct CellLoads {
-    /// Measured time of the points of each cell, ns.
+    /// Measured computing time of the points of each cell, ns.
     pub costs: Vec<u64>,
     /// For each cell, the highest rank that owns points of it; −1 if the cell has no points.
     pub ranks: Vec<f64>,
@@ -111,8 +111,8 @@ impl Cells {
         (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
-    /// The cells that share a face, an edge or a corner with a cell. For each of them, also the directions in
-    /// which it is displaced.
+    /// The cells that share a face, an edge or a corner with `cell`. Each item is the index of such a cell,
+    /// and for each direction, whether the cell is displaced from `cell` in this direction.
     pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
         let position = [cell % nx, cell / nx % ny, cell / nx / ny];

@@ -5,7 +5,8 @@ use crate::points::Point;
 
 /// The local points of a rank, in the order of local indices:
 ///
-/// 1. interior points, which have no bonds to ghosts, sorted by cell, box and id;
+/// 1. interior points, which have no bonds to ghosts, sorted by partition cell, by box in the cell, and by
+///    id;
 /// 2. border points, sorted in the same way;
 /// 3. ghosts, grouped by owner and sorted by id.
 ///

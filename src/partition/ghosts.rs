@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! If cells of a rank are adjacent to cells of another rank, the rank sends the points of these cells to the
-//! other rank. The receiver then requests as ghosts the points within the cutoff of one of its owned points.
+//! If a cell of rank p is adjacent to a cell of rank q, rank p sends the points of its cell to rank q. Rank q
+//! then requests as ghosts the points among them that lie within the cutoff of a point of rank q.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -81,8 +81,8 @@ pub fn domain(
 }
 
 /// For each other rank, select the points of this rank in cells that are adjacent to cells of the other rank.
-/// Return their bytes by rank, and the indices of all selected points; only these points can have ghosts as
-/// neighbours. `owned` is sorted by cell.
+/// Return the bytes of these points by rank, and the indices of all selected points. Only these points can
+/// have ghosts as neighbours. `owned` is sorted by cell.
 fn offers(
     comm: &dyn Communicator,
     cells: &Cells,

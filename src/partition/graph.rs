@@ -16,8 +16,8 @@ const ALONG_X: f64 = 1.5;
 /// Owner of cells without points.
 pub const NO_OWNER: u32 = u32::MAX;
 
-/// With fewer cells per part than this, recursive bisection is used, because the k-way method leaves parts
-/// empty.
+/// With fewer cells per part than this, recursive bisection is used, because the k-way method would leave
+/// parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
 /// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If there are

@@ -65,8 +65,8 @@ impl<'a> AtCoarser<'a> {
         }
     }
 
-    /// Test whether a coarser node lies within the distance of `index`. If so, an index within the distance
-    /// could have a node of the level but has none.
+    /// Test whether a coarser node lies within the distance of `index`. This is the case if a node of the
+    /// level is possible, but missing, at an index within the distance.
     ///
     /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {

@@ -1,4 +1,4 @@
-//! Fractions of refined points that belong to a set.
+//! The fraction of each point that belongs to a set, on refined grids.
 
 use rustc_hash::FxHashMap;
 

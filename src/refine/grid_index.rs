@@ -32,7 +32,7 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
 }
 
 /// The index with the number `number` among the indices of a level in a level-0 cell, in steps of this level.
-/// Numbers count indices with x fastest; `origin`, the centre of the cell, has number 0.
+/// Numbers count indices with x fastest. `origin`, the index of the centre of the cell, has number 0.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)

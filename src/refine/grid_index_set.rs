@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 
 use super::grid_index::GridIndex;
 
-/// Edge of the cube of indices in one word.
+/// Edge of the cube of indices that one 64-bit word represents.
 pub(super) const EDGE: i64 = 4;
 
 /// Indices per word.
@@ -43,7 +43,7 @@ impl GridIndexSet {
         self.word(word) >> bit & 1 == 1
     }
 
-    /// The bits of the indices in a word.
+    /// The bits of the indices of this set that lie in `word`.
     pub(super) fn word(&self, word: GridIndex) -> u64 {
         self.words.get(&word).copied().unwrap_or(0)
     }

@@ -75,8 +75,8 @@ impl<'a> Grids<'a> {
         self.coarsest
     }
 
-    /// Refine the regions of the problem permanently. Nodes are suppressed if a pre-crack separates their
-    /// parents. `coarse` are this rank's level-0 points. Collective.
+    /// Refine the regions of the problem permanently. Nodes are suppressed if a pre-crack separates two of
+    /// their parents. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
     /// If a region contains no point of a body given as a shape; the error is the same on all ranks.
@@ -194,8 +194,9 @@ impl<'a> Grids<'a> {
         }
     }
 
-    /// The faces half-way between adjacent nodes at which a node is suppressed. Each face has its centre (m),
-    /// the edges (m) of the cells of the two adjacent nodes, and the axis of its normal.
+    /// The faces between the cells of adjacent nodes of a level, if the node half-way between the two nodes
+    /// is suppressed. Each item is the centre of a face (m), the edges of the cells of the two nodes (m), and
+    /// the axis of the normal of the face.
     pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
@@ -269,7 +270,8 @@ impl<'a> Grids<'a> {
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))
     }
 
-    /// The parents of a node. All indices are in steps of the finest level.
+    /// The parents of a node that is not on the grid of level 0. All indices are in steps of the finest
+    /// level.
     pub fn parents(&self, index: GridIndex) -> Vec<GridIndex> {
         let (level, index) = canonical(self.finest, index);
         let steps = 1 << (self.finest + 1 - level);

@@ -106,7 +106,8 @@ impl Pattern {
         node.filter(|node| !is_in(&self.permanent, node))
     }
 
-    /// The nodes that coarsening a node has removed, as grid indices in steps of the finest level.
+    /// The nodes that have been removed by coarsening the node at `index` of `level`, as grid indices in
+    /// steps of the finest level.
     pub fn removed(
         &self,
         body: &impl Fn(GridIndex) -> bool,
@@ -187,8 +188,8 @@ impl Pattern {
                 all += 1;
                 if self.is_taken(coarse + 1, other) {
                     taken += 1;
-                    // Eq. 12: subtract 1/2, 1/4 or 1/8 of the finer volume for a node that is offset along 1,
-                    // 2 or 3 axes.
+                    // Eq. 12 of Dipasquale et al.: subtract 1/2, 1/4 or 1/8 of the finer volume for a node
+                    // that is offset along 1, 2 or 3 axes.
                     volume -= cell(coarse + 1) >> halves(other);
                 }
             }

@@ -14,7 +14,8 @@ use super::recorder::Recorder;
 /// Writer of checkpoints, with the number of written checkpoints and the time spent on writing.
 pub struct CheckpointWriter {
     checkpoints: Checkpoints,
-    /// Description of the physics. A restart compares this description with the description of its deck.
+    /// Description of the physics, which each checkpoint contains. A restart compares the description in the
+    /// checkpoint with the description of the restarted run.
     physics: String,
     fingerprint: u64,
     /// Number of checkpoints written.

@@ -13,8 +13,8 @@ use crate::solver::observers::HistoryRow;
 /// instability.
 const WARNING_GAIN: f64 = 1.0;
 
-/// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows, or the last row,
-/// exceed this ratio.
+/// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows, or the last row
+/// of a stage, exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
 /// Ratio of energy gain to energy input. The run ends with an error at the first row above this ratio.
@@ -74,8 +74,8 @@ impl EnergyWatch {
     /// [`WARNING_GAIN`]. The result is the same on all ranks.
     ///
     /// # Errors
-    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last one, above
-    /// [`CERTAIN_GAIN`] in one row, or not finite.
+    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last row of a stage, above
+    /// [`CERTAIN_GAIN`] in one row, or NaN.
     pub fn check(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
         // Negative fracture energy means that breaking bonds have added energy, which would hide part of the

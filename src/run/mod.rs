@@ -73,7 +73,7 @@ pub struct Outcome {
     pub stopped: Option<Reason>,
     /// Number of the step reached.
     pub number: u64,
-    /// Number of the last step.
+    /// Number of the last step of the whole run, if the time step does not change.
     pub last: u64,
     /// Time reached, s.
     pub time: f64,
@@ -570,7 +570,7 @@ impl<'a> Job<'a> {
         &self,
         simulation: &Simulation<'_, D>,
     ) -> Vec<(&'static str, String)> {
-        // Attributes are written collectively, so values that can differ come from rank 0.
+        // Attributes are written collectively, so values that can differ between ranks come from rank 0.
         let [text, in_full, path] = match self.options.deck.as_ref().map(Deck::source) {
             Some(Source { path, text, .. }) => [
                 text.clone(),

@@ -21,10 +21,11 @@ pub trait Observer {
     /// written.
     fn step(&mut self, _now: &mut dyn RunState) {}
 
-    /// Called after a row of the history has been computed.
+    /// Called after a row of the history has been computed. In a new run, the first row precedes the call of
+    /// [`Self::begin`].
     fn row(&mut self, _now: &mut dyn RunState, _row: &Row) {}
 
-    /// Called after the time loop. `complete` is true at the end of the run, false after a stop.
+    /// Called after the time loop. `complete` is true at the end of the run, false after a stop or a failure.
     fn end(&mut self, _complete: bool) {}
 }
 
@@ -40,7 +41,7 @@ pub enum Message {
     Started,
     /// The set-up of points and bonds is complete.
     SetUp {
-        /// The time step, s.
+        /// Time step of the first stage, s.
         step: f64,
         /// Stable step of the first stage, with the scaled density of this stage, s.
         stable_step: f64,
@@ -123,13 +124,13 @@ pub trait RunState {
     /// Return the number of the step reached.
     fn number(&self) -> u64;
 
-    /// Return the number of the last step.
+    /// Return the number of the last step of the whole run, if the time step does not change.
     fn last(&self) -> u64;
 
     /// Return the time reached, s.
     fn time(&self) -> f64;
 
-    /// Return the length of a step, s.
+    /// Return the present time step, s.
     fn step(&self) -> f64;
 
     /// Return the dimension of the problem, which is the number of components of vectors.
@@ -150,10 +151,10 @@ pub trait RunState {
 
     /// Return the values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit
     /// of [`Field::unit`]. The values are ordered by point, with [`Field::components`] values per point. A
-    /// request needs one to three passes over the bonds. Collective: all ranks must request the same field.
+    /// request needs one or several passes over the bonds. Collective: all ranks must request the same field.
     fn field(&mut self, field: Field) -> Vec<f64>;
 
-    /// Return the energies of all points, J. A request needs one pass over the bonds. Collective.
+    /// Return the energies of all points, J. A request needs one or two passes over the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
     /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. After a request

@@ -113,7 +113,7 @@ impl<'a> OutputFile<'a> {
         &self.output.fields
     }
 
-    /// Append an output. Collective.
+    /// Append an output, and reset the count of newly broken bonds that belongs to this result. Collective.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.

@@ -48,7 +48,8 @@ impl<'a> Recorder<'a> {
     /// `rows` rows. Collective.
     ///
     /// # Errors
-    /// If a file cannot be written, or if a set of the history or of an output is empty.
+    /// If a file cannot be created, resumed or written, or if the set of an output is empty. Also the errors
+    /// of [`HistoryObserver::new`].
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         files: &Files,
@@ -343,7 +344,8 @@ pub fn reasons_for_new_results<const D: usize>(
 pub enum Continuation {
     /// The existing file is resumed.
     Resume,
-    /// A new file starts. If an existing file must be renamed, the reason is given.
+    /// A new file starts. The reason is given if the checkpoint or the folder contains a result of this
+    /// output.
     New(Option<String>),
 }
 

@@ -10,8 +10,8 @@ use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 /// Exit code of an immediate exit after a second signal.
 const IMMEDIATE_EXIT: i32 = 130;
 
-/// Stop signals within this interval after the first count as one, because the launcher and the batch system
-/// may both send the same signal.
+/// Stop signals within this interval after the first one count as one signal, because the launcher and the
+/// batch system may both send the same signal.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// Receiver of the signals of this process.

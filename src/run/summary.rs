@@ -17,13 +17,13 @@ pub struct Summary {
     pub is_refined: bool,
     /// Number of steps of this run.
     pub steps: u64,
-    /// Number of force evaluations: one per explicit step and per repeat of a step, and one or more per iteration
-    /// of a load step.
+    /// Number of force evaluations: one per explicit step and per repeat of a step, one or more per iteration
+    /// of a load step, and one per restart and refinement.
     pub evaluations: u64,
-    /// Time step of the last stage, s.
+    /// Time step at the end of the run, or at the stop, s.
     pub step: f64,
-    /// Stable step of the last stage, with the scaled density of this stage, s. `None` if the last stage
-    /// computes equilibria.
+    /// Stable step of the stage in which the run ended or stopped, with the scaled density of this stage, s.
+    /// `None` if this stage computes equilibria.
     pub stable_step: Option<f64>,
     /// Number of ranks.
     pub ranks: usize,

@@ -12,8 +12,9 @@ use crate::solver::Simulation;
 /// printed for a larger difference.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// Largest factor between the mean volume of the points of a file or mesh and the volume of a cell whose edge is
-/// their mean distance. A warning is printed if the mean volume is larger or smaller by more than this factor.
+/// Largest factor between the mean volume of the points of a file or mesh, and the volume of a cell whose
+/// edge is the mean distance to the nearest neighbour. A warning is printed if the mean volume is larger or
+/// smaller by more than this factor.
 const VOLUME_FACTOR: f64 = 10.0;
 
 /// Number, volume, mass, centre and neighbours of a body's points.
@@ -27,14 +28,14 @@ pub struct BodyFigures {
     pub mass: f64,
     /// Centre of mass, m.
     pub centre: [f64; 3],
-    /// Volume of the shape without the parts that later bodies occupy, m³; `None` for points from a file or
-    /// mesh.
+    /// Volume of the shape without the parts that bodies later in the deck occupy, m³; `None` for points from
+    /// a file or mesh.
     pub shape_volume: Option<f64>,
     /// Mean distance to the nearest neighbour for points from a file or mesh, m; 0 if there are no
     /// neighbours.
     pub spacing: f64,
-    /// Smallest, median and largest number of neighbours per point, without pre-cracked bonds, for bodies
-    /// that do not lie on a lattice.
+    /// Smallest, median and largest number of neighbours per point; bonds that pre-cracks cut do not count.
+    /// `None` for bodies on a lattice.
     pub neighbours: Option<[u64; 3]>,
 }
 
@@ -44,8 +45,8 @@ impl BodyFigures {
         dimension.edge(self.volume / self.points as f64)
     }
 
-    /// Test whether the mean volume of points from a file or a mesh fits their distances, within a factor of
-    /// `VOLUME_FACTOR`; `None` for points without neighbours.
+    /// Test whether the mean volume of points from a file or a mesh fits their mean distance to the nearest
+    /// neighbour, within a factor of `VOLUME_FACTOR`; `None` for points without neighbours.
     pub fn volumes_fit(&self, dimension: Dimension) -> Option<bool> {
         let cell = self.cell(dimension);
         let ratio = self.volume / self.points as f64 / cell;
@@ -125,8 +126,7 @@ fn is_from_file(body: &Body) -> bool {
     !matches!(body.points, PointSource::Lattice { .. })
 }
 
-/// Return the smallest, median and largest number of neighbours per point of each body that does not lie on a
-/// lattice. Collective.
+/// Return [`BodyFigures::neighbours`] of each body. Collective.
 fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64; 3]>> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let bodies = problem.bodies.iter().enumerate();

@@ -12,13 +12,13 @@ use crate::solver::observers::Schedule;
 /// Static bytes per point in a result: position, id, block, volume and VTK cell.
 const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 
-/// Bytes of a result or checkpoint in addition to its points.
+/// Bytes of a result or checkpoint in addition to the data of the points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list: an eighth of a compact group of neighbour indices, and one bit.
+/// Bytes of a bond in a list, at each end: an eighth of a compact group of neighbour indices, and one bit.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
-/// Bytes of a bond in a lattice: one bit.
+/// Bytes of a bond in a lattice, at each end: one bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
 /// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which
@@ -26,8 +26,8 @@ const ON_LATTICE: f64 = 1.0 / 8.0;
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
-/// Estimated bytes per point and per list bond at the peak of the set-up. The set-up of lattices needs less
-/// memory than the time loop.
+/// Estimated bytes per point, and per end of a bond in a list, at the peak of the set-up. The set-up of
+/// lattices needs less memory than the time loop.
 const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 
 /// Estimated bytes per point for contact, from a measurement with a block of 512 000 points without contacts.
@@ -43,7 +43,7 @@ const FIELD_COPIES: f64 = 3.0;
 /// messages.
 const CHECKPOINT_COPIES: [f64; 2] = [2.0, 3.0];
 
-/// Measured memory of a process for its points, bytes.
+/// Memory of the points and bonds of a process, measured or estimated, bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// Peak during the set-up.
@@ -120,7 +120,8 @@ impl Cost {
         cost(problem, counts, &simulation.expected_clock())
     }
 
-    /// Estimate the cost of a run from its size, without its points. `clock` gives the number of steps.
+    /// Estimate the cost of a run from its size, before its points are created. `clock` gives the number of
+    /// steps.
     pub fn estimate(problem: &Problem, size: &Size, clock: &Clock) -> Self {
         let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
         let mut bodies = problem.bodies.iter();
@@ -160,8 +161,7 @@ impl Cost {
     }
 }
 
-/// Return the bytes of history per directed bond of a body. Each directed bond stores the history of both
-/// ends.
+/// Return the bytes of history that a body stores at each end of a bond: the history of both ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {
@@ -172,7 +172,8 @@ fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     (2 * size_of::<f64>() * numbers) as f64
 }
 
-/// Estimate the memory during and after the set-up.
+/// Estimate the memory during and after the set-up. `bonds` is the memory of the bonds (bytes), and `listed`
+/// is the number of bonds in lists, counted at both ends.
 fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measured {
     let dimension = problem.dimension.count();
     // Position, displacement, velocity and force; energy of broken bonds; palette indices of the volumes of
@@ -210,7 +211,7 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Return the number of values per point in a checkpoint.
+/// Return the number of values per point in a checkpoint, without the state of the bonds.
 fn saved_width(problem: &Problem) -> usize {
     fn width<const D: usize>(problem: &Problem) -> usize {
         let mut blocks = problem.blocks();

@@ -44,7 +44,7 @@ pub struct DryRun {
 /// Measured wall-clock times on one rank, s.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seconds {
-    /// A time step or, with load steps, a force evaluation.
+    /// A time step; with load steps, an iteration.
     pub step: f64,
     /// A row of the history.
     pub row: f64,

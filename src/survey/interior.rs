@@ -46,7 +46,8 @@ pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     }
 }
 
-/// Create the problem of a block with at least one complete family; `None` if the block has too many bonds.
+/// Create the problem of a small block of the lattice with at least one complete family; `None` if the block
+/// has too many bonds.
 fn block(problem: &Problem, body: usize) -> Option<Problem> {
     let (mut block, spacing) = single_body(problem, body)?;
     block.bodies[0].damage = None;

@@ -1,4 +1,4 @@
-//! Warnings about loads and supports without the intended effect.
+//! Warnings about loads, supports and temperatures without the intended effect.
 
 use std::collections::HashSet;
 
@@ -154,9 +154,9 @@ fn without_effect<const D: usize>(
     }
 }
 
-/// Warn of a traction or pressure whose default depth, the spacing of a body, differs from the thickness of its
-/// layer by more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not
-/// checked. Collective.
+/// Warn of a traction or pressure whose default depth, the spacing of a body, differs from the thickness of
+/// the loaded layer by more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`]
+/// points are not checked. Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,
@@ -207,8 +207,9 @@ fn layer<const D: usize>(
 }
 
 /// Return the thickness of a layer and the cell edge, m. The thickness is the mean length of rows of adjacent
-/// cells, in the direction with the shortest rows. If the layer has points of several bodies, they are the
-/// numbers of the body whose thickness differs most from its cell edge. `None` if there are no cells.
+/// cells, in the direction with the shortest rows. If the layer has points of several bodies, the result is
+/// that of the body for which thickness and cell edge differ most. `None` if there are no cells. The entries
+/// of `cells` are a body, and the three indices of a cell.
 fn thickness<const D: usize>(problem: &Problem, cells: &HashSet<[i64; 4]>) -> Option<[f64; 2]> {
     let of_body = |body: usize| {
         let own = || cells.iter().filter(move |cell| cell[0] == body as i64);

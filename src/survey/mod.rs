@@ -31,8 +31,8 @@ use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
-/// A point is weakly bonded if it has fewer intact bonds than this number, by dimension. The numbers are half
-/// the number of neighbours of a complete family with a horizon of two spacings.
+/// Number of intact bonds in 1-D, 2-D and 3-D. A warning is printed for points with fewer intact bonds. The
+/// numbers are half the number of neighbours of a complete family with a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Common horizons, in spacings.
@@ -242,8 +242,8 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     moving.filter_map(safety).collect()
 }
 
-/// Return the stiffness of a family with bonds stretched by s, divided by the stiffness that the stable step
-/// assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
+/// Return the stiffness of a family with bonds stretched by s = `stretch`, divided by the stiffness that the
+/// stable step assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
@@ -282,7 +282,7 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Return the number of points of each set, with warnings of sets by position that have very few points.
+/// Return the number of points of each set. Warn of sets by position that have very few points. Collective.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

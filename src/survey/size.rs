@@ -1,4 +1,4 @@
-//! Estimated size of a run. Its points are not generated, because they may be too many.
+//! Estimated size of a run. The points of lattices are not generated, because they may be too many.
 
 use crate::dimension::Dimension;
 use crate::error::Result;
@@ -86,7 +86,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
 }
 
 /// Return the mean number of neighbours that a point of a body has on the lattices of all bodies, from
-/// sampled points.
+/// sampled points. `reach` is the longest bond to each of `others`, m.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
@@ -171,8 +171,8 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
 }
 
 /// Test whether a point is in the set of an output; `None` is the set of all points. Sets of ids are not
-/// supported. All points count as members of a group of a mesh, because the ids of its points are not known
-/// yet.
+/// supported. All points count as members of a group of a mesh, because the ids of the points of a group are
+/// not known yet.
 fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f64; 3]) -> bool {
     set.map(|set| &problem.sets[set]).is_none_or(|set| {
         matches!(set.selector, Selector::Mesh(_))

@@ -20,7 +20,7 @@ pub struct Speed {
     pub ghosts: u64,
     /// Number of bonds of owned points, counted at each owned end.
     pub directed_bonds: u64,
-    /// Number of these bonds in lattice families.
+    /// Number of bonds of owned points in lattice families, counted at each owned end.
     pub lattice_bonds: u64,
     /// Memory of the bonds, bytes.
     pub bond_bytes: u64,
@@ -34,7 +34,7 @@ pub struct Speed {
     pub times: Times,
     /// Messages of the steps.
     pub sent: Traffic,
-    /// Messages of one exchange of displacements per step, without overlap.
+    /// Messages of one exchange of displacements per step, without overlap of messages and computation.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
@@ -99,7 +99,7 @@ fn speed_in<const D: usize>(
     })
 }
 
-/// Exchange displacements `times` times without overlap.
+/// Exchange displacements `times` times, without overlap of messages and computation. Collective.
 fn exchange_without_overlap<const D: usize>(
     comm: &dyn Communicator,
     simulation: &mut Simulation<'_, D>,

@@ -1,23 +1,23 @@
 //! Adaptive time step: a step in which too many bonds of a point break is rolled back and repeated with a
 //! shorter step.
 //!
-//! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. A short step gives
-//! these bonds time to carry the load before they break:
+//! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. With short steps,
+//! the load is redistributed before more bonds break:
 //!
 //! ```text
-//! N_b > most broken, Δt > smallest        undo the step, Δt ← Δt · reduce
-//! N_b ≤ stable broken in `steps` steps    Δt ← Δt · raise, up to the largest
+//! N_b > most_broken, Δt > smallest                    undo the step, Δt ← Δt · reduce
+//! N_b ≤ stable_broken in `steps` consecutive steps    Δt ← Δt · raise, up to the largest
 //! ```
 //!
 //! N_b is the largest number of bonds of a point that break in a step, over all ranks. All ranks therefore
-//! make the same decision.
+//! make the same decision. The other names are those of [`Adaptive`] and of the keys of `[time.adaptive]`.
 
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
 
 use super::integrator::Integrator;
 
-/// Verlet integrator whose step follows an adaptive rule.
+/// Verlet integrator whose time step follows an adaptive rule.
 pub struct AdaptiveVerlet(pub Adaptive);
 
 impl<const D: usize> Integrator<D> for AdaptiveVerlet {
@@ -27,28 +27,28 @@ impl<const D: usize> Integrator<D> for AdaptiveVerlet {
     }
 }
 
-/// Relative tolerance: a step that is shorter than the rest of the stage by this fraction still ends the
-/// stage.
+/// Relative tolerance: if a step is shorter than the rest of the stage by less than this fraction, the step
+/// is lengthened to end the stage.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
-/// State of the rule between steps; the same on all ranks.
+/// State of the adaptive rule between steps; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StepControl {
     /// Step that the rule requests, s.
     step: f64,
     /// Smallest and largest step, s.
     limits: [f64; 2],
-    /// Number of consecutive steps in which at most `stable broken` bonds of any point broke.
+    /// Number of consecutive steps in which at most `stable_broken` bonds of any point broke.
     calm: u64,
-    /// Number of steps rolled back so far.
+    /// Number of steps that were rolled back since the start of the run.
     pub undone: u64,
-    /// Largest number of bonds of one point that broke in one step since the last row of the history.
+    /// Largest number of bonds of one point that broke in one step since the last row of the history, without
+    /// the steps that were rolled back.
     pub most_broken: u64,
 }
 
 impl StepControl {
-    /// Start a stage. `step` (s) is the time step of the stage without adaptation: the fixed step of the
-    /// deck, or the step that follows from the stable step.
+    /// Start a stage. `step` (s) is the first step that was chosen for the stage.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);
@@ -74,8 +74,8 @@ impl StepControl {
         }
     }
 
-    /// Decide whether a step of this size (s) is rolled back. `broken` is the largest number of bonds of a
-    /// point that broke in this step. Adjust the size of the next step.
+    /// Return whether a step of `size` (s) must be rolled back, and set the size of the next step. `broken`
+    /// is the largest number of bonds of a point that broke in the step.
     fn undoes(&mut self, rule: &Adaptive, size: f64, broken: u64) -> bool {
         let [smallest, largest] = self.limits;
         if broken > rule.most_broken && size > smallest {
@@ -99,8 +99,8 @@ impl StepControl {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Make one explicit step with the size that the rule requests. Contact and the end of the stage can
-    /// require a shorter step. Collective.
+    /// Make one explicit step of the size that the rule requests. If too many bonds break, repeat the step
+    /// with a smaller size. Contact and the end of the stage can also require a smaller size. Collective.
     fn make_adaptive_step(&mut self, rule: &Adaptive) {
         let mut kept = std::mem::take(&mut self.kept);
         self.keep(&mut kept);

@@ -1,6 +1,6 @@
 //! Symmetric band matrices and their Cholesky factor.
 
-/// A pivot below this fraction of its diagonal entry is round-off.
+/// A pivot is round-off if it is below this fraction of the diagonal entry in its row.
 const SINGULAR: f64 = 1e-10;
 
 /// A symmetric, positive semidefinite band matrix, or its Cholesky factor. The lower half of the band is
@@ -32,10 +32,10 @@ impl Banded {
         self.entries.fill(0.0);
     }
 
-    /// Add to an entry of the lower half.
+    /// Add `value` to the entry at `row` and `column` of the lower half.
     ///
     /// # Panics
-    /// If the entry is outside the band.
+    /// If the entry is above the diagonal or outside the band.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         assert!(
             column <= row && row - column <= self.band,
@@ -76,7 +76,7 @@ impl Banded {
         }
     }
 
-    /// Solve L Lᵀ x = b in place, after [`Self::factor`].
+    /// Solve L Lᵀ x = b after [`Self::factor`]. `values` contains b at the call and x at the return.
     pub fn solve(&self, values: &mut [f64]) {
         let width = self.band + 1;
         for row in 0..self.size {

@@ -1,10 +1,10 @@
-//! The clock of a run: time, step and number of steps.
+//! The clock of a run: time, time step and number of steps.
 
-/// Time, step and step count. The step may change. The time since the last change is a multiple of the step,
-/// so round-off does not accumulate.
+/// Time, time step and number of steps. The time step may change. The time since the last change is a
+/// multiple of the time step, so round-off does not accumulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
-    /// Time (s) and step number at the last change of the step.
+    /// Time (s) and number of completed steps at the last change of the time step.
     since: (f64, u64),
     /// Time before the last step, s.
     before: f64,
@@ -75,7 +75,7 @@ impl Clock {
         self.number += 1;
     }
 
-    /// Change the step (s) from the present time on.
+    /// Set the time step to `step` (s), from the present time on.
     pub fn set_step(&mut self, step: f64) {
         self.since = (self.time(), self.number);
         self.step = step;
@@ -88,30 +88,31 @@ impl Clock {
         self.step = step;
     }
 
-    /// Whether the step has changed since the last step, or no step has been made.
+    /// Whether the time step has been set since the last completed step, or no step has been completed.
     pub fn is_new_size(&self) -> bool {
         self.number == self.since.1
     }
 
-    /// Continue with another step (s) until another end (s).
+    /// Begin a stage at the present time, with steps of `step` (s) until `end` (s).
     pub fn set_stage(&mut self, step: f64, end: f64) {
         self.set_step(step);
         self.end = end;
     }
 
-    /// Number of completed steps at the end, if the step does not change.
+    /// Number of completed steps at the end of the stage, if the time step does not change.
     pub fn last(&self) -> u64 {
         let (time, number) = self.since;
         number + steps_to(self.end - time, self.step) as u64
     }
 
-    /// Whether the end has been reached.
+    /// Whether the end of the stage has been reached.
     pub fn is_over(&self) -> bool {
         self.number >= self.last()
     }
 }
 
-/// Number of steps of length `step` (s) in `time` (s), rounded up except for round-off; at least 1.
+/// Number of steps of length `step` (s) in `time` (s), rounded up; a fraction of a step that is only
+/// round-off does not count. At least 1.
 pub fn steps_to(time: f64, step: f64) -> f64 {
     let steps = time / step;
     let whole = if (steps - steps.round()).abs() < 1e-9 * steps {

@@ -2,11 +2,11 @@
 //!
 //! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
 //! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
-//! a cell. The cells have the stiffness of the classical solid. The elastic constants of a cell are averages
-//! over its points, weighted by volume and by the fraction of intact bonds. Supported components of points
-//! are springs at their position in the cell. Forces on points are distributed to the nodes of their cells
-//! (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same weights,
-//! so the preconditioner is symmetric.
+//! a cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
+//! averages over its points by volume. Each point contributes its constants times its fraction of intact
+//! bonds. A supported component of a point acts as a spring at the position of the point in its cell. Forces
+//! on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
+//! interpolated to the points (prolongation) with the same weights, so the preconditioner is symmetric.
 //!
 //! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
 //! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of
@@ -23,17 +23,17 @@ use crate::solver::model::Model;
 use super::banded::Banded;
 use super::load_step::CHUNK;
 
-/// Minimum edge of a cell, horizons.
+/// Minimum edge of a cell, in horizons.
 const EDGE: f64 = 1.0;
 
 /// Factor by which edges grow until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Allowed multiply-adds per point to solve with the factored matrix: about as many as a force evaluation
-/// with few bonds.
+/// Number of multiply-adds per material point that are allowed to solve with the factored matrix: about as
+/// many as a force evaluation with few bonds needs.
 const SOLUTION: f64 = 16.0;
 
-/// Multiply-adds to solve with the factored matrix that are allowed for any number of points.
+/// Number of multiply-adds to solve with the factored matrix that is always allowed, even with few points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.
@@ -42,7 +42,7 @@ const FACTORIZATION: f64 = 2e8;
 /// Maximum number of nodes at the corners of a cell.
 const CORNERS: usize = 8;
 
-/// Maximum number of pairs of nodes of a cell.
+/// Maximum number of pairs of nodes of a cell, including the pairs of a node with itself.
 const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 
 /// The grid, and its stiffness matrix as a Cholesky factor.
@@ -57,7 +57,7 @@ pub struct CoarseGrid<const D: usize> {
     matrix: Banded,
     /// Forces on the nodes in rounding units, one vector per task.
     parts: Vec<Vec<i64>>,
-    /// Sums of these forces over tasks and ranks.
+    /// Sums of `parts` over tasks and ranks.
     words: Vec<u64>,
     /// Displacements of the nodes by component, m.
     values: Vec<f64>,
@@ -66,7 +66,8 @@ pub struct CoarseGrid<const D: usize> {
 /// Contribution of a point to the stiffness of the grid.
 #[derive(Debug, Clone, Copy)]
 pub struct PointStiffness<const D: usize> {
-    /// λ V and G V of the point, N m.
+    /// Lamé's first parameter λ and the shear modulus G, each times the volume V of the point and its
+    /// fraction of intact bonds, N m.
     pub moduli: [f64; 2],
     /// Stiffness of the supported components, N/m; 0 for free components.
     pub springs: [f64; D],
@@ -82,7 +83,8 @@ struct CellPosition<const D: usize> {
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Create a grid that covers all points, with cells of one horizon (m) or more. Collective.
+    /// Create a grid that covers all points. The edges of its cells are at least `horizon` (m), and long
+    /// enough that the matrix is small. Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -210,7 +212,7 @@ impl<const D: usize> CoarseGrid<D> {
         self.matrix.factor();
     }
 
-    /// Compute the displacements of the nodes under forces on the owned points (N/m³, by component).
+    /// Compute the displacements of the nodes under force densities on the owned points (N/m³, by component).
     /// Collective.
     pub fn solve(&mut self, comm: &dyn Communicator, model: &Model<D>, force: &[Vec<f64>; D]) {
         let owned = model.owned();
@@ -285,7 +287,8 @@ impl<const D: usize> CoarseGrid<D> {
         (0..D).map(|d| along(d) * self.node_strides[d]).sum()
     }
 
-    /// Index of a node of a cell, relative to its first node.
+    /// Index of a node of a cell, relative to the first node of the cell. Bit d of `corner` is 1 for nodes on
+    /// the upper face along axis d.
     fn corner(&self, corner: usize) -> usize {
         let strides = self.node_strides.iter().enumerate();
         strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
@@ -324,7 +327,7 @@ impl<const D: usize> CoarseGrid<D> {
 }
 
 impl<const D: usize> CellPosition<D> {
-    /// Interpolation weight of a node of the cell.
+    /// Interpolation weight of a node of the cell at the position of the point.
     fn weight(&self, corner: usize) -> f64 {
         let along = self.along.iter().enumerate();
         along
@@ -332,7 +335,7 @@ impl<const D: usize> CellPosition<D> {
             .product()
     }
 
-    /// Gradient of the weight of a node, 1/m.
+    /// Gradient of the weight of a node, 1/m. `per_length` is the same as in [`CoarseGrid`].
     fn slope(&self, corner: usize, per_length: &[f64; D]) -> [f64; D] {
         std::array::from_fn(|d| {
             let others = (0..D).filter(|other| *other != d);
@@ -345,7 +348,8 @@ impl<const D: usize> CellPosition<D> {
     }
 }
 
-/// Weight of the lower (`end` = 0) or upper (`end` = 1) face of a cell along an axis.
+/// Weight of the lower (`end` = 0) or upper (`end` = 1) face of a cell along an axis, at the coordinate
+/// `along` from 0 to 1.
 fn weight(end: usize, along: f64) -> f64 {
     if end == 1 { along } else { 1.0 - along }
 }

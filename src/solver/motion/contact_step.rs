@@ -41,7 +41,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
-    /// Count consecutive steps that could have been longer with contact.
+    /// Count the consecutive steps that could have been longer in spite of contact.
     pub(in crate::solver) fn count_calm_steps(&mut self) {
         let Some(limit) = self.contact_limit() else {
             return;

@@ -31,14 +31,14 @@ pub struct Description {
 pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
     Interpolated,
-    /// A new point gets the mean. A removed point returns its volume times its difference from the mean.
-    /// Momentum and linear fields are conserved.
+    /// A new point gets the mean. A removed point returns its volume times the difference of its value from
+    /// the mean of its parents. This conserves momentum, and fields that are linear in space.
     Conserved,
-    /// A new point gets the mean. A removed point is mixed into its parents by volume, so that no value
-    /// leaves the previous range.
+    /// A new point gets the mean. The value of a removed point is mixed into the values of its parents by
+    /// volume, so that no value leaves the previous range.
     Mixed,
-    /// A new point gets a part by volume, so that the sum over all points is conserved. A removed point
-    /// returns all of its value.
+    /// A new point gets a part of the values of its parents, in proportion to volume, so that the sum over
+    /// all points is conserved. A removed point returns all of its value.
     Shared,
     /// The field is recomputed for a new point; a removed point returns nothing.
     FoundAnew,
@@ -149,7 +149,8 @@ fields! {
         output: Some(Field::Displacement),
         ..STATE
     };
-    /// Temperature; none without prescribed temperatures.
+    /// Temperature, in the unit of the key `reference_temperature` of the materials; none without prescribed
+    /// temperatures.
     temperature: Option<Vec<f64>> = Description {
         name: "temperature",
         unit: "K",
@@ -237,7 +238,7 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Factor of strain rate and temperature on the yield stress of a point in the last step, minus 1; none
+    /// Relative change of the yield stress of a point by strain rate and temperature, in the last step; none
     /// without plasticity.
     yield_change: Option<Vec<f64>> = Description {
         name: "yield_change",
@@ -261,7 +262,7 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Work done by loads and supports, J; none without loads and supports.
+    /// Work done by loads and supports, J; none if the deck has neither loads nor supports.
     external_work: Option<Vec<f64>> = Description {
         name: "external_work",
         ..ENERGY
@@ -324,7 +325,8 @@ fields! {
         unit: "m",
         ..STATE
     };
-    /// Force density of the supports at the last equilibrium, N/m³; none without load steps or supports.
+    /// Force density of the supports at the last equilibrium, N/m³. None if the deck lacks load steps or
+    /// supports.
     equilibrium_reaction: Option<[Vec<f64>; D]> = Description {
         name: "equilibrium_reaction",
         unit: "N/m^3",
@@ -341,7 +343,7 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Contribution of contact to the fictitious density, N/m⁴; none without contact or relaxation.
+    /// Contribution of contact to the fictitious density, N/m⁴. None if the deck lacks contact or relaxation.
     contact_density: Option<Vec<f64>> = Description {
         name: "contact_density",
         unit: "N/m^4",
@@ -350,8 +352,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Time at which a point was last within the horizon of a trigger of refinement or of a point with
-    /// missing bonds, s; none without coarsening.
+    /// Time at which a point was last within the horizon of a point that triggers refinement or has broken
+    /// bonds, s; none without coarsening.
     last_seen: Option<Vec<f64>> = Description {
         name: "last_seen",
         unit: "s",
@@ -364,7 +366,7 @@ fields! {
         ..ENERGY
     };
     /// Number of a point's bonds that have broken since the last output of a further result; one column per
-    /// further result with this field. None without damage.
+    /// further result with this field. No columns without damage.
     newly_broken_of_further: Vec<Vec<f64>> = Description {
         name: NEWLY_BROKEN_OF_FURTHER,
         unit: "1",
@@ -486,7 +488,7 @@ impl Needs {
         }
     }
 
-    /// Number of values per point that a checkpoint stores.
+    /// Number of values per point that a checkpoint stores, without the state of the bonds.
     pub fn state_width<const D: usize>(self) -> usize {
         let fields = Fields::<D>::new(&Model::empty(), self);
         fields.state().count()
@@ -554,28 +556,29 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Force density on an owned point without the reaction, N/m³: internal force, external force and
-    /// viscous damping.
+    /// Component `d` of the force density on an owned point without the reaction, N/m³: internal force,
+    /// external force and viscous damping.
     #[inline]
     pub fn acting(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let exerted = Exerted::new(&self.internal_force, self.external_force.as_ref(), d);
         model.less_damping(point, exerted.at(point), self.velocity[d][point])
     }
 
-    /// The force density of all forces on an owned point, N/m³; 0 in equilibrium.
+    /// Component `d` of the force density of all forces on an owned point, N/m³; 0 in equilibrium.
     #[inline]
     pub fn total_force(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let reaction = self.reaction.as_ref().map_or(0.0, |field| field[d][point]);
         self.acting(model, d, point) + reaction
     }
 
-    /// Record the released energy and the lost force of the bonds that broke at the end of a step (s).
+    /// Record the bonds that broke at the end of a step: their number, the energy that they released, and
+    /// their overshoot energy. `step` is the length of the step, s.
     ///
-    /// The force F of a breaking bond acted in the first half kick of the step, but not in the second. During
-    /// the step, the points therefore did ½ F·Δℓ less work on the bond than the bond held at the end of the
-    /// step. The points keep this difference. On average, a bond reaches its criterion in the middle of the
-    /// step at whose end the break is detected. Therefore neither motion nor energy depends on the step to
-    /// first order.
+    /// The force F of a breaking bond acted in the first half kick of the step, but not in the second. So the
+    /// points did not supply all of the energy that the bond had at the end of the step: ½ F·Δℓ is missing,
+    /// with the change Δℓ of the bond vector in the step. The released energy is reduced by this amount. On
+    /// average, a bond reaches its criterion in the middle of the step at whose end the break is detected.
+    /// Therefore neither motion nor energy depends on the step length to first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
         let velocity = &self.velocity;
         let (Some(count), Some(new), Some(freed), Some(overshoot)) = (
@@ -637,8 +640,8 @@ impl<const D: usize> Fields<D> {
         columns.for_each(|column| column.fill(0.0));
     }
 
-    /// Fictitious density of each owned point (N/m⁴), with which iterations are stable. It is infinite for a
-    /// point without bonds, which does not move.
+    /// Fictitious density of each owned point (N/m⁴), with which iterations are stable. The density of a
+    /// point that has never had an intact bond is infinite, so the point does not move.
     ///
     /// # Panics
     /// In a run without load steps.

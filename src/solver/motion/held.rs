@@ -74,9 +74,9 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Call `look` at the first and at the last load step of a stage, until it returns a value. The arguments
-    /// of `look` are the simulation with the loads and supports of this load step, the pieces, and the time,
-    /// s.
+    /// Call `look` at the first and at the last load step of a stage, until `look` returns a value. Return
+    /// this value. The arguments of `look` are the simulation with the loads and supports of this load step,
+    /// the pieces, and the time, s.
     ///
     /// `look` is not called for explicit stages and for stages without loads. It is not called in runs with
     /// contact either, because contact can hold pieces. Afterwards, the loads and supports of the first stage
@@ -120,8 +120,9 @@ impl<const D: usize> Simulation<'_, D> {
         self.apply_loads(time, true);
     }
 
-    /// Return an error if a piece is loaded along an axis in which no support holds it. Of several such
-    /// pieces, the message names the one with the smallest point id. Collective.
+    /// Return an error if a piece is loaded along an axis in which no support holds it. The message begins
+    /// with `failure`. Of several such pieces, the message names the one with the smallest point id.
+    /// Collective.
     pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
         let pieces = self.find_pieces(self.unloaded_points());
         self.unheld_load(&pieces).map_or(Ok(()), |unheld| {
@@ -202,8 +203,8 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Find a piece that the present loads rotate. Of several pieces, return the one with the smallest point
-    /// id. Collective.
+    /// Find a piece that the present loads rotate, and that no support holds in the plane of the rotation. Of
+    /// several pieces, return the one with the smallest point id. Collective.
     fn find_unheld_torque(&self, pieces: &Pieces<D>) -> Option<UnheldTorque> {
         const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
         let planes = || (0..3).filter(|axis| PLANES[*axis].iter().all(|d| *d < D));
@@ -268,8 +269,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Return the index of the condition with the largest load on the points `points`, which are sorted.
-    /// Loads are compared by the magnitude of the sum of `weight`, a function of a point and the force on it
-    /// (N). Collective.
+    /// Loads are compared by the magnitude of the sum of `weight` over the points. The arguments of `weight`
+    /// are a point and the force of the load on this point (N). Collective.
     fn largest_load(&self, points: &[usize], weight: impl Fn(usize, [f64; D]) -> f64) -> usize {
         let (conditions, mut sums) = self.conditions.load_sums(&self.model, points, weight);
         let sums = reduce(self.comm, &mut sums).into_iter();

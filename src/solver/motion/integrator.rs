@@ -10,9 +10,10 @@ use super::verlet::Verlet;
 
 /// The integration method of a stage.
 pub trait Integrator<const D: usize>: Send + Sync {
-    /// Make one step, with or without its second half kick, or one iteration of a load step.
-    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied.
-    /// Returns whether the second half kick of this step must still be applied. Collective.
+    /// Make one explicit time step, or one iteration of a load step. An explicit step may leave its second
+    /// half kick to the next call. `half_kick_pending` says whether the second half kick of the previous step
+    /// must still be applied. Returns whether the second half kick of this step must still be applied.
+    /// Collective.
     fn advance(&mut self, simulation: &mut Simulation<'_, D>, half_kick_pending: bool) -> bool;
 }
 

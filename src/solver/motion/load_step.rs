@@ -8,10 +8,11 @@
 //! of the equilibrium. Iterations compute the forces from a trial history: the history after a step from the
 //! last equilibrium to the present positions. The history is stored at equilibrium.
 //!
-//! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). In a free body that only moves
-//! rigidly, loads and reactions are 0, and both sides are round-off. Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is
-//! also accepted as equilibrium. ρ is an upper bound of the stiffness of a point, so ε ‖V ρ u‖ bounds the
-//! forces that come from rounding u.
+//! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖), with the total forces f on the
+//! points. In a free body that only moves rigidly, loads and reactions are 0, and both sides are round-off.
+//! Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is also accepted as equilibrium, with the volume V and the
+//! displacement u of a point. The fictitious density ρ (N/m⁴) is an upper bound of the stiffness of a point.
+//! So ε ‖V ρ u‖, with the machine precision ε, bounds the forces that come from rounding u.
 
 use rayon::prelude::*;
 
@@ -26,10 +27,10 @@ use crate::solver::model::Model;
 use super::Fields;
 use super::stable_step::largest_eigenvalue;
 
-/// Number of points that one task processes.
+/// Minimum number of points of a task in a parallel loop; the last task may have fewer.
 pub(super) const CHUNK: usize = 4096;
 
-/// Factor from the stiffness bound to the fictitious density; the reserve covers bonds that rotate.
+/// Factor on the fictitious density: a reserve for bonds that rotate.
 const MARGIN: f64 = 1.2;
 
 /// The unbalanced force is round-off if its norm is below this fraction of ‖V ρ u‖.
@@ -38,23 +39,25 @@ const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 /// Progress of a load step; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadStep {
-    /// Iterations made in this load step.
+    /// Number of iterations in this load step. The prediction with which Newton's method begins a load step
+    /// does not count.
     pub iterations: u64,
-    /// Number of iterations since bonds last broke in this load step, or since its start.
+    /// Number of iterations since bonds last broke in this load step, or since the start of the load step.
     pub since_breaking: u64,
     /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
     /// point. The residual is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation; NaN if all points are at rest.
     pub(super) damping: f64,
-    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, N. The tolerance is relative to this norm, so
-    /// it does not shrink when a body is unloaded or breaks.
+    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, N. The tolerance is relative to at least this
+    /// norm, so the allowed ‖f‖ does not shrink when a body is unloaded or breaks.
     pub(super) scale: f64,
     /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,
-    /// Whether the equilibrium has been found, and no more bonds break.
+    /// Whether the equilibrium has been found, and no more bonds break. True before the first load step.
     pub is_settled: bool,
-    /// Whether the maximum number of iterations was reached without an equilibrium.
+    /// Whether the load step ended without an equilibrium: the maximum number of iterations was reached, a
+    /// force is not finite, or a loaded piece without support drifts away.
     pub has_failed: bool,
 }
 
@@ -74,13 +77,13 @@ impl Default for LoadStep {
 }
 
 impl LoadStep {
-    /// Message for a load step that failed at a time (s).
+    /// Return the beginning of the error message for a load step that failed at `time` (s).
     fn failure(&self, time: f64) -> String {
         let iterations = self.since_breaking;
         format!("t = {time:.6e} s: no equilibrium within {iterations} iterations")
     }
 
-    /// Compute the residual from the squared norms that [`balance`] returns.
+    /// Compute the residual from the squared norms: the values of [`balance`], summed over all points.
     pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
         let scale = (loads + reactions).max(self.scale);
@@ -127,13 +130,14 @@ impl LoadStep {
 }
 
 /// Fictitious density (N/m⁴) with which iterations of Δt = 1 are stable. `eigenvalue` is the largest
-/// eigenvalue of D of [`super::stable_step`], N/m⁴.
+/// eigenvalue of the matrix D of a point (N/m⁴); see [`super::stable_step`].
 pub fn stable_density(eigenvalue: f64) -> f64 {
     0.5 * MARGIN * eigenvalue
 }
 
-/// Fictitious density of each owned point (N/m⁴): an upper bound of its stiffness, with which iterations of
-/// Δt = 1 are stable. It is infinite for a point without bonds. `stiffness` is D of [`super::stable_step`].
+/// Fictitious density of each owned point (N/m⁴): an upper bound of the point's stiffness, with which
+/// iterations of Δt = 1 are stable. The density of a point without bonds is infinite. `stiffness` contains
+/// the matrices D of the owned points; see [`super::stable_step`].
 pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     let density = |point: usize| {
         let entries = stiffness.each_ref().map(|column| column[point]);
@@ -145,8 +149,8 @@ pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     (0..stiffness[0].len()).map(density).collect()
 }
 
-/// Squared norms for the residual, for a point with a fictitious density (N/m⁴): total force, loads,
-/// reactions (N), and V ρ u.
+/// Return the squared norms (N²) of four vectors of a point: total force, load, reaction, and V ρ u with the
+/// fictitious density ρ = `density` (N/m⁴).
 pub(super) fn balance<const D: usize>(
     model: &Model<D>,
     fields: &Fields<D>,
@@ -282,8 +286,8 @@ impl<const D: usize> Simulation<'_, D> {
         contact.map_or(ExactSum::ZERO, |contact| contact.rigid_forces().clone())
     }
 
-    /// Raise `scale` to the norms of loads and reactions at the present equilibrium, if they are larger.
-    /// Collective.
+    /// Raise `scale` to the sum of the norms of loads and reactions at the present equilibrium, if this sum
+    /// is larger. Collective.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, mut reactions] = sums(model, fields, |point, _| {
@@ -333,7 +337,8 @@ impl<const D: usize> Simulation<'_, D> {
         )))
     }
 
-    /// Describe the point with the largest unbalanced force. Collective.
+    /// Return a text for error messages that describes the point with the largest unbalanced force; empty if
+    /// no point has bonds. Collective.
     fn worst_point(&self) -> String {
         let (model, fields) = (&self.model, &self.fields);
         let density = fields.fictitious_density.as_deref().unwrap_or_default();
@@ -399,8 +404,9 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Sum over the owned points with bonds. `terms` returns the terms of a point, given its index and its
-/// fictitious density (N/m⁴).
+/// Sum over this rank's owned points with a finite fictitious density; only points that have never had an
+/// intact bond are excluded. `terms` returns the terms of a point, given the index and the fictitious density
+/// (N/m⁴) of the point.
 pub(super) fn sums<const D: usize, const N: usize>(
     model: &Model<D>,
     fields: &Fields<D>,

@@ -3,29 +3,31 @@
 //! [`super::load_step`] defines the equilibrium and when bonds break. An iteration is
 //!
 //! ```text
-//! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
+//! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation per v
 //! u ← u + s x                              s = 1 if |x·f(u + x)| ≤ 0.9 x·f(u), otherwise by line search
 //! η ← | ‖f(u + s x)‖ − ‖f − K x‖ | / ‖f‖   at most 0.1: nonlinearity of the forces
 //! ```
 //!
-//! η follows Eisenstat & Walker 1996, the differences Knoll & Keyes 2004. f includes the reactions, so f is 0
-//! for supported components. All force evaluations use the history that an equilibrium at the displaced
-//! positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that yield. ε is
-//! limited so that no point moves by more than `SHIFT` horizons. The relative error of the difference is then
-//! of the order of `SHIFT` for bonds that rotate, and of the order of (machine ε)/`SHIFT` from rounding.
+//! η follows Eisenstat & Walker 1996, and the differences of f follow Knoll & Keyes 2004. f includes the
+//! reactions, so f is 0 for supported components. All force evaluations use the history that an equilibrium
+//! at the displaced positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that
+//! yield. ε is chosen such that the largest displacement component changes by `SHIFT` times the shortest
+//! horizon. The relative error of the difference is then of the order of `SHIFT` for bonds that rotate, and
+//! of the order of (machine ε)/`SHIFT` from rounding.
 //!
-//! K is symmetric for laws with an energy. In a body that softens or buckles, K may not be positive
-//! definite. The conjugate gradients then stop at the first direction of negative curvature. The
-//! preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
+//! K is symmetric if the forces of the law derive from an energy. In a body that softens or buckles, K may
+//! not be positive definite. The conjugate gradients then stop at the first direction of negative curvature.
+//! The preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
 //! (`coarse_grid.rs`), for long waves.
 //!
 //! The first iteration of a load step linearizes about the last equilibrium in two cases: the size of the
-//! load step has changed, or bonds broke in the last load step. The prescribed displacements are then part of
-//! the motion. Otherwise, the points first repeat their motion of the last load step.
+//! load step has changed, or bonds broke in the last load step. The change of the prescribed displacements is
+//! then part of x. Otherwise, the points first repeat their motion of the last load step.
 //!
-//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. It is not
-//! repeated if bonds have broken in it, because an equilibrium at its full load was then found. The smaller
-//! load steps continue up to the end of the original load step.
+//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. A load
+//! step in which bonds have broken is not repeated, because an equilibrium at its full load was then found. A
+//! load step is not repeated either if no support holds a loaded piece of a body. The smaller load steps
+//! continue up to the end of the original load step.
 
 use std::time::Instant;
 
@@ -42,7 +44,7 @@ use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
 use super::load_step::{CHUNK, sums};
 
-/// Largest displacement component of a point in a finite difference, horizons.
+/// Largest displacement component of a finite difference, divided by the shortest horizon.
 const SHIFT: f64 = 1e-6;
 
 /// Maximum number of conjugate gradient iterations per Newton iteration.
@@ -64,10 +66,11 @@ const LINEAR_TOLERANCE_SHARE: f64 = 0.5;
 /// Lower bound of the fraction of intact bonds in the diagonal of the preconditioner.
 const LEAST_INTACT: f64 = 1e-3;
 
-/// State of the method between load steps; the same on all ranks.
+/// State of Newton's method between iterations; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonState {
-    /// Number of force evaluations of the present load step, with any method.
+    /// Number of force evaluations of the present load step, with any method; in explicit stages, of the
+    /// present time step.
     pub evaluations: u64,
     /// η of the next iteration.
     forcing: f64,
@@ -75,7 +78,7 @@ pub struct NewtonState {
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,
-    /// Number of load steps of the present size up to the end of the original load step.
+    /// Number of load steps of the present size that remain up to the end of the original load step.
     left: u64,
 }
 
@@ -184,7 +187,7 @@ struct Vectors<const D: usize> {
     /// bond.
     inverse_diagonal: [Vec<f64>; D],
     coarse: CoarseGrid<D>,
-    /// Whether bonds have broken since the preconditioner was computed.
+    /// Whether the preconditioner must be computed: at first, and after bonds have broken.
     is_stale: bool,
     /// The shortest horizon, m.
     horizon: f64,
@@ -269,7 +272,8 @@ impl<const D: usize> Vectors<D> {
         simulation.newton.adapt(linear, force);
     }
 
-    /// Store the total forces at the base u, and start the linear residual with them.
+    /// Store the total forces at the base u. Set the residual of the linear problem to these forces, and to 0
+    /// where the inverse diagonal is 0.
     fn note_force(&mut self, simulation: &Simulation<'_, D>) {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {
@@ -284,9 +288,9 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Improve x by conjugate gradients until ‖f − K x‖ is small. The tolerance is at least
-    /// `LINEAR_TOLERANCE_SHARE` times `allowed`, the norm ‖f‖ (N) that is accepted as equilibrium.
-    /// Collective.
+    /// Improve x by conjugate gradients until ‖f − K x‖ is at most η times its initial value, or
+    /// `LINEAR_TOLERANCE_SHARE` times `allowed`, or until the iterations are used up. `allowed` is the norm
+    /// ‖f‖ (N) that is accepted as equilibrium. Returns ‖f − K x‖ before and after. Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
@@ -331,7 +335,7 @@ impl<const D: usize> Vectors<D> {
         linear
     }
 
-    /// ‖f − K x‖, N. Collective.
+    /// Return ‖f − K x‖, N. Collective.
     fn residual_norm(&self, simulation: &Simulation<'_, D>) -> f64 {
         let (model, fields) = (&simulation.model, &simulation.fields);
         let square = sums(model, fields, |point, _| {
@@ -426,7 +430,7 @@ impl<const D: usize> Vectors<D> {
         unreachable!("the loop returns")
     }
 
-    /// Product x·f of the correction with the total forces at the present positions, J. Collective.
+    /// Return the product x·f of the correction and the total forces at the present positions, J. Collective.
     fn power(&self, simulation: &Simulation<'_, D>) -> f64 {
         let (model, fields) = (&simulation.model, &simulation.fields);
         let power = sums(model, fields, |point, _| {
@@ -499,7 +503,7 @@ impl<const D: usize> Vectors<D> {
         });
     }
 
-    /// Estimate the mean of the diagonal of K divided by the fictitious density. For a vector s of random
+    /// Estimate [`NewtonState::diagonal`]; it is 1 if the estimate is not positive. For a vector s of random
     /// signs, s·K s approximates the trace of K (Hutchinson 1990). Collective.
     fn measure_diagonal(&mut self, simulation: &mut Simulation<'_, D>) {
         let owned = simulation.model.owned();
@@ -604,7 +608,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Move the points to the base plus `length` times a direction.
+/// Set the displacements of the owned points to `base` plus `length` times `direction`.
 fn move_from<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     base: &[Vec<f64>; D],
@@ -621,7 +625,7 @@ fn move_from<const D: usize>(
     }
 }
 
-/// Add a multiple of a vector to another vector.
+/// Add `factor` times `vector` to `to`.
 fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; D]) {
     for (to, vector) in to.iter_mut().zip(vector) {
         let both = to.par_iter_mut().zip(vector).with_min_len(CHUNK);
@@ -629,7 +633,8 @@ fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; 
     }
 }
 
-/// Dot product of a force density and a displacement, weighted by volume, J. Collective.
+/// Return the dot product of a force density (N/m³) and a displacement (m), weighted by volume, J.
+/// Collective.
 fn dot<const D: usize>(
     simulation: &Simulation<'_, D>,
     a: &[Vec<f64>; D],

@@ -19,18 +19,18 @@ pub(super) struct Pieces<const D: usize> {
 pub(super) struct Piece {
     /// Smallest point id of the piece.
     first: u64,
-    /// Local indices of the points of this rank, ascending.
+    /// Local indices of the owned points of the piece, ascending.
     pub points: Vec<usize>,
     /// Number of points of the piece over all ranks.
     pub count: u64,
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a column per component over the local points: 0 for points with a nonzero load, otherwise 1.
+    /// Return a column per component over the local points: 0 for points that can move and have a nonzero
+    /// load, otherwise 1.
     pub(super) fn unloaded_points(&self) -> [Vec<f64>; D] {
         let mut all = std::array::from_fn(|_| vec![1.0; self.model.volume.len()]);
-        // A point without bonds in its reference family does not move in load steps, so its loads are
-        // ignored.
+        // A point that has never had an intact bond does not move in load steps, so its loads are ignored.
         let density = self.fields.fictitious_density.as_deref();
         if let (Some(force), Some(density)) = (&self.fields.external_force, density) {
             for (is_unloaded, force) in all.iter_mut().zip(force) {
@@ -44,8 +44,8 @@ impl<const D: usize> Simulation<'_, D> {
         all
     }
 
-    /// Find the pieces of all bodies. `is_unloaded` are columns as from [`Self::unloaded_points`]. The
-    /// supports of the present stage apply. Collective.
+    /// Find the pieces of all bodies. `is_unloaded` contains the columns of [`Self::unloaded_points`], at one
+    /// or several times. The supports of the present stage apply. Collective.
     pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {
@@ -57,8 +57,9 @@ impl<const D: usize> Simulation<'_, D> {
         pieces
     }
 
-    /// Call `look` with each suspected piece, in the order of their smallest point ids, until it returns a
-    /// value. `is_suspect` must have the same value at all points of a piece. Collective.
+    /// Call `look` with each suspected piece, in the order of the smallest point ids of the pieces, until
+    /// `look` returns a value. Return this value. `is_suspect` is called with the local index of a point, and
+    /// must be the same at all points of a piece. Collective.
     pub(super) fn first_of_pieces<T>(
         &self,
         pieces: &Pieces<D>,

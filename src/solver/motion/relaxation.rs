@@ -12,14 +12,15 @@
 //!
 //! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1, times a reserve. ρ follows
 //! from the largest eigenvalue of the matrix D of each point. c is the critical damping of the present
-//! motion. The quotient is a Rayleigh quotient with u̇ rather than u, because differences of f along u̇ give
-//! ¹K u̇ exactly. All sums are exact, so the result is bitwise independent of ranks and threads.
+//! motion. The quotient is a Rayleigh quotient of the tangent stiffness ¹K with u̇ rather than u, because
+//! differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the result is bitwise independent of
+//! ranks and threads.
 //!
 //! [`super::load_step`] defines the equilibrium and when bonds break.
 //!
-//! Contact is part of the equilibrium. Its repulsion has a potential; neither friction nor damping acts.
-//! Points in contact add the contact stiffness to ρ while they touch. Driven rigid bodies move with time,
-//! as supports do. Their forces on the points count as reactions.
+//! Contact is part of the equilibrium. The repulsion has a potential; neither friction nor contact damping
+//! acts. While points are in contact, their ρ includes the contact stiffness. Rigid bodies with a prescribed
+//! motion move with time, as supports do. The forces of rigid bodies on the points count as reactions.
 
 use std::time::Instant;
 
@@ -46,7 +47,7 @@ impl<const D: usize> Integrator<D> for DynamicRelaxation {
 /// Upper limit of the damping c; from c = 2 on, the velocity would change its sign.
 const MOST_DAMPING: f64 = 1.9;
 
-/// Sums with the forces before an evaluation: u̇·f and u̇·ρ u̇, J.
+/// Sums of the velocities u̇ of an iteration, before the force evaluation: u̇·f and u̇·ρ u̇, J.
 struct Before {
     power: ExactSum,
     inertia: ExactSum,
@@ -92,7 +93,7 @@ impl<const D: usize> Simulation<'_, D> {
         velocity.for_each(|component| component.fill(0.0));
     }
 
-    /// Move the points by one iteration.
+    /// Move the points by one iteration. Returns the sums of the new velocities and the old forces.
     fn drift(&mut self) -> Before {
         self.load_step.iterations += 1;
         self.load_step.since_breaking += 1;
@@ -139,7 +140,8 @@ impl<const D: usize> Simulation<'_, D> {
         Before { power, inertia }
     }
 
-    /// Compute damping and residual from the forces at the new positions. Collective.
+    /// Compute damping and residual from the forces at the new positions. `before` is `None` if the points
+    /// start from rest. Collective.
     fn look(&mut self, before: Option<Before>) {
         let (model, fields) = (&self.model, &self.fields);
         let [power, free, loads, reactions, stiffness] = sums(model, fields, |point, density| {

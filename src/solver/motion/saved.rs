@@ -195,8 +195,8 @@ impl<const D: usize> Simulation<'_, D> {
         Ok(())
     }
 
-    /// Check that a saved state has the columns with these names, the bonds with these lengths, and the
-    /// length of the progress.
+    /// Check that a saved state has the columns with these names, bond states with these lengths (bytes per
+    /// point), and progress of the expected length.
     fn fits(&self, names: &[String], lengths: &[u32], saved: &Saved) -> Result<()> {
         let error = |what: String| Err(Error::run(format!("the checkpoint {what}")));
         let saved_names: Vec<&str> = (saved.columns.iter())

@@ -1,9 +1,12 @@
 //! The stable time step: the largest one for which stability is guaranteed.
 //!
-//! The energy of a bond is ½ C (n·(u_j − u_i))² ≤ C ((n·u_i)² + (n·u_j)²), so the whole strain energy is at
-//! most Σ V u·(D u) with D = Σ V C n⊗n, and every frequency obeys ω² ≤ 2 λ_max(D)/ρ. Verlet is stable for Δt
-//! ≤ 2/ω, hence Δt = min √(2ρ/λ_max(D)). The usual Δt = √(2ρ/Σ V C) (Silling & Askari 2005) uses the trace of
-//! D instead. For a D with equal eigenvalues, this step is √3 times smaller in 3-D, and √2 times in 2-D.
+//! A bond with the stiffness C (N/m⁷) and the direction n has the energy ½ C (n·(u_j − u_i))² V_i V_j. This
+//! energy is at most C ((n·u_i)² + (n·u_j)²) V_i V_j. So the energy of all bonds is at most Σ_i V_i u_i·(D_i
+//! u_i) with D_i = Σ_j V_j C n⊗n, and every frequency obeys ω² ≤ 2 λ_max(D)/ρ. Verlet is stable for Δt ≤ 2/ω,
+//! hence Δt = min √(2ρ/λ_max(D)).
+//!
+//! The usual step √(2ρ/Σ_j V_j C) (Silling & Askari 2005) uses the trace of D instead of λ_max(D). If the
+//! eigenvalues of D are equal, the usual step is shorter by a factor of √3 in 3-D, and √2 in 2-D.
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -12,8 +15,8 @@ use crate::comm::{self, Communicator};
 
 use crate::solver::model::Model;
 
-/// Return the stable step over all ranks, s; infinite if no point has a bond. `stiffness` is D of each owned
-/// point (N/m⁴) as columns xx, yy, zz, xy, yz, xz. Collective.
+/// Return the stable step over all ranks, s; infinite if no point has a bond. `stiffness` contains the matrix
+/// D of each owned point (N/m⁴) as columns xx, yy, zz, xy, yz, xz. Collective.
 pub fn stable_step<const D: usize>(
     comm: &dyn Communicator,
     model: &Model<D>,

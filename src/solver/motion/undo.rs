@@ -13,7 +13,7 @@ pub struct Kept {
     fields: Vec<Vec<f64>>,
     bonds: KeptBonds,
     contact: Option<ContactState>,
-    /// Factors of the loads in the current step.
+    /// Factors of the loads at the time of the copy.
     load_factors: Vec<f64>,
 }
 
@@ -38,7 +38,8 @@ impl<const D: usize> Simulation<'_, D> {
         kept.contact = self.contact.as_ref().map(Contact::state);
     }
 
-    /// Restore the copied state. If the same steps are repeated, their results are bitwise the same.
+    /// Restore the state from `kept`; do nothing if `kept` is empty. If the same steps are then repeated,
+    /// their results are bitwise the same.
     pub fn undo(&mut self, kept: &Kept) {
         let Some(clock) = kept.clock else { return };
         self.clock = clock;

@@ -32,8 +32,8 @@ fn constants<const D: usize>(model: &Model<D>, block: u16) -> Constants {
     (model.density[block], model.damping[block])
 }
 
-/// Return the constants if all points of the part have the same ones. The compiler can then vectorize over
-/// points.
+/// Return the constants if all points of the part belong to the same block. The compiler can then vectorize
+/// over points.
 fn same_constants<const D: usize>(part: &Part<'_, D>) -> Option<Constants> {
     let (first, others) = part.blocks().split_first()?;
     let is_same = others.iter().all(|block| block == first);
@@ -68,7 +68,7 @@ pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bo
 
 /// Apply [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next step in one loop. The steps
 /// have the same length (s), and there is no damping. The results are bitwise the same as with two loops.
-/// Returns whether all velocities between both half kicks are finite.
+/// Returns whether all velocities between the two half kicks are finite.
 pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
     for_each_component(part, |place, velocity, force, (density, _)| {
         let half_kick = 0.5 * step * (force / density);

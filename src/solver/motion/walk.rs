@@ -89,7 +89,7 @@ impl<'a, const D: usize> Part<'a, D> {
         self.velocity[0].len()
     }
 
-    /// Blocks of the points of the part.
+    /// Index of the block of each point of the part.
     pub fn blocks(&self) -> &'a [u16] {
         &self.model.block[self.first..self.first + self.count()]
     }
@@ -142,7 +142,7 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Split off the first `count` points of the part.
+    /// Split off the first `count` points of the part, and return them as another part.
     fn split_off_first(&mut self, count: usize) -> Self {
         let first = self.first;
         self.first += count;
@@ -166,7 +166,7 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 }
 
-/// Split off the first `count` entries of columns.
+/// Split off the first `count` entries of each column, and return them.
 fn cut<'a, const N: usize>(columns: &mut Columns<'a, N>, count: usize) -> Columns<'a, N> {
     columns.each_mut().map(|column| {
         let (first, others) = std::mem::take(column).split_at_mut(count);

@@ -37,7 +37,8 @@ pub struct Vertex {
     pub along: f64,
 }
 
-/// A branch: from the start of the crack, or from its parent branch, to its tip.
+/// The vertices of a branch: from the start of the crack, or from the fork at which the branch begins, to the
+/// tip of the branch.
 pub type Branch = Vec<Vertex>;
 
 /// Distances that define which points are connected, and how they are grouped into sections.
@@ -45,8 +46,8 @@ pub type Branch = Vec<Vertex>;
 pub struct Reach {
     /// Points up to this distance apart are connected, m.
     pub link: f64,
-    /// Length of a section, m; at least `link`. Shorter branches are dropped. Paths begin at all points
-    /// within one section length of the start of the crack.
+    /// Length of a section, m; at least `link`. Branches that are shorter than a section are dropped. Paths
+    /// begin at all points within one section length of the start of the crack.
     pub section_length: f64,
 }
 
@@ -58,7 +59,8 @@ pub fn length(branches: &[Branch]) -> f64 {
 }
 
 /// Find the branches of a crack that starts at `from` (m). The first branch has the longest path to its tip.
-/// The result is empty if no point is near the start. The result depends only on the points and their order.
+/// The result is empty if no point is within one section length of the start. The result depends only on the
+/// points and their order.
 pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch> {
     let places: Vec<[f64; 3]> = points.iter().map(|point| point.place).collect();
     let bins = Bins::new(&places, reach.link * (1.0 + TOLERANCE));
@@ -227,7 +229,7 @@ fn drop_stubs(parts: &mut [Part]) {
 /// Join the centroids of successive parts to branches.
 fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
     // The vertex of a part is its centroid. For a part without children, the vertex is moved along the line
-    // to the farthest point of the part.
+    // from the previous vertex, up to the farthest point of the part.
     let place = |part: &Part, before: Vector| {
         let members = || part.members.iter().map(|member| &points[*member]);
         let (mut sum, mut weight) = (Vector::zeros(), 0.0);
@@ -248,8 +250,8 @@ fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Ve
         place: from,
         along: 0.0,
     };
-    // The branches begin at the part without a parent that extends farthest. Other parts without parents are
-    // not used.
+    // Of the parts without a parent, the branches begin at the part with the largest `farthest`. The other
+    // parts without a parent are not used.
     let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
     let farther = |a: &usize, b: &usize| {
         let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);

@@ -22,9 +22,9 @@ pub struct GlobalState {
     pub angular_momentum: Vec<f64>,
     /// Number of bonds broken since the start.
     pub broken: u64,
-    /// Number of points whose damage exceeds the threshold.
+    /// Number of cracked points: points whose damage exceeds the `damage_threshold` of the history.
     pub cracked_points: u64,
-    /// Corners of the bounding box of the cracked points, m.
+    /// Corners of the bounding box of the cracked points, m; NaN if there are none.
     pub cracked_extent: [[f64; 3]; 2],
     /// Number of singular points: points whose law gives no force.
     pub singular_points: u64,

@@ -1,10 +1,10 @@
-//! In runs without `[contact]`, bodies that no bond joins pass through each other. This module finds points
-//! of two such bodies that are nearer than their spacing. For bodies whose bonds have broken, it finds points
-//! that are nearer than half their spacing.
+//! In runs without `[contact]`, bodies that no bond joins pass through each other. This module finds two
+//! points of such bodies that are nearer than their spacing, which is the mean edge of their cells. For
+//! bodies whose bonds have broken, it finds points that are nearer than half their spacing.
 //!
 //! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks
-//! by spatial cells, so that each rank compares a part. Points of the second body are sent to the ranks of
-//! all cells that are near enough.
+//! by spatial cells, so that each rank compares a part of the points. Points of the second body are sent to
+//! the ranks of all cells that are near enough.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -15,16 +15,15 @@ use crate::points::distance_squared;
 use crate::solver::Simulation;
 use crate::solver::model::Model;
 
-/// Edge of a cell divided by the largest distance that counts. Large cells have fewer points near their
-/// borders.
+/// Edge of a cell divided by [`Meeting::radius`]. Large cells have fewer points near their borders.
 const CELL: f64 = 8.0;
 
 /// Two points of bodies that no bond joins are too near only if their distance is below this fraction of
 /// their initial distance.
 const NEARER: f64 = 0.9;
 
-/// If bonds joined two bodies, two of their points are too near if their distance is below this fraction of
-/// their spacing and of their initial distance. Compression alone rarely reaches this distance.
+/// Two points of bodies that bonds joined are too near if their distance is below this fraction of both their
+/// spacing and their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Number of points that one task processes.

@@ -5,8 +5,8 @@ use crate::problem::{CrackPath, Problem};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
-/// Distance, in horizons, up to which damaged points are connected. This distance bridges a gap of one point
-/// in a row, but branches soon separate.
+/// Distance, in horizons, up to which damaged points are connected. This distance is long enough to bridge a
+/// gap of one point, and short enough that the points of two branches are soon no longer connected.
 const LINK: f64 = 2.0 / 3.0;
 
 /// Find the owned points of the set of a crack. Collective.
@@ -24,7 +24,7 @@ pub fn points_of<const D: usize>(
     Ok(points)
 }
 
-/// Smallest and largest spacing of all points, m. Collective.
+/// Smallest and largest spacing of all points, from their volumes, m. Collective.
 pub fn spacings<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; 2] {
     let model = &simulation.model;
     let mut extremes = [-f64::MAX, 0.0];

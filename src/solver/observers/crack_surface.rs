@@ -37,8 +37,9 @@ const DIAGONAL: f64 = 1.8;
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
-/// Largest damage of an undamaged point ahead, as a fraction of the threshold. At an oblique surface of the
-/// body, the damage falls below the threshold before the crack ends, but stays above this fraction.
+/// Largest damage of a point ahead of the front that counts as undamaged, as a fraction of the threshold. At
+/// an oblique surface of the body, the damage falls below the threshold before the crack ends, but stays
+/// above this fraction.
 const UNDAMAGED: f64 = 0.5;
 
 /// A crack in 3-D whose area and front are computed.
@@ -62,8 +63,8 @@ pub struct Surface {
     /// Largest distance between the start of the crack and a damaged point of the crack, m; 0 without damaged
     /// points.
     pub reach: f64,
-    /// Positions of the points of the front, moved to the mid-plane of the crack, m. They are in the order of
-    /// the ids of the points.
+    /// Positions of the points of the front, moved to the mid-plane of the crack, m. The positions are in the
+    /// order of the ids of the points.
     pub front: Vec<[f64; 3]>,
 }
 

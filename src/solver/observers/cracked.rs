@@ -1,4 +1,5 @@
-//! Number and bounding box of the cracked points, whose damage exceeds the threshold.
+//! Number and bounding box of the cracked points: points whose damage exceeds the `damage_threshold` of the
+//! history.
 
 use crate::comm::{self, Communicator};
 use crate::solver::Simulation;

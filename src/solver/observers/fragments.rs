@@ -39,7 +39,7 @@ impl Fragments {
         for id in &ids {
             *own.entry(*id as u64).or_default() += 1;
         }
-        // A rank is assigned to each fragment and counts its points.
+        // Each fragment is assigned to a rank, which counts the points of the fragment.
         let mut outgoing = vec![Vec::new(); comm.size()];
         for (fragment, points) in own {
             let home = (fragment % comm.size() as u64) as usize;

@@ -43,7 +43,7 @@ struct Probe {
 pub struct HistoryObserver {
     columns: Columns,
     reactions: Vec<Vec<u32>>,
-    /// Points of each support force, and the direction of the force component.
+    /// For each support force, this rank's points of the set, and the direction of the force component.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
     statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
@@ -54,7 +54,8 @@ pub struct HistoryObserver {
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     j_integrals: JIntegrals,
-    /// Energy (J) in the first row, and number of bonds that were intact before any bond could break.
+    /// Sum of the energy balance in the first row (J), and number of bonds that were intact before any bond
+    /// could break, counted at both ends.
     start: Option<(f64, u64)>,
 }
 
@@ -93,7 +94,7 @@ pub struct HistoryRow {
     pub number: u64,
     /// Energies of the row.
     pub energies: Energies,
-    /// Energy at the start, J; the error of the energy balance is relative to it.
+    /// Sum of the energy balance in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
     /// Kinetic energy, J, that loads and prescribed motions can add in a step without work in the trapezoidal
     /// rule.
@@ -147,8 +148,9 @@ impl HistoryObserver {
     /// Find the points of all sets, probes, fronts, cracks, tips and J integrals of the history. Collective.
     ///
     /// # Errors
-    /// If a set is empty, if no point lies along the line of a front, if all points of a tip lie behind its
-    /// start, or if the box of a J integral contains no point or is too near to the end of the bodies. The
+    /// If a set is empty, if no point lies along the line of a front, if all points of the set of a crack tip
+    /// lie behind the start of the line, if the box of a J integral contains no point or is too near to the
+    /// end of the bodies, or if no body lies on the line that stands for the crack front of a J integral. The
     /// error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
@@ -206,7 +208,7 @@ impl HistoryObserver {
         })
     }
 
-    /// Find the points of the history again after points have migrated. Collective.
+    /// Find the points of the history again after a rebalance or refinement. Collective.
     ///
     /// # Errors
     /// Same as for [`Self::new`].
@@ -225,8 +227,9 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Reference values for all rows: the energy (J) in the first row, and the number of bonds that were
-    /// intact before any bond could break.
+    /// Reference values for all rows: the sum of the energy balance in the first row (J), see
+    /// [`Energies::error`], and the number of bonds that were intact before any bond could break, counted at
+    /// both ends. `None` before the first row.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
@@ -693,7 +696,7 @@ fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Exact
     })
 }
 
-/// Compute several exact sums over the points with local index below `count`. `add` adds the terms of a
+/// Compute `width` exact sums over the points with local index below `count`. `add` adds the terms of a
 /// point.
 fn sums_over(
     count: usize,

@@ -1,12 +1,12 @@
-//! Nonlocal J integrals over boxes around crack tips, in 3-D around pieces of crack fronts: energy released per
-//! area of crack growth.
+//! Nonlocal J integrals over boxes around crack tips (in 3-D, around pieces of crack fronts): energy released
+//! per area of crack growth.
 //!
 //! A box has a weight q that is 1 inside and falls to 0 over a layer inside the faces. With the unit vector e
 //! in the direction of growth, the strain energy density W and the force states T, the integral is
 //!
 //! J = −(1/L) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
 //!
-//! L is the thickness in plane problems. In 3-D, it is the integral of q along the crack front. In an
+//! L is the thickness in plane problems, and the integral of q along the crack front in 3-D. In an
 //! equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010) over the
 //! boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
 
@@ -22,8 +22,8 @@ use crate::solver::Simulation;
 use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
-/// Tolerance of the distance between the box and the ends of the bodies, relative to the margin, and of the
-/// components of the direction of growth.
+/// Tolerance of the distance between the box and the ends of the bodies, in horizons, and of the components
+/// of the direction of growth.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.
@@ -46,8 +46,8 @@ impl JIntegrals {
     /// Find the points of the boxes. Collective.
     ///
     /// # Errors
-    /// If a box contains no point, if the bodies end near the box in the direction of growth, or if no body lies
-    /// on the line that stands for the crack front. The error is the same on all ranks.
+    /// If a box contains no point, if the bodies end near the box in the direction of growth, or if no body
+    /// lies on the line that stands for the crack front in 3-D. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let mut directions = Vec::new();
         let mut boxes = Vec::new();
@@ -110,7 +110,7 @@ impl JIntegrals {
     }
 }
 
-/// Check that the box contains points, and that the bodies reach at least one horizon beyond it in the
+/// Check that the box contains points, and that the bodies reach at least one horizon beyond the box in the
 /// directions of the axes along which the crack grows. Collective.
 fn is_in_the_bodies<const D: usize>(
     simulation: &Simulation<'_, D>,

@@ -63,8 +63,8 @@ fn extent(edges: [f64; 3], direction: [f64; 3]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
-/// Return the centre and the edges of the cell that an owned point fills, m, and whether the cells of its body fill
-/// the body without gaps.
+/// Return the centre and the edges (m) of the cell that an owned point fills. Also return whether the cells
+/// of the body fill the body without gaps.
 fn cell<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
@@ -78,8 +78,9 @@ fn cell<const D: usize>(
     else {
         return (position, edges(simulation, point), false);
     };
-    // At the surface of a refined body, each point fills a cell of level 0. Gauss points, and points that
-    // `jitter` has moved, do not lie at the centres of their cells.
+    // In a refined body, the cell of each point has the edges of level 0, because the outermost points lie
+    // half an edge of level 0 inside the surface. Gauss points, and points that `jitter` has moved, do not
+    // lie at the centres of their cells.
     let middle = |d: usize| {
         let number = ((position[d] - origin[d]) / spacing[d]).floor();
         origin[d] + (number + 0.5) * spacing[d]
@@ -91,11 +92,12 @@ fn cell<const D: usize>(
     (middle, spacing, true)
 }
 
-/// Tolerance for a line parallel to a face of a cell, relative to the edge of the cell. With it, a line along a
-/// face between two cells lies in both.
+/// Tolerance for a line parallel to a face of a cell, relative to the edge of the cell. With this tolerance,
+/// a line along the face between two cells lies in both cells.
 const FACE: f64 = 1e-9;
 
-/// Return the range of the line {a · `direction`} in a box with this centre and these edges (m), by a (m).
+/// Return the range of distances a (m) for which the position a · `direction` lies in a box with this centre
+/// and these edges (m). `None` if there is no such distance.
 fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let mut range = f64::NEG_INFINITY..f64::INFINITY;
     for d in 0..3 {
@@ -113,8 +115,8 @@ fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (range.start < range.end).then_some(range)
 }
 
-/// Return the range of the line {a · `direction`} that belongs to a point at most one edge beside the line, by
-/// a (m).
+/// Return the range of distances a (m) on the line {a · `direction`} that belongs to the point at `position`
+/// (m). `None` if the point is more than one edge away from the line.
 fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
     let across = (0..3).map(|d| (position[d] - along * direction[d]).powi(2));
@@ -123,7 +125,7 @@ fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
 }
 
 /// Integrate q along the part of a line that lies in the bodies, m. The line passes through the centre of the
-/// box along the crack front. Collective.
+/// box in the direction `front`. Collective.
 ///
 /// # Errors
 /// If no body lies on the line in the box. The error is the same on all ranks.
@@ -169,8 +171,8 @@ pub fn front_length<const D: usize>(
     Err(Error::input(message).at(&rule.span))
 }
 
-/// Integrate q over a range of the line, m. Between the positions at which a factor of q has a kink, q is a product
-/// of up to three linear factors, for which Simpson's rule is exact.
+/// Integrate q over a range of the line, m. Between the positions at which a factor of q has a kink, q is a
+/// product of up to three linear factors. Simpson's rule is exact for such a product.
 fn integral(rule: &JIntegral, centre: [f64; 3], front: [f64; 3], range: Range<f64>) -> f64 {
     let mut kinks = vec![range.start, range.end];
     for d in 0..3 {

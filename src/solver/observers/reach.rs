@@ -23,7 +23,8 @@ pub struct Course {
 pub struct Reached {
     /// Distance from the start of the line, m.
     pub along: f64,
-    /// Position, m. It is as far from the line as the farthest point above the threshold.
+    /// Position, m: the position of the farthest point above the threshold, moved in the direction of the
+    /// line to `along`.
     pub position: [f64; 3],
 }
 

@@ -12,7 +12,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Create a schedule with intervals.
+    /// Create a schedule with this interval and without given times.
     pub fn every(interval: Interval) -> Self {
         Self {
             interval: Some(interval),
@@ -47,15 +47,14 @@ impl Schedule {
             Some(Interval::Steps(steps)) => clock.number().is_multiple_of(steps),
             Some(Interval::Seconds(seconds)) => passed(seconds, before),
             Some(Interval::SecondsAtSteps { seconds, steps }) => {
-                // Time of the previous check. The present step is used even if the step has changed since
-                // then.
+                // Time of the previous check, if the time step has not changed since then.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
             }
         }
     }
 
-    /// Number of given times up to a time (s), except for round-off.
+    /// Number of given times that are at most `time` (s), up to round-off.
     fn reached(&self, time: f64) -> usize {
         self.times
             .partition_point(|given| given * (1.0 - ROUNDING) <= time)
@@ -146,7 +145,7 @@ mod tests {
         assert_eq!(due(every(4), &[0.1, 0.45], 0.1, 10), [0, 1, 4, 5, 8, 10]);
         let seconds = Some(Interval::Seconds(0.25));
         assert_eq!(due(seconds, &[0.4, 0.5], 0.1, 10), [0, 3, 4, 5, 8, 10]);
-        // Steps whose multiples are rounded.
+        // Time steps whose multiples are not exact in floating point.
         for step in [0.1, 1e-8 / 3.0, 7.3e-9] {
             let times: Vec<f64> = [3, 10, 700, 99_999].map(|k| f64::from(k) * step).to_vec();
             assert_eq!(

@@ -160,9 +160,9 @@ impl Snapshot {
 }
 
 /// Convert Kirchhoff stress to Cauchy stress, with six components per point. The stress is divided by J, the
-/// ratio of deformed to undeformed volume. J needs the out-of-plane stretch. In plane stress, the law gives
-/// this stretch. If the law does not, Hooke's law with logarithmic strains gives ε_zz = −ν/(1 − ν) (ε_xx +
-/// ε_yy). Under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
+/// ratio of deformed to undeformed volume. J needs the out-of-plane stretch. In plane stress, the law
+/// computes this stretch. For a law that does not, the stretch follows from Hooke's law with logarithmic
+/// strains: ε_zz = −ν/(1 − ν) (ε_xx + ε_yy). Under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
@@ -219,7 +219,7 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
 }
 
 /// Stretch ratio (deformed over reference length) of an owned point perpendicular to the plane or bar, for
-/// this deformation gradient. It is 1 if the strain in this direction is 0, and in 3-D.
+/// this deformation gradient. The ratio is 1 in plane strain, under uniaxial strain, and in 3-D.
 fn stretch_across<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
@@ -294,7 +294,8 @@ fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) 
     -material.elastic.youngs_modulus * material.expansion.coefficient * change
 }
 
-/// Plastic state of an owned point. Only its plastic strain is set, which is 0 without plasticity.
+/// Plastic state of an owned point. Only the plastic strain of this state is set; the strain is 0 without
+/// plasticity.
 fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticState {
     let strain = fields.plastic_strain.as_ref();
     PlasticState {

@@ -15,12 +15,12 @@ pub struct Tip {
     growth: Growth,
 }
 
-/// State of a crack tip at the time of a row; NaN if no point is above its threshold.
+/// State of a crack tip at the time of a row; NaN if no damage exceeds the threshold of the tip.
 #[derive(Debug, Clone, Copy)]
 pub struct TipNow {
     /// Position, m.
     pub position: [f64; 3],
-    /// Length of the crack, m.
+    /// Length of the crack, m: distance of the tip from the start of the line, along the line.
     pub length: f64,
     /// Speed, m/s.
     pub speed: f64,
@@ -63,7 +63,8 @@ impl Tip {
         &self.name
     }
 
-    /// State of the tip for the given damage of the owned points. Collective.
+    /// Return the state of the tip for the given damage of the owned points, and record the length of the
+    /// crack for later speeds. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -95,12 +96,12 @@ impl Tip {
 /// The length of a crack over time, from which its speed is computed.
 ///
 /// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
-/// latest row in which the crack was at least one horizon shorter. If there is no such row, it begins at the
-/// latest row in which the crack was not longer than at first.
+/// latest row in which the crack was at least one horizon shorter. If there is no such row, the interval
+/// begins at the latest row in which the crack was not longer than at first.
 ///
 /// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
 /// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
-/// speed falls as one horizon divided by the duration of the interval.
+/// speed is one horizon divided by the duration of the interval, which then grows from row to row.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.
@@ -115,7 +116,8 @@ impl Growth {
         }
     }
 
-    /// Speed (m/s) when the length is `length` (m) at a time (s); NaN at the first length.
+    /// Record `length` (m) at `time` (s), and return the speed, m/s. The speed is NaN at the first length,
+    /// and if the length is NaN.
     fn speed(&mut self, time: f64, length: f64) -> f64 {
         if length.is_nan() {
             return f64::NAN;
