@@ -197,7 +197,7 @@ fn from_file(
         .map_err(|(row, message)| at(lines.get(row).copied().unwrap_or(header.line), message))
 }
 
-/// Return the indices of the columns of time and value.
+/// Return the indices in `names` of the columns of time and value.
 fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usize; 2], String> {
     let find = |wanted: &str| {
         let missing = || {

@@ -65,53 +65,53 @@ pub struct Points {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// A box (interval, rectangle) between two corners, in m.
+    /// A box between two corners; a rectangle in plane problems, an interval in 1-D.
     Box {
-        /// Lower corner.
+        /// Lower corner, m.
         lower: Vector,
-        /// Upper corner.
+        /// Upper corner, m.
         upper: Vector,
     },
     /// A disc (plane problems).
     Disc {
-        /// Centre.
+        /// Centre, m.
         centre: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
     },
     /// A cylinder (3-D) between the centres of its two ends.
     Cylinder {
-        /// Centre of one end.
+        /// Centre of one end, m.
         from: Vector,
-        /// Centre of the other end.
+        /// Centre of the other end, m.
         to: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
     },
     /// A ball (3-D).
     Sphere {
-        /// Centre.
+        /// Centre, m.
         centre: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
     },
     /// A polygon (plane problems).
     Polygon {
-        /// Corners [x, y] in order.
+        /// Corners [x, y] in order along the border, m.
         vertices: Spanned<Vec<Vector>>,
     },
     /// A polygon in x and y, extruded along z (3-D).
     Prism {
-        /// Corners [x, y] in order.
+        /// Corners [x, y] in order along the border, m.
         vertices: Spanned<Vec<Vector>>,
-        /// Lower z.
+        /// Lower z, m.
         bottom: Number,
-        /// Upper z.
+        /// Upper z, m.
         top: Number,
     },
     /// The union of the shapes.
     Union(Spanned<Vec<Spanned<Shape>>>),
-    /// The first shape without the parts that lie in any other shape.
+    /// The first shape without the parts that lie in any of the other shapes.
     Difference(Spanned<Vec<Spanned<Shape>>>),
 }
 
@@ -134,20 +134,20 @@ pub struct Set {
     /// Number that the file uses for the first point; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
-    /// Name of a group in the meshes that define the points of bodies.
+    /// Name or number of a group in the meshes that define the points of bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Spanned<GroupName>>,
 }
 
-/// A surface that cuts bonds.
+/// A pre-crack: bonds that cross this surface (in plane problems, this line) start broken.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Crack {
-    /// A straight cut (plane problems).
+    /// A straight line (plane problems).
     Segment {
-        /// One end.
+        /// One end, m.
         from: Vector,
-        /// The other end.
+        /// The other end, m.
         to: Vector,
         /// Width of a slot in m, half on each side of the segment; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -155,7 +155,7 @@ pub enum Crack {
     },
     /// A parallelogram (3-D).
     Rectangle {
-        /// A corner.
+        /// A corner, m.
         corner: Vector,
         /// The vector in m from `corner` to an adjacent corner.
         edge_a: Vector,
@@ -167,11 +167,11 @@ pub enum Crack {
     },
     /// A flat disc (3-D).
     Disc {
-        /// Centre.
+        /// Centre, m.
         centre: Vector,
         /// Normal, of any length.
         normal: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
         /// Width of a slot in m, half on each side of the surface; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -21,9 +21,9 @@ pub struct Contact {
     /// series. With `"short-range"`, the spring constant in Pa; by default 15 times the smaller bulk modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Distance in m at which contact begins. The default is the mean edge of the two cells, or 1.35 times
-    /// this edge with `"short-range"`. For points that start closer, contact begins below their initial
-    /// distance (0.9 times this distance with `"short-range"`).
+    /// Distance in m of two points at which contact begins. The default is the mean edge of the cells of the
+    /// two points, or 1.35 times this edge with `"short-range"`. For points that start closer, contact begins
+    /// at their initial distance, or at 0.9 times their initial distance with `"short-range"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.

@@ -113,7 +113,7 @@ pub struct Output {
     /// Simulated times of outputs in s, in addition to those of `every` or `every_steps`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<Vector>,
-    /// Names of the fields.
+    /// Names of the fields. If not given: `displacement`, `velocity`, `damage` and `strain_energy_density`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
     /// Precision of the fields that change in time: `"double"` (8 bytes per number) or `"single"` (4 bytes).
@@ -160,7 +160,8 @@ pub struct History {
     /// given.
     #[serde(default)]
     pub angular_momentum: Spanned<bool>,
-    /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
+    /// Damage above which a point counts as cracked; 0.35 if not given. Cracked points are counted, and their
+    /// smallest and largest coordinates are recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage_threshold: Option<Number>,
     /// Sums, means and extremes of fields over sets and bodies, by name.
@@ -265,7 +266,8 @@ pub struct FieldStatistics {
     /// Name of an output field.
     pub field: Text,
     /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
-    /// `"principal_1"`. The magnitude of a vector if not given.
+    /// `"principal_1"`. If not given, the magnitude of a vector; required for tensors, and not allowed for
+    /// fields with one number per point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// A set or a body; all points if not given.
@@ -292,8 +294,8 @@ pub enum Statistic {
 }
 
 /// A front: the position that a field has reached along a line. The search finds the farthest point near the
-/// line whose value exceeds the threshold. Linear interpolation to the next point ahead gives the position
-/// where the value crosses the threshold.
+/// line at which the absolute value of the field exceeds the threshold. Linear interpolation to the next
+/// point ahead gives the position where the absolute value crosses the threshold.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {
@@ -310,7 +312,8 @@ pub struct Front {
     /// Name of an output field.
     pub field: Text,
     /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
-    /// `"principal_1"`. The magnitude of a vector if not given.
+    /// `"principal_1"`. If not given, the magnitude of a vector; required for tensors, and not allowed for
+    /// fields with one number per point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// Threshold that the absolute value of the field must exceed, in the unit of the field.

@@ -8,8 +8,8 @@ use crate::deck::number::{Number, Vector};
 use crate::deck::spanned::Spanned;
 
 /// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when the
-/// distance of the point to the surface is half the edge of the point's cell, or the initial distance if that
-/// is smaller.
+/// distance of the point to the surface is half the edge of the point's cell, or the initial distance if the
+/// initial distance is smaller.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
@@ -31,7 +31,7 @@ pub struct Rigid {
     /// Initial angular velocity of a free body, 1/s: a vector, or one number in plane problems.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angular_velocity: Option<Spanned<Vec<Number>>>,
-    /// Force at the centre of a free body in N: an expression of t for each component.
+    /// Force in N at the centre of a free body: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Vector>,
     /// Young's modulus in Pa of the layer between points and surface; the modulus of the points' material if

@@ -169,7 +169,7 @@ pub struct Relaxation {
     /// Number of load steps.
     #[serde(default = "default_load_steps")]
     pub load_steps: Count,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
     #[serde(default = "default_tolerance")]
     pub tolerance: Number,
     /// Largest number of iterations of a load step.
@@ -203,17 +203,17 @@ fn default_iterations() -> Count {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Static {
-    /// Number of load steps; the value of the relaxation if not given.
+    /// Number of load steps; `load_steps` of the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions. The value of
-    /// the relaxation if not given.
+    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions;
+    /// `tolerance` of the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Number>,
     /// Largest number of iterations of a load step.
     #[serde(default = "default_max_iterations")]
     pub max_iterations: Count,
-    /// Largest number of halvings of a load step without an equilibrium.
+    /// Largest number of times that a load step is halved because no equilibrium is found.
     #[serde(default = "default_max_halvings")]
     pub max_halvings: Spanned<u64>,
 }
