@@ -80,8 +80,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Write a rectangle as a pre-crack; in 2-D its bottom edge.
 ///
-/// The edges are ub·b from the corner and (ub × n)·a, with the bottom unit vector ub, the normal n, and the
-/// lengths b and a.
+/// From the corner, the bottom edge is b·ub and the side edge is a·(ub × n). ub is the bottom unit vector, n
+/// the normal, b the bottom length and a the side length.
 fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
     let written = translation.name("crack", name);
     let shape = match translation.dimension {

@@ -31,7 +31,7 @@ struct Initial {
     node: Node,
 }
 
-/// Writer of conditions; collects initial values until the end.
+/// Writer of conditions; collects initial values until [`Self::finish`] writes them.
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
@@ -75,7 +75,7 @@ impl Conditions {
     /// Write a condition.
     ///
     /// # Errors
-    /// If a key is missing, `Coordinate` is not x, y or z, or the node set is unknown.
+    /// If a key is missing or not a text, `Coordinate` is not x, y or z, or the node set is unknown.
     pub fn add(
         &mut self,
         translation: &mut Translation,
@@ -211,7 +211,8 @@ impl Conditions {
         Ok(())
     }
 
-    /// Write the initial values, one table per set.
+    /// Write the initial values, one table per set. Log the initial values that a table of another set may
+    /// replace by 0.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self

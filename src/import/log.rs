@@ -39,7 +39,7 @@ pub struct Entry {
     pub value: String,
     /// Outcome of the key.
     pub fate: Fate,
-    /// The key in the new deck, or the reason for leaving it out.
+    /// The key in the new deck, or the reason why the key is approximated or left out.
     pub note: String,
 }
 
@@ -220,8 +220,8 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note has the
-    /// outcome `LeftOut`.
+    /// Return the outcomes of all keys of a tree, in the order of the text. A value without a note has the
+    /// outcome `LeftOut`. A table without a note is not listed, but its keys are.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);

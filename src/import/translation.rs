@@ -165,7 +165,8 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// Return the name of a table in the new deck, unique in its section.
+    /// Return the name in the new deck for a table of the source deck. The name is unique in its section. The
+    /// same source name always gets the same name.
     pub fn name(&mut self, section: &'static str, name: &str) -> String {
         let same = |(s, read, _): &&(&str, String, String)| *s == section && read == name;
         if let Some((.., written)) = self.names.iter().find(same) {
@@ -256,7 +257,8 @@ pub fn line_error(source: &Source, line: usize, message: impl AsRef<str>) -> Err
     )
 }
 
-/// Return a name in lower case, with letters, digits and underscores only.
+/// Return a name in lower case, with letters, digits and underscores only, and with at most [`LONGEST_NAME`]
+/// characters.
 fn slug(name: &str) -> String {
     let mut slug = String::new();
     for c in name.trim().chars().take(LONGEST_NAME) {

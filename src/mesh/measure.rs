@@ -1,7 +1,8 @@
 //! Exact volume and centroid of an element, which becomes a point.
 //!
-//! An element is the image of its reference element under its shape functions. Volume ∫ det J and first
-//! moments ∫ x det J are integrals of polynomials, for which the Gauss rules here are exact.
+//! The shape functions map the reference element to the element; J is the Jacobian matrix of this map. The
+//! volume ∫ det J and the first moments ∫ x det J over the reference element are integrals of polynomials.
+//! The Gauss rules of this module are exact for these polynomials.
 
 use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
@@ -23,7 +24,7 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate along an axis.
+    /// Return the reference coordinate with this value along an axis.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
@@ -84,7 +85,7 @@ struct GaussPoint {
 /// The Gauss rules of all types, in the order of [`KINDS`].
 static RULES: LazyLock<Vec<Vec<GaussPoint>>> = LazyLock::new(|| KINDS.map(rule).into());
 
-/// Return points and weights of the Gauss rule on [−1, 1].
+/// Return points and weights of the Gauss rule on [−1, 1] with 1 to 4 points.
 fn gauss(points: usize) -> Vec<(f64, f64)> {
     let symmetric = |pairs: &[(f64, f64)]| {
         let mirrored = pairs.iter().rev().map(|(x, weight)| (-x, *weight));
@@ -107,7 +108,7 @@ fn gauss(points: usize) -> Vec<(f64, f64)> {
     }
 }
 
-/// Return the Gauss rule of a type, exact for volume and first moments.
+/// Return the Gauss rule of a type, exact for volume and first moments; empty for a point.
 fn rule(kind: Kind) -> Vec<GaussPoint> {
     let second_order = kind.nodes > kind.corners();
     // n points are exact up to the degree 2n − 1 in each coordinate. Collapsing the coordinates raises the
@@ -606,12 +607,12 @@ mod tests {
 
     #[test]
     fn a_frustum_as_one_hexahedron_has_its_volume() {
-        // A 2 × 2 base, a 1 × 1 top, height 3: V = h/3 (A + a + √(A a)) = 7.
+        // Base area A = 2 × 2, top area a = 1 × 1, height h = 3: V = h/3 (A + a + √(A a)) = 7.
         let layer = |half: f64, z: f64| SQUARE.map(|[a, b]| [half * a, half * b, z]);
         let nodes = [layer(1.0, 0.0), layer(0.5, 3.0)].concat();
         let measure = measure(Kind::new(Form::Hexahedron, 8), &nodes);
         assert!((measure.size - 7.0).abs() < 1e-14);
-        // z̄ = h/4 (A + 2 √(A a) + 3 a)/(A + √(A a) + a).
+        // Height of the centroid: h/4 (A + 2 √(A a) + 3 a)/(A + √(A a) + a).
         assert!((measure.centroid[2] - 0.75 * 11.0 / 7.0).abs() < 1e-14);
     }
 }

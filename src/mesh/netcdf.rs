@@ -181,7 +181,7 @@ struct Variable {
     is_record: bool,
 }
 
-/// Return the size of a number of a type, bytes.
+/// Return the size of a number of the netCDF type `kind`, bytes.
 fn size_of_kind(kind: u32) -> Fault<usize> {
     match kind {
         1 | 2 | 7 => Ok(1),
