@@ -191,8 +191,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 }
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
-/// faces normal to this axis. A polygon has the smallest and the largest coordinate of its corners. A union
-/// has the lowest and the highest of the faces of its parts. A difference has the faces of its first part.
+/// faces normal to this axis. The sides of a prism or polygon are bounded by the smallest and the largest
+/// coordinate of the corners. A union has the lowest and the highest of the faces of its parts. A difference
+/// has the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
@@ -315,8 +316,8 @@ fn point_source(
             let edges = &spacing[..scope.dimension];
             let longest = edges.iter().copied().fold(0.0, f64::max);
             if let (Some(number), true) = (&body.horizon, longest > horizon) {
-                // `horizon::resolve` has copied a horizon of the grid that contains the mean spacing to the
-                // bodies, with its byte range in `[grid]`.
+                // If the horizon of the grid contains the mean spacing, `horizon::resolve` has given its
+                // value to the body, with the byte range of the key in `[grid]`.
                 let key = if number.span() == grid.horizon.span() {
                     "[grid]"
                 } else {

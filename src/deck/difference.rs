@@ -70,7 +70,7 @@ fn compared(
     let (mut old, mut new) = (table(&old.text)?, table(&new.text)?);
     // A deck from a checkpoint of an earlier version lacks keys that were added later. These keys get their
     // defaults. If defaults cannot be filled in, for example because a file is missing, the deck is compared
-    // without them.
+    // without defaults.
     if let Ok(explained) = decks.0.explain() {
         complete(&mut old, &table(&explained)?, &new);
     }

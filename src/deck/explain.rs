@@ -211,7 +211,7 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
 
 /// Return the depth of a traction or pressure, m; `None` if the depth differs between the bodies that may
 /// have points in the set. The depth in each body is then the spacing of this body, and a single number
-/// cannot express it.
+/// cannot express these depths. Also return `None` for a condition without a depth.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

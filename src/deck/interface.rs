@@ -21,9 +21,9 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
 /// # Errors
-/// On bodies whose laws cannot share a bond, and on an invalid or repeated pair. Also on a rule or strength
-/// that the material laws of a pair do not allow. The solver checks whether the laws allow the damage law of
-/// a pair.
+/// On bonded bodies whose laws exert forces of different directions, and on an invalid or repeated pair. Also
+/// on a rule or strength that the material laws of a pair do not allow. The solver checks whether the laws
+/// allow the damage law of a pair.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,

@@ -1,4 +1,4 @@
-//! Decks: the TOML file that describes a run, from its text to a validated [`Problem`].
+//! Decks, the TOML files that describe runs: from the text of a deck to a validated [`Problem`].
 
 mod assign;
 mod bodies;
@@ -173,8 +173,8 @@ impl Deck {
         Ok(found.as_ref().unwrap_or(&self.grammar))
     }
 
-    /// Return the deck as TOML with every default written out. Rows of tables replace the paths of their
-    /// files, and numbers replace horizons that contain the mean spacing of points.
+    /// Return the deck as TOML with every default written out. Tables contain their rows in place of the path
+    /// of a file. Horizons that contain the mean spacing of points are numbers.
     ///
     /// # Errors
     /// If the deck is invalid, as in [`Self::problem`], or cannot be serialized.

@@ -220,8 +220,8 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. A value without a note has the
-    /// outcome `LeftOut`. A table without a note is not listed, but its keys are.
+    /// Return the outcomes of all keys of a tree, in the order of the text. A value or an empty table without
+    /// a note has the outcome `LeftOut`. Any other table without a note is not listed, but its keys are.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);

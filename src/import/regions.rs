@@ -176,7 +176,7 @@ impl Region {
         }
     }
 
-    /// Return the shape of the region, enlarged by [`MARGIN`], as a table with one key.
+    /// Return the shape of the region, enlarged by `MARGIN` times the spacing, as a table with one key.
     pub fn shape(&self, spacing: f64) -> Value {
         let margin = MARGIN * spacing;
         let (name, value) = match self {

@@ -257,7 +257,7 @@ pub fn line_error(source: &Source, line: usize, message: impl AsRef<str>) -> Err
     )
 }
 
-/// Return a name in lower case, with letters, digits and underscores only, and with at most [`LONGEST_NAME`]
+/// Return a name in lower case, with letters, digits and underscores only, and with at most `LONGEST_NAME`
 /// characters.
 fn slug(name: &str) -> String {
     let mut slug = String::new();

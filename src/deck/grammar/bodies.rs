@@ -122,7 +122,7 @@ pub struct Set {
     /// A condition on the reference position, such as `"x < 2*dx && y > 0"`.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<Number>,
-    /// A region.
+    /// Region that contains the points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<Spanned<Shape>>,
     /// The points' global ids, from 0.

@@ -14,11 +14,12 @@ use crate::deck::spanned::Spanned;
 pub struct Contact {
     /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon.
     /// `"short-range"`: short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`:
-    /// contact only between pairs with their own rule.
+    /// contact only for pairs of bodies with their own `model`.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of both materials in
-    /// series. With `"short-range"`, the spring constant in Pa; by default 15 times the smaller bulk modulus.
+    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of two equally thick
+    /// layers of the two materials in series. With `"short-range"`, the spring constant in Pa; by default 15
+    /// times the smaller bulk modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// Distance in m of two points at which contact begins. The default is the mean edge of the cells of the

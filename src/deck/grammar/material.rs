@@ -80,7 +80,7 @@ impl<'de> Deserialize<'de> for Material {
     }
 }
 
-/// Schema with one property per law; its value is the table of the law's keys.
+/// Schema with one property per law; the value of the property is the table of the law's keys.
 impl JsonSchema for Material {
     fn schema_name() -> Cow<'static, str> {
         "Material".into()
@@ -179,10 +179,12 @@ pub struct CriticalStretch {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
+    /// Fracture energy in J/m² of cracks along `direction`: the normal of the crack is perpendicular to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
+    /// Fracture energy in J/m² of cracks across `direction`: the normal of the crack is parallel to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
     /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
@@ -217,10 +219,12 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
+    /// Fracture energy in J/m² of cracks along `direction`: the normal of the crack is perpendicular to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
+    /// Fracture energy in J/m² of cracks across `direction`: the normal of the crack is parallel to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
     /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.

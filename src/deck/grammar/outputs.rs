@@ -173,7 +173,8 @@ pub struct History {
     /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks by name. The path and the length of each crack are computed, in 3-D the area and the front.
+    /// Cracks by name. In plane problems, the path and the length of each crack are computed; in 3-D, the
+    /// area and the front.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
     /// Crack tips that are tracked, by name.
@@ -200,8 +201,9 @@ pub struct Checkpoint {
     pub every_time: Option<Number>,
 }
 
-/// Points are rebalanced when rank loads drift apart. The ranks' times in the loops over bonds are compared
-/// at regular intervals. Results do not depend on the rebalancing.
+/// Rebalancing: points are distributed over the ranks again when the loads of the ranks drift apart. The load
+/// of a rank is its time in the loops over bonds; these times are compared at regular intervals. Results do
+/// not depend on the rebalancing.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Balance {
@@ -251,7 +253,7 @@ pub struct CrackPath {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// Position in m; the probe records the nearest point.
+    /// Position in m; the probe records values of the nearest point.
     pub at: Vector,
     /// Names of output fields, such as `"stress"` and `"strain"`, that are recorded in addition to
     /// displacement and velocity.

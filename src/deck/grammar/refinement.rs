@@ -21,8 +21,8 @@ pub struct Refinement {
     /// With `"delta-m"`: m of each level from 1 on. If not given, m rises by 1 from level to level.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
-    /// Factor on the horizon of points with a coarser level inside their horizon, so that their families do
-    /// not lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
+    /// Factor on the horizon of points that have points of a coarser level inside their horizon, so that
+    /// their families do not lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
     /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with
@@ -52,7 +52,7 @@ pub struct Trigger {
     /// Smallest damage of a trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Number>,
-    /// A condition on the reference position and t.
+    /// A condition on the reference position and t that makes a point a trigger.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<Number>,
     /// A condition on the reference position and t that every trigger must fulfil.
@@ -94,7 +94,7 @@ pub enum LevelBonds {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RefinedRegion {
-    /// A condition on the reference position.
+    /// A condition on the reference position that selects the points.
     #[serde(rename = "where")]
     pub condition: Number,
     /// Lowest level of points in this region; the finest level if not given.

@@ -33,7 +33,7 @@ pub struct Time {
     /// loading.
     #[serde(default = "default_density_scale")]
     pub density_scale: Number,
-    /// Settings of a step that adapts to the number of bonds that break in it.
+    /// Settings of an adaptive time step, which depends on the number of bonds that break in a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
 }
@@ -114,7 +114,7 @@ impl Method {
     }
 }
 
-/// A time step that adapts to the number of bonds that break in it.
+/// An adaptive time step dt, which depends on the number of bonds that break in a step.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
