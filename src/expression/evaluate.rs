@@ -279,8 +279,8 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Test whether the operations of the code show that the result is always 0 or 1, as for a comparison. The
-/// ranges of the operands are not examined, so the result is false for `0*x`, for example.
+/// Return true if the operations of the code show that its value is always 0 or 1, as for a comparison. The
+/// values of constants and variables are not combined, so the function returns false for `0*x`, for example.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);

@@ -280,8 +280,8 @@ impl Expression {
         self.evaluate(position, time) != 0.0
     }
 
-    /// Test whether the operations of the expression show that the result is always 0 or 1, as for a
-    /// comparison. The result may be false for other expressions that always return 0 or 1, such as `0*x`.
+    /// Return true if the operations of the expression show that its value is always 0 or 1, as for a
+    /// comparison. For other expressions whose value is always 0 or 1, such as `0*x`, return false.
     pub fn is_condition(&self) -> bool {
         evaluate::is_truth(&self.code)
     }

@@ -159,9 +159,9 @@ pub struct Body {
     pub material: String,
     /// Name of the damage law.
     pub damage: Option<String>,
-    /// Horizon as written in the source deck.
+    /// Horizon, m.
     pub horizon: Value,
-    /// Key and value of the points: `points` or `shape.box`.
+    /// Key and value of the points; the key is `points`, or the shape such as `shape.box`.
     pub points: (String, Value),
 }
 

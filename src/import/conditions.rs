@@ -17,7 +17,7 @@ pub enum Quantity {
     BodyForce,
     /// Force on each point of the set, N.
     ForceOfPoint,
-    /// Temperature, from which this reference temperature is subtracted, if there is one.
+    /// Temperature; if there is a reference temperature, it is subtracted from the prescribed value.
     Temperature(Option<Value>),
 }
 
@@ -53,7 +53,8 @@ pub struct Given<'n> {
     pub steps: Vec<u64>,
 }
 
-/// Return the component of a condition: its node, its name and its index.
+/// Return the component of a condition: the node of the key `Coordinate`, the name x, y or z, and the index
+/// 0, 1 or 2.
 fn component<'n>(
     translation: &Translation,
     node: &'n Node,

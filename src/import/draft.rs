@@ -200,7 +200,7 @@ impl Draft {
         self.sections.iter().any(|section| section.is(header))
     }
 
-    /// Test whether a condition prescribes displacement or velocity.
+    /// Test whether any condition of the deck prescribes displacement or velocity.
     pub fn has_support(&self) -> bool {
         let prescribes = |section: &Section, key: &str| section.get(key).is_some();
         self.sections.iter().any(|section| {

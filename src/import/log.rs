@@ -33,7 +33,7 @@ impl fmt::Display for Fate {
 pub struct Entry {
     /// Line, from 1.
     pub line: usize,
-    /// Path of keys from the top of the deck, or the command.
+    /// Path of keys from the top of the deck, or the name of the command.
     pub key: String,
     /// Value of the key; empty for a table.
     pub value: String,
@@ -91,7 +91,7 @@ impl Losses {
             .iter()
             .filter(|entry| entry.fate == Fate::LeftOut && entry.note != UNUSED_DAMAGE);
         for entry in lost {
-            // The arguments of a LAMMPS fix are its name, group and style.
+            // The first three arguments of a LAMMPS fix are id, group and style.
             let style = entry.value.split_whitespace().nth(2).unwrap_or("");
             if entry.key == "fix" && LOADS_OF_SCRIPTS.contains(&style) {
                 losses.conditions.push(entry.line);

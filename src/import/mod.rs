@@ -86,7 +86,7 @@ impl Import {
 }
 
 /// Translate the deck at `path`. `target` is the path of the new deck; paths of files in the new deck are
-/// relative to its folder. Without `code`, the code is detected from the text.
+/// relative to the folder of the new deck. Without `code`, the code is detected from the text.
 ///
 /// # Errors
 /// If the file cannot be read, the code is unknown, or the deck lacks data that a run needs. The message

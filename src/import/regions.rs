@@ -108,7 +108,7 @@ pub fn region(
 }
 
 impl Region {
-    /// Return the corners of a bounding box.
+    /// Return the lower and the upper corner of a box that contains the region.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         match self {
             Self::Block(lower, upper) => [*lower, *upper],

@@ -108,7 +108,7 @@ impl<'a> Translation<'a> {
     /// Return a whole number.
     ///
     /// # Errors
-    /// If the value is not a whole number.
+    /// If the value is negative, not whole, or 10¹⁵ or more.
     pub fn count(&self, node: &Node, key: &str) -> Result<u64> {
         let number = self.number(node, key)?;
         let is_whole = (0.0..1e15).contains(&number) && number.fract() == 0.0;

@@ -369,7 +369,8 @@ impl File<'_> {
         self.mesh.elements.push(*kind, (number, line), nodes);
     }
 
-    /// Add the last element to its geometrical entity and to its physical groups. The tag 0 means none.
+    /// Add the last element to its geometrical entity and to its physical groups. The tag 0 means no entity
+    /// and no group.
     fn add_to_groups(&mut self, dimension: usize, entity: i64, physical: &[i64]) {
         let last = self.mesh.elements.len() as u64 - 1;
         if entity != 0 {
@@ -478,7 +479,7 @@ impl File<'_> {
         let entities = entities.into_iter().map(|group| (true, group));
         let physical = physical.into_iter().map(|group| (false, group));
         for (is_entity, (key, elements)) in entities.chain(physical) {
-            // The names of the file belong to physical groups.
+            // The names in the file are names of physical groups.
             let name = self.names.get(&key).filter(|_| !is_entity);
             self.mesh.groups.push(Group {
                 name: name.cloned(),
@@ -618,8 +619,8 @@ impl<'a> Cursor<'a> {
             .map_err(|_| self.fault(format!("must be a whole number, is {}", excerpt(word))))
     }
 
-    /// Read a number of entries of version 2. The number is text even in binary files; there, the rest of its
-    /// line is skipped too.
+    /// Read a number of entries of version 2. The number is text even in binary files. In binary files, the
+    /// rest of the line is skipped too.
     fn count_line(&mut self) -> Result<i64> {
         let count = self.text_number()?;
         if matches!(self.encoding, Encoding::Binary { .. }) {

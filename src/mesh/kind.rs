@@ -64,7 +64,7 @@ pub const KINDS: [Kind; 19] = [
 pub type Between = &'static [usize];
 
 impl Kind {
-    /// Create a type, which must be in [`KINDS`].
+    /// Create a type; only the types in [`KINDS`] are supported.
     pub const fn new(form: Form, nodes: usize) -> Self {
         Self { form, nodes }
     }

@@ -1,4 +1,4 @@
-//! Exact volume and centroid of an element, which becomes a point.
+//! Exact volume and centroid of an element; the element becomes a point with this volume at the centroid.
 //!
 //! The shape functions map the reference element to the element; J is the Jacobian matrix of this map. The
 //! volume ∫ det J and the first moments ∫ x det J over the reference element are integrals of polynomials.
@@ -111,8 +111,8 @@ fn gauss(points: usize) -> Vec<(f64, f64)> {
 /// Return the Gauss rule of a type, exact for volume and first moments; empty for a point.
 fn rule(kind: Kind) -> Vec<GaussPoint> {
     let second_order = kind.nodes > kind.corners();
-    // n points are exact up to the degree 2n − 1 in each coordinate. Collapsing the coordinates raises the
-    // degree by up to 2.
+    // A Gauss rule of n points is exact up to the degree 2n − 1 in each coordinate. Collapsing the
+    // coordinates raises the degree by up to 2.
     let points = match (kind.form, second_order) {
         (Form::Point, _) => return Vec::new(),
         (Form::Triangle | Form::Tetrahedron, false) => 1,
@@ -169,7 +169,7 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
         }
     }
     // det J of a quadrilateral is linear. If the edges cross one another, det J is negative along an edge,
-    // which the Gauss points can miss. The middles of the edges are therefore added with weight 0.
+    // but may be positive at all Gauss points. The middles of the edges are therefore added with weight 0.
     if kind == Kind::new(Form::Quadrilateral, 4) {
         for at in [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]] {
             add([at[0], at[1], 0.0], 0.0);
@@ -183,7 +183,7 @@ const SQUARE: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0
 
 /// Compute the shape functions of all nodes at a position in the reference element.
 ///
-/// - Lines, quadrilaterals and hexahedra: [−1, 1]^D.
+/// - Lines, quadrilaterals and hexahedra in D dimensions: [−1, 1]^D.
 /// - Triangles and tetrahedra: r, s, t ≥ 0, r + s + t ≤ 1.
 /// - Wedges: a triangle × [−1, 1].
 /// - Pyramids: collapsed coordinates u, v in [−1, 1] and w in [0, 1]. At the height w, a pyramid is the

@@ -1,7 +1,8 @@
 //! Meshes of finite elements in the formats of other programs. Elements become points.
 //!
-//! A reader allocates no memory for a count in a file before it has found, or at least checked the size of,
-//! the counted data. A damaged file therefore needs no more memory than a valid file of the same size.
+//! A reader compares a count in a file with the number of bytes before it allocates memory for the counted
+//! entries, or reads the entries one by one. A damaged file therefore needs no more memory than a valid file
+//! of the same size.
 
 mod abaqus;
 mod exodus;
@@ -254,8 +255,8 @@ impl Mesh {
     ///
     /// A key is a name or a number. The kind of the group may come before the name or number, such as in
     /// `side set 1`. A number without a kind means a geometrical entity only if no other group has this
-    /// number. If the key means several groups of one kind, the first of these groups is returned; if it
-    /// means none, `None`.
+    /// number. If the key means several groups of one kind, return the first of these groups. If the key
+    /// means no group, return `None`.
     ///
     /// # Errors
     /// If the key means groups of different kinds; the message lists these groups.

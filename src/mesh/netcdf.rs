@@ -192,7 +192,7 @@ fn size_of_kind(kind: u32) -> Fault<usize> {
     }
 }
 
-/// Position in the header.
+/// The bytes after the part of the header that has been read.
 struct Cursor<'a> {
     rest: &'a [u8],
     version: u8,

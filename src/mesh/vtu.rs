@@ -229,7 +229,7 @@ impl File<'_> {
                 Some(order) => order.iter().map(|k| index(*k)).collect(),
                 None => (0..nodes.len()).map(index).collect(),
             };
-            // The manual of VTK and its programs disagree on which triangle of a wedge comes first. Swap the
+            // The manual and the programs of VTK disagree on which triangle of a wedge comes first. Swap the
             // triangles if the volume is negative.
             if kind == Kind::new(Form::Wedge, 6) {
                 let places: Vec<[f64; 3]> = indices
@@ -287,7 +287,7 @@ impl File<'_> {
             different.insert(*value);
             if different.len() > MOST_GROUPS {
                 // Add an empty group for each of these values. `read` then removes all groups of this array,
-                // because they are more than the limit.
+                // because their number exceeds the limit.
                 for value in different {
                     groups
                         .entry((of_nodes, name.to_owned(), value))

@@ -111,7 +111,8 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     run.write(translation, &model)
 }
 
-/// Return the node ids of fixes that are defined before the first run but inactive in it, with the reason.
+/// Return the node ids of fixes that are defined before the first run but inactive during this run, with the
+/// reason.
 fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
     let mut acting: HashMap<&str, usize> = HashMap::new();
     let mut without = HashMap::new();

@@ -9,7 +9,7 @@ use super::super::{Elements, Group, Members, Mesh, Runs, fault, position};
 use super::{Place, Reader};
 use crate::error::{Result, excerpt};
 
-/// Largest number of nodes, and of elements, of all instances.
+/// Largest total number of nodes, and of elements, of the model and all instances.
 const LARGEST: usize = u32::MAX as usize;
 
 /// Nodes, elements and sets of the model, of a part or of an instance.
@@ -48,7 +48,7 @@ pub(super) struct Set {
     pub(super) place: Place,
 }
 
-/// An instance that has been appended to the mesh.
+/// An instance, or the model, that has been appended to the mesh.
 pub(super) struct Placed {
     name: String,
     node_indices: FxHashMap<u64, u32>,
@@ -299,8 +299,8 @@ impl Reader {
         Ok(self.mesh)
     }
 
-    /// Add a group for each name of sets of the instances, with the members of all sets with this name. If
-    /// the assembly has a set with this name, no group is added.
+    /// For each set name that occurs in instances, add a group with the members of all sets of instances with
+    /// this name. If the assembly has a set with this name, no group is added.
     fn add_bare_names(&mut self) {
         let prefixes: FxHashSet<String> = self
             .placed

@@ -131,8 +131,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Read an included file at the position of its `*INCLUDE` line, or of the keyword line with its
-    /// `INPUT` parameter.
+    /// Read an included file at the position of the `*INCLUDE` line, or of another keyword line, whose
+    /// `INPUT` parameter names the file.
     fn include(&mut self, from: &Path, input: &str, depth: usize) -> Result<()> {
         self.included += 1;
         if depth == DEEPEST || self.included > MOST_INCLUDED {
