@@ -107,8 +107,9 @@ pub fn damage(
                 translation.log.left_out(&model.node, note);
                 return Ok(None);
             };
-            // State-based form of the relation of Silling & Askari (2005): G0 = s0² δ (3 G + (3/4)⁴ (k − 5
-            // G/3)). For k = 5 G/3, this is the relation 9 k δ s0²/5 of bond-based solids.
+            // State-based form of the relation of Silling & Askari (2005):
+            // G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)). For k = 5 G/3, this is the relation 9 k δ s0²/5 of
+            // bond-based solids.
             let energy = stretch
                 * stretch
                 * horizon

@@ -37,9 +37,9 @@ pub struct Body {
     pub horizon: Option<Number>,
 }
 
-/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are `x
-/// [y [z]] volume block`, separated by commas, semicolons or white space, unless `columns` or a header names
-/// other columns.
+/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are
+/// `x [y [z]] volume block`, separated by commas, semicolons or white space, unless `columns` or a header
+/// names other columns.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {

@@ -46,7 +46,8 @@ pub struct Contact {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactPair {
-    /// Names of the two bodies, in any order; the same name twice for contact of a body with itself.
+    /// Names of the two bodies; the same name twice for contact of a body with itself. The order matters only
+    /// for the sign of the contact force in the history.
     pub bodies: Spanned<Vec<Text>>,
     /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -189,8 +189,8 @@ pub struct History {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if
-    /// nothing is given.
+    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if the
+    /// section gives none of its keys.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Text>,
     /// Steps between checkpoints.
