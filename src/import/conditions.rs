@@ -35,7 +35,8 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act.
+    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act; no
+    /// numbers mean all steps.
     pub written: Vec<(String, Vec<u64>)>,
     /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,

@@ -101,7 +101,7 @@ impl Kind {
         }
     }
 
-    /// Return for each node after the corners the corners between which it lies.
+    /// Return, for each node after the corners, the corners between which this node lies.
     pub fn between(self) -> &'static [Between] {
         let all: &[Between] = match self.form {
             Point => &[],

@@ -14,8 +14,9 @@ use crate::deck::spanned::Spanned;
 pub struct Body {
     /// Name of the material.
     pub material: Text,
-    /// Name of the damage law. Without a damage law, bonds never break. Exceptions are bonds of
-    /// `softening_pmb` and `fatigue_pmb`, and pairs of bodies with their own damage law.
+    /// Name of the damage law. Without a damage law, bonds within the body never break, except bonds of
+    /// `softening_pmb` and `fatigue_pmb`. Bonds to another body can break by the damage law of that body or
+    /// of the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
@@ -53,7 +54,8 @@ pub struct Points {
     /// elements that belong to no other body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
-    /// Names of the columns of a file without a header: coordinates, `volume`, `block`, and any other names.
+    /// Names of the columns of the file, which take precedence over a header of the file: coordinates,
+    /// `volume`, `block`, and any other names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<Spanned<Vec<String>>>,
     /// Metres per unit of length of the mesh; 1 if not given.

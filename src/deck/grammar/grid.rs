@@ -14,7 +14,8 @@ pub struct Grid {
     /// Edge of a lattice cell in m, or a list with one edge for each dimension; for bodies given as shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
-    /// Horizon δ in m: points up to this distance are bonded. In an expression such as `"3.015 * spacing"`,
+    /// Horizon δ in m: points up to this distance are bonded; with the volume corrections `"exact"` and
+    /// `"linear"`, also points that are slightly farther apart. In an expression such as `"3.015 * spacing"`,
     /// `spacing` is the mean spacing of the points of a body; the expression is evaluated for each body
     /// without its own horizon.
     pub horizon: Number,
@@ -114,9 +115,9 @@ pub struct Pair {
     /// As in `[interface]`; the rule of `[interface]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With
-    /// `"none"` these bonds never break. If neither `damage` nor `strength` is given, the bonds
-    /// break at the smaller threshold of the two bodies.
+    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
+    /// these bonds never break. If neither `damage` nor `strength` is given, the bonds break by the damage
+    /// laws of the two bodies; if the horizons are equal, at the smaller of the two thresholds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical

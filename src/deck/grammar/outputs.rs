@@ -152,8 +152,8 @@ pub struct History {
     /// Forces of supports along a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether the number of fragments and the mass of the fragment with the most points are recorded; false
-    /// if not given.
+    /// Whether the number of fragments is recorded, with mass and momentum of the fragment with the most
+    /// points; false if not given.
     #[serde(default)]
     pub fragments: bool,
     /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not

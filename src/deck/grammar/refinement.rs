@@ -12,7 +12,7 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
-    /// The finest level; its spacing is the spacing of the grid divided by 2^levels.
+    /// The finest level; its spacing is the spacing of level 0 divided by 2^levels.
     pub levels: Spanned<u64>,
     /// How the horizon depends on the spacing: with `"delta"`, m = δ/dx is constant; with `"delta-m"`, m
     /// rises with the level.
@@ -58,8 +58,9 @@ pub struct Trigger {
     /// A condition on the reference position and t that every trigger must fulfil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time in s after which points become coarser if no trigger and no point with broken bonds is nearby.
-    /// Each evaluation coarsens by one level. If not given, points never become coarser.
+    /// Time in s after which points become coarser if, during this time, they were not within the horizon of
+    /// a trigger or of a point with broken bonds. Each evaluation coarsens by one level. If not given, points
+    /// never become coarser.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }

@@ -38,13 +38,13 @@ pub struct Rigid {
     /// not given. The layer is half a horizon thick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// As in `[contact]`.
+    /// Coefficient of friction, as in `[contact]`; 0 if not given, even if `[contact]` has a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
-    /// As in `[contact]`.
+    /// Coefficient of static friction, as in `[contact]`; `friction` of this body if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// As in `[contact]`.
+    /// Coefficient of restitution, as in `[contact]`; 1 if not given, even if `[contact]` has a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
 }
