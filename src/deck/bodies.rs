@@ -15,7 +15,7 @@ use crate::points::{BodyPoints, Columns};
 use crate::problem;
 
 /// Largest number of bodies. Tables such as the longest bonds of the bond search have an entry for each pair
-/// of bodies, so they grow with the square of the number of bodies.
+/// of bodies, so these tables grow with the square of the number of bodies.
 const MOST_BODIES: usize = 256;
 
 /// Validate the bodies.

@@ -27,8 +27,8 @@ pub struct Sets<'n> {
 }
 
 impl<'n> Sets<'n> {
-    /// Create an empty collection. `mesh_prefix` is the kind of the mesh's groups that are node sets, written
-    /// before their names; `None` without a mesh.
+    /// Create an empty collection. `mesh_prefix` is the text that the new deck needs before the names of node
+    /// sets of the mesh; `None` without a mesh.
     pub fn new(mesh_prefix: Option<&'static str>) -> Self {
         Self {
             defined: Vec::new(),
