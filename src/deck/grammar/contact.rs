@@ -23,8 +23,8 @@ pub struct Contact {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// Distance in m of two points at which contact begins. The default is the mean edge of the cells of the
-    /// two points, or 1.35 times this edge with `"short-range"`. For points that start closer, contact begins
-    /// at their initial distance, or at 0.9 times their initial distance with `"short-range"`.
+    /// two points, or 1.35 times this edge with `"short-range"`. Even if `radius` is larger, contact of two
+    /// points begins at most at their initial distance, or at 0.9 times this distance with `"short-range"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
