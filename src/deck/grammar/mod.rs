@@ -120,7 +120,7 @@ pub struct Deck {
     pub balance: Option<Spanned<Balance>>,
 }
 
-/// Dimension of the problem; in the plane, also its stress state.
+/// Dimension of the problem; for plane problems, also whether the stress or the strain across the plane is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum DimensionName {
     /// A bar.
