@@ -30,7 +30,8 @@ const TIME: [&str; 2] = ["t", "time"];
 /// Read the tables, and store them in the scope.
 ///
 /// # Errors
-/// On a name that no expression can use, and on an invalid table.
+/// On a name that no expression can use or that is already the name of a parameter or function, and on an
+/// invalid table.
 pub fn read(scope: &mut Scope, deck: &Deck) -> Result<()> {
     for (name, spanned) in &deck.table {
         let key = format!("[table.{name}]");
