@@ -173,8 +173,8 @@ impl Deck {
         Ok(found.as_ref().unwrap_or(&self.grammar))
     }
 
-    /// Return the deck as TOML with every default written out. Tables contain their rows in place of the path
-    /// of a file. Horizons that contain the mean spacing of points are numbers.
+    /// Return the deck as TOML with every default written out. The paths of files of tables are replaced by
+    /// the rows of the tables. Horizons that contain the mean spacing of points are replaced by their values.
     ///
     /// # Errors
     /// If the deck is invalid, as in [`Self::problem`], or cannot be serialized.
