@@ -108,7 +108,8 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Log the node sets that are unused.
+    /// Log the declared node sets that nothing uses. Unused entries that are not declared as node sets stay
+    /// without a note.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
             if set.written.is_none() && set.is_declared {
