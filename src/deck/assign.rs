@@ -14,8 +14,8 @@ const TOP_KEYS: [&str; 5] = [
     "constraint",
 ];
 
-/// Return whether a name is a key: a path with dots, or a key outside of all sections. A parameter with the
-/// same name takes precedence over a key outside of all sections.
+/// Return whether `name` is a key of the deck: a path with dots, or a key outside of all sections. If the
+/// deck has a parameter with the name of a key outside of all sections, return false.
 pub fn is_key(source: &Source, name: &str) -> bool {
     let is_parameter = || {
         let deck = source.text.parse::<DocumentMut>().ok()?;
@@ -24,13 +24,15 @@ pub fn is_key(source: &Source, name: &str) -> bool {
     name.contains('.') || (TOP_KEYS.contains(&name) && is_parameter().is_none())
 }
 
-/// Return the text of a deck with these values assigned to keys; missing keys are added.
+/// Assign values to keys of a deck, and return the new text of the deck. `assignments` has pairs of a key and
+/// the text of its value. Missing keys are added.
 ///
-/// A text that is a TOML value keeps its type. Any other text, such as a bare word or an
-/// expression, becomes a string. If the deck is not valid TOML, its text is returned unchanged.
+/// If the text of a value is a TOML value, the value keeps its type. Any other text, such as a bare word or
+/// an expression, becomes a string. If the deck is not valid TOML, its text is returned unchanged.
 ///
 /// # Errors
-/// If a key has an empty part, passes through a list or a value, or names a section.
+/// If a key has an empty part or is the name of a section, or if a part before the last one is a list or a
+/// value.
 pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
     let mut document: DocumentMut = match source.text.parse() {
         Ok(document) => document,

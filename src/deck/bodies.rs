@@ -14,8 +14,8 @@ use crate::message::format_number;
 use crate::points::{BodyPoints, Columns};
 use crate::problem;
 
-/// Largest number of bodies. Each step searches one bond list per pair of bodies, so the cost grows with the
-/// square of the number of bodies.
+/// Largest number of bodies. Tables such as the longest bonds of the bond search have an entry for each pair
+/// of bodies, so these tables grow with the square of the number of bodies.
 const MOST_BODIES: usize = 256;
 
 /// Validate the bodies.
@@ -23,7 +23,8 @@ const MOST_BODIES: usize = 256;
 /// # Errors
 /// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
 /// the material does not support, an invalid number or shape, or a body without exactly one source of points.
-/// If two bodies request the same rows or elements of a file, or name different columns of the same file.
+/// On a missing spacing, and on a key that does not belong to the source of points. If two bodies request the
+/// same rows or elements of a file, or name different columns of the same file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -89,11 +90,11 @@ pub fn bodies(
     })
 }
 
-/// Validate the sources of the bodies' points without the other keys of the bodies. `spacing` is that of the
-/// grid.
+/// Validate the sources of the bodies' points without the other keys of the bodies. `spacing` has the edges
+/// of a lattice cell in `[grid]`, m.
 ///
 /// # Errors
-/// As [`bodies`] does for the sources of points, except that spacings are not compared with the horizon.
+/// As [`bodies`] for the sources of points, except that spacings are not compared with the horizon.
 pub fn point_sources(
     scope: &Scope,
     deck: &Deck,
@@ -119,7 +120,7 @@ pub fn of_sources<'a>(deck: &'a Deck, sources: &'a [problem::PointSource]) -> Ve
     own.collect()
 }
 
-/// Return an error if there is no body, or too many.
+/// Return an error if the deck has no body, or more than `MOST_BODIES`.
 fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     if deck.body.len() > MOST_BODIES {
         let message = format!(
@@ -177,9 +178,9 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
 /// Tolerance for a whole number of cells, as a fraction of a cell's edge.
 const WHOLE: f64 = 1e-6;
 
-/// Return the grid origin along an axis, m, from which cells of this edge (m) fill a shape exactly. The
-/// origin is 0 if cells from 0 fill the shape, otherwise the lower face of the shape. `None` for a shape that
-/// is not a whole number of cells long between two flat faces.
+/// Return the grid origin along an axis, m, from which cells with the edge `edge` (m) fill a shape exactly.
+/// The origin is 0 if cells from 0 fill the shape, otherwise the lower face of the shape. `None` for a shape
+/// that is not a whole number of cells long between two flat faces.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {
@@ -190,8 +191,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 }
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
-/// faces normal to this axis. For the base of a prism or a polygon, return the smallest and largest
-/// coordinate of its corners. For a difference, return the faces of its first shape.
+/// faces normal to this axis. The sides of a prism or polygon are bounded by the smallest and the largest
+/// coordinate of the corners. A union has the lowest and the highest of the faces of its parts. A difference
+/// has the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
@@ -254,7 +256,7 @@ fn rows_are_taken_once(scope: &Scope, bodies: &[BodyPoints]) -> Result<()> {
     columns_agree(scope, bodies)
 }
 
-/// Return an error if two bodies name different columns of the same point file.
+/// Return an error if two bodies with the same point file have different `columns`.
 fn columns_agree(scope: &Scope, bodies: &[BodyPoints]) -> Result<()> {
     let file = |body: &BodyPoints| match body.points {
         problem::PointSource::File {
@@ -283,7 +285,8 @@ fn columns_agree(scope: &Scope, bodies: &[BodyPoints]) -> Result<()> {
     Ok(())
 }
 
-/// Validate the source of a body's points. `grid_spacing` and the horizon of the body are in m.
+/// Validate the source of a body's points. `grid_spacing` (the cell edges of `[grid]`) and `horizon` are in
+/// m.
 fn point_source(
     scope: &Scope,
     deck: &Deck,
@@ -313,7 +316,8 @@ fn point_source(
             let edges = &spacing[..scope.dimension];
             let longest = edges.iter().copied().fold(0.0, f64::max);
             if let (Some(number), true) = (&body.horizon, longest > horizon) {
-                // A horizon of the grid that contains the mean spacing has been copied to the bodies.
+                // If the horizon of the grid contains the mean spacing, `horizon::resolve` has given its
+                // value to the body, with the byte range of the key in `[grid]`.
                 let key = if number.span() == grid.horizon.span() {
                     "[grid]"
                 } else {

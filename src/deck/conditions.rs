@@ -70,7 +70,7 @@ pub fn initials(
         .collect()
 }
 
-/// Read the header of an initial file to find its columns. The path of the file is relative to the
+/// Read the header of a file of initial values to find the columns. The path in the deck is relative to the
 /// folder of the deck.
 fn initial_file(
     scope: &Scope,
@@ -97,9 +97,9 @@ fn initial_file(
 /// Validate the loads, supports and temperatures.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth`
-/// or `normal` that is missing or has no effect. Whether the points of a set by position need a
-/// `depth` is only known once there are points.
+/// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth` or
+/// `normal` that is missing or has no effect. If only some of the bodies that may have points in the set need
+/// a `depth`, a missing `depth` is not reported here. The solver then checks the points of the set.
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,
@@ -179,7 +179,8 @@ fn on_a_layer(condition: &grammar::Condition) -> bool {
     condition.traction.is_some() || condition.pressure.is_some()
 }
 
-/// Return the thickness of the layer on which a condition acts; `None` if it acts on no layer.
+/// Return the thickness of the layer on which a condition acts; `None` for a condition without a layer. A
+/// `depth` of such a condition is an error.
 fn depth(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Option<Depth>> {
     match &condition.depth {
         Some(depth) if on_a_layer(condition) => {

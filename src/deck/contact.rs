@@ -11,7 +11,7 @@ use crate::problem::{self, ContactModel, ContactRule};
 /// Smallest coefficient of restitution. The damping of smaller coefficients requires very short time steps.
 const LEAST_RESTITUTION: f64 = 0.01;
 
-/// Keys of a contact rule, common to `[contact]`, its pairs and rigid bodies.
+/// Keys of the contact rule of `[contact]`, of a pair of bodies or of a rigid body.
 #[derive(Clone, Copy)]
 pub(super) struct Keys<'a> {
     pub model: ContactName,
@@ -22,11 +22,12 @@ pub(super) struct Keys<'a> {
     pub restitution: Option<&'a Number>,
 }
 
-/// Validate contact. Return `None` for a deck without `[contact]`.
+/// Validate `[contact]`. Return `None` for a deck without this section.
 ///
 /// # Errors
-/// On numbers out of range, on invalid or repeated pairs, and on methods or grids that do not support
-/// contact. On a pair that inherits the stiffness of `[contact]` but has another model, except `"none"`.
+/// On numbers out of range, and on invalid or repeated pairs. On friction in a relaxation, and on methods or
+/// grids that do not support contact or rigid bodies. On a pair that inherits the stiffness of `[contact]`
+/// but has another model than `[contact]`, except `"none"`.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
@@ -125,8 +126,8 @@ pub(super) fn relaxes(deck: &Deck) -> bool {
     all.any(|(_, method)| *method.get_ref() == grammar::Method::Relaxation)
 }
 
-/// Validate a contact rule; `relaxes` is true if any stage of the run is a relaxation. The model `"none"`
-/// gives `None`.
+/// Validate a contact rule; `relaxes` is true if any stage of the run is a relaxation. Return `None` for the
+/// model `"none"`.
 pub(super) fn rule(
     scope: &Scope,
     section: &str,

@@ -14,14 +14,14 @@ use crate::expression::{Expression, POSITION_AND_TIME};
 /// Keys that a restart may change although their section is fixed.
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
-/// Keys of the history that set the interval of rows.
+/// Keys of `[history]` that set the interval of rows.
 const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
 
-/// Return the differences in the physics of two decks: one line per key, with its old and new
-/// value. Keys that only one deck has are compared with the default of the other deck.
+/// Return the differences in the physics of two decks: one line per key, with its old and new value. A key
+/// that only one deck has is compared with its default.
 ///
 /// # Errors
-/// If a deck cannot be parsed.
+/// If a deck does not follow the grammar, or its parameters or tables are invalid.
 pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
     compared(old, new, |comparison, old, new| {
         comparison.compare("", Some(old), Some(new))
@@ -32,7 +32,7 @@ pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
 /// rows is ignored.
 ///
 /// # Errors
-/// If a deck cannot be parsed.
+/// If a deck does not follow the grammar, or its parameters or tables are invalid.
 pub fn history_differences(old: &Source, new: &Source) -> Result<Vec<String>> {
     compared(old, new, |comparison, old, new| {
         let keys = |deck: &Value| {
@@ -70,7 +70,7 @@ fn compared(
     let (mut old, mut new) = (table(&old.text)?, table(&new.text)?);
     // A deck from a checkpoint of an earlier version lacks keys that were added later. These keys get their
     // defaults. If defaults cannot be filled in, for example because a file is missing, the deck is compared
-    // without them.
+    // without defaults.
     if let Ok(explained) = decks.0.explain() {
         complete(&mut old, &table(&explained)?, &new);
     }
@@ -90,8 +90,8 @@ fn complete(deck: &mut Value, explained: &Value, other: &Value) {
             for (key, other) in other {
                 match (deck.get_mut(key), explained.get(key)) {
                     (Some(own), Some(explained)) => complete(own, explained, other),
-                    // A missing table and an empty table are equivalent, so an empty table is only added
-                    // beside an empty table.
+                    // A missing table and an empty table are equivalent, so an empty table is only added if
+                    // the table of the other deck is empty too.
                     (None, Some(explained)) if !is_empty(explained) || is_empty(other) => {
                         deck.insert(key.clone(), explained.clone());
                     }
@@ -161,8 +161,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Return a value as an expression of position and time, with the parameters of its deck
-    /// inserted; `None` if the value is not an expression.
+    /// Return a value as an expression of position and time, with the parameters of its deck inserted; `None`
+    /// if the value is not an expression. `deck` is 0 for the old deck and 1 for the new deck.
     fn expression(&self, deck: usize, value: Option<&Value>) -> Option<Expression> {
         let written = match value? {
             Value::Integer(value) => Written::Value(*value as f64),
@@ -184,7 +184,8 @@ fn counts_where_used(key: &str) -> bool {
     section.is_some_and(|section| section.restart == Restart::WhereUsed)
 }
 
-/// Format a value for messages: the text of the deck, and the number of a constant expression.
+/// Format a value for messages: the text in the deck, followed by the number if the text is a constant
+/// expression.
 fn shown(value: Option<&Value>, expression: Option<&Expression>) -> String {
     let Some(value) = value else {
         return "not there".to_owned();

@@ -162,7 +162,8 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     }
 }
 
-/// Return the grid origin of all lattice bodies, m; `None` if their origins differ.
+/// Return the grid origin of all lattice bodies, m; `None` if their origins differ, and 0 without lattice
+/// bodies.
 ///
 /// Without `origin`, the origin is chosen for each spacing, so bodies of different spacings may have
 /// different origins. The single key `origin` cannot express different origins.
@@ -208,8 +209,9 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the depth of a traction or pressure, if it is the same for all bodies that may have points
-/// in the set. Otherwise, each body has the depth of its spacing, which no number expresses.
+/// Return the depth of a traction or pressure, m; `None` if the depth differs between the bodies that may
+/// have points in the set. The depth in each body is then the spacing of this body, and a single number
+/// cannot express these depths. Also return `None` for a condition without a depth.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

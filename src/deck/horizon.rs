@@ -14,12 +14,13 @@ use crate::points::mean_spacing::mean_spacings;
 /// Name of the mean spacing in the expression of a horizon.
 const SPACING: &str = "spacing";
 
-/// Replace the horizons that contain the mean spacing by their values: `horizon` of a body by that of its
-/// points, and `horizon` of the grid by one value for each body without its own horizon. The grid gets the
-/// largest of these values. Meshes and point files are read if these horizons depend on them.
+/// Evaluate the horizons that contain the mean spacing. The `horizon` of a body is evaluated with the mean
+/// spacing of the body's points. The `horizon` of the grid is evaluated for each body without its own
+/// horizon. These bodies get their values, and the grid gets the largest of these values. Meshes and point
+/// files are read if horizons depend on their points.
 ///
-/// Return the deck with numbers in place of these expressions; `None` if there are none. A parameter or table
-/// with the name `spacing` replaces the mean spacing. Collective.
+/// Return a copy of the deck with these values; `None` if no horizon contains the mean spacing. If a
+/// parameter or table has the name `spacing`, this name does not mean the mean spacing. Collective.
 ///
 /// # Errors
 /// If the horizon of the grid contains the mean spacing, although all bodies have their own horizon. On an

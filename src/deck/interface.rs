@@ -21,8 +21,9 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
 /// # Errors
-/// On bodies whose laws cannot share a bond, and on an invalid or repeated pair. Also on a rule or damage law
-/// that the material laws of a pair do not allow.
+/// On bonded bodies whose laws exert forces of different directions, and on an invalid or repeated pair. Also
+/// on a rule or strength that the material laws of a pair do not allow. The solver checks whether the laws
+/// allow the damage law of a pair.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -103,8 +104,8 @@ struct Damages<'a> {
 }
 
 impl Damages<'_> {
-    /// Return the damage of the bonds, and the byte range of this setting; the byte range is `0..0` if the
-    /// pair gives neither `damage` nor `strength`.
+    /// Return the damage of the bonds, and the byte range of the value of `damage` or `strength`; the byte
+    /// range is `0..0` if the pair gives neither.
     fn damage(
         &self,
         table: &grammar::Pair,
@@ -148,8 +149,8 @@ impl Damages<'_> {
         Ok((InterfaceDamage::Own(damages[index].clone()), span))
     }
 
-    /// Return the damage law whose critical stretch follows from a strength. Return an error if the law of
-    /// a body cannot have this criterion, or if the stiffnesses of the bodies differ too much.
+    /// Return the damage law whose critical stretch follows from a strength. Return an error if the material
+    /// law of a body does not allow this criterion, or if the stiffnesses of the bodies differ too much.
     fn of_strength(&self, strength: &Number) -> Result<problem::Damage> {
         let key = format!("{} strength", self.key);
         let stress = self.scope.positive(strength, &key)?;
@@ -252,8 +253,9 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     Err(scope.error(other.span.clone(), message))
 }
 
-/// Return an error if the rule needs one micromodulus for both ends of a bond (any rule but `own`), unless
-/// both bodies have the same bond-based law without a function of the bond length.
+/// Check that the bodies allow a rule that needs one micromodulus for both ends of a bond (any rule but
+/// `own`). Return an error unless both bodies have the same bond-based law, without a function of the bond
+/// length.
 fn one_micromodulus(
     scope: &Scope,
     key: &str,

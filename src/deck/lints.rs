@@ -132,7 +132,8 @@ fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
     Ok(unused.map(warning).collect())
 }
 
-/// Collect the names in all strings of a value, each parsed as an expression.
+/// Add to `names` the names in all strings of a value. Each string is parsed as an expression; strings that
+/// are not expressions are skipped.
 fn names_in(value: &Value, names: &mut IndexSet<String>) {
     match value {
         Value::String(text) => names.extend(Expression::names(text).unwrap_or_default()),

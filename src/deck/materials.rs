@@ -154,8 +154,9 @@ impl Section<'_> {
         Ok(value)
     }
 
-    /// Return the elastic constants. A bond-based law fixes Poisson's ratio, except for a bar under uniaxial
-    /// stress. Some laws compute the elastic constants from their own keys.
+    /// Return the elastic constants of the material. A bond-based law fixes Poisson's ratio, except for a bar
+    /// under uniaxial stress. Some laws compute the elastic constants from the keys that only these laws
+    /// have.
     fn elastic(&self, law: &problem::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
         if let Some(own) = own {
@@ -232,7 +233,7 @@ impl Section<'_> {
         })
     }
 
-    /// Return the given elastic constants in the order of the deck.
+    /// Return key and kind of the given elastic constants, in the order of the deck.
     fn elastic_constants(&self) -> Vec<(&'static str, Constant)> {
         let mut given: Vec<_> = ELASTIC_CONSTANTS
             .into_iter()

@@ -1,4 +1,4 @@
-//! Decks: the TOML file that describes a run, from its text to a validated [`Problem`].
+//! Decks, the TOML files that describe runs: from the text of a deck to a validated [`Problem`].
 
 mod assign;
 mod bodies;
@@ -52,17 +52,20 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Deck {
     source: Source,
     grammar: grammar::Deck,
-    /// The grammar with numbers in place of horizons that contain the mean spacing; `None` inside without such
-    /// horizons. Determined once, because meshes and point files may have to be read.
+    /// The grammar with numbers in place of horizons that contain the mean spacing. The value is `None` if
+    /// the deck has no such horizons. It is determined once, because meshes and point files may have to be
+    /// read.
     with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
-/// Read a deck. `set` has pairs of a name and a value or expression; the name is a parameter, or a key with
-/// its section, such as `time.safety`.
+/// Read a deck. `set` has pairs of a name and a value or expression. The name is that of a parameter, or a
+/// key with its section, such as `time.safety`. Keys outside of all sections, such as `thickness`, have no
+/// section.
 ///
 /// # Errors
-/// If the file cannot be read, or its text does not follow the grammar. The message has file, line, column,
-/// key and the allowed values.
+/// If the file cannot be read, its text does not follow the grammar, or an entry of `set` has an unknown name
+/// or an invalid value. The message has file, line, column, key and the allowed values; about an entry of
+/// `set`, it has the name and the value.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
     read_with(path, &[], set)
 }
@@ -128,7 +131,7 @@ impl Deck {
 
     /// Validate the deck in a single process, and return its problem with the warnings about the deck.
     ///
-    /// If a horizon contains the mean spacing of points, this process reads all of their files;
+    /// If a horizon contains the mean spacing of points, this process reads all files of these points;
     /// [`Self::problem_on`] shares this work between ranks.
     ///
     /// # Errors
@@ -149,7 +152,8 @@ impl Deck {
 
     fn problem_in(&self, scope: &Scope, grammar: &grammar::Deck) -> Result<Problem> {
         let mut problem = validate::validate(scope, grammar)?;
-        // Parameters in horizons count as used.
+        // The warnings are about the deck as written: a parameter that occurs only in a horizon is used,
+        // although `grammar` may have a number in its place.
         problem.warnings = lints::lints(scope, &self.grammar, &problem)?;
         Ok(problem)
     }
@@ -157,7 +161,7 @@ impl Deck {
     /// Return the grammar with numbers in place of horizons that contain the mean spacing. Collective.
     fn with_horizons(&self, scope: &mut Scope, comm: &dyn Communicator) -> Result<&grammar::Deck> {
         let known = self.with_horizons.get();
-        // Ranks may be threads that share this deck, so some may find the result of others.
+        // Ranks may be threads that share this deck, so some ranks may find the result of other ranks here.
         let known_on = total(comm, u64::from(known.is_some()));
         let found = match known {
             Some(found) if known_on == comm.size() as u64 => found,
@@ -169,8 +173,8 @@ impl Deck {
         Ok(found.as_ref().unwrap_or(&self.grammar))
     }
 
-    /// Return the deck as TOML with every default written out. Rows of tables replace the paths of their
-    /// files, and numbers replace horizons that contain the mean spacing of points.
+    /// Return the deck as TOML with every default written out. The paths of files of tables are replaced by
+    /// the rows of the tables. Horizons that contain the mean spacing of points are replaced by their values.
     ///
     /// # Errors
     /// If the deck is invalid, as in [`Self::problem`], or cannot be serialized.

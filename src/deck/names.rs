@@ -1,4 +1,4 @@
-//! Check of the names of tables. These names appear in column names and messages.
+//! Check of the names of sections such as `[body.NAME]`. These names appear in column names and messages.
 
 use super::grammar::{Deck, NamedTable};
 use super::resolve::Scope;
@@ -8,7 +8,7 @@ use crate::error::{Result, excerpt};
 /// Largest number of characters of a name.
 const LONGEST: usize = 64;
 
-/// Check the title and the names of all tables.
+/// Check the title and the names of all sections such as `[body.NAME]`.
 ///
 /// # Errors
 /// On a title with control characters. On the first name that is empty, has more than 64 characters, or

@@ -21,7 +21,7 @@ struct Piece {
     file: usize,
     /// Byte range in this file.
     place: Range<usize>,
-    /// Both byte ranges have equal content.
+    /// Whether both byte ranges have equal content.
     is_equal: bool,
 }
 
@@ -44,9 +44,9 @@ impl Origins {
         Self { files, pieces }
     }
 
-    /// Return the path, text and byte range in the file that a range of the merged text comes from. `length`
-    /// is the length of the merged text, bytes. `None` for a value that is in no file, such as a value of
-    /// `--set`.
+    /// Return the source of the range `span` of the merged text: the path and the text of a file, and a byte
+    /// range in this file. `length` is the length of the merged text, bytes. Return `None` for a range that
+    /// comes from no file, such as a value of `--set`.
     pub fn find(
         &self,
         span: &Range<usize>,

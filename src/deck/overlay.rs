@@ -11,7 +11,7 @@ use crate::error::Result;
 /// choice in an overlay, for example another law of a material, replaces the choice of the deck.
 ///
 /// # Errors
-/// If the deck or an overlay is not TOML.
+/// If there are overlays, and the deck or an overlay is not TOML.
 pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
     if overlays.is_empty() {
         return Ok(deck.text.clone());
@@ -28,7 +28,7 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
     Ok(merged.to_string())
 }
 
-/// Parse a text, and keep its comments and blanks.
+/// Parse a text to a document that keeps comments and blanks.
 fn document(source: &Source) -> Result<DocumentMut> {
     // Errors of this parser have the same text as for decks without overlays.
     if let Err(error) = source.text.parse::<toml::Table>() {
@@ -38,7 +38,8 @@ fn document(source: &Source) -> Result<DocumentMut> {
     parsed.map_err(|error| source.error(error.span().unwrap_or(0..0), error.message()))
 }
 
-/// Merge `upper` into `lower`, the table at `path`; keys of `upper` override keys of `lower`.
+/// Merge `upper` into `lower`, the table at `path`; keys of `upper` override keys of `lower`. `is_inline` is
+/// true if `lower` is an inline table.
 fn merge_tables<'k>(
     lower: &mut dyn TableLike,
     upper: &'k dyn TableLike,
@@ -71,8 +72,8 @@ fn merge_tables<'k>(
     }
 }
 
-/// Return whether the only key of a table names a choice: the law of a material, the kind of a damage law or
-/// crack, or a shape.
+/// Return whether the only key of the table at `path` names a choice: the law of a material, the kind of a
+/// damage law or crack, or a shape.
 fn is_choice(path: &[&str]) -> bool {
     matches!(
         path,

@@ -21,7 +21,7 @@ const RISE: f64 = 1.0;
 /// Validate the refinement. Return `None` for a deck without `[refinement]`.
 ///
 /// # Errors
-/// On bodies that cannot be refined, and on invalid levels, ratios m, regions or triggers.
+/// On bodies that cannot be refined, and on invalid levels, ratios m, factors, regions or triggers.
 pub fn refinement(
     scope: &Scope,
     deck: &Deck,

@@ -30,7 +30,7 @@ pub struct Scope<'a> {
     pub tables: IndexMap<String, Arc<Table>>,
     /// Number of components of a vector.
     pub dimension: usize,
-    /// Section and name of the tables that [`Self::find_used`] has looked up.
+    /// Section and name of the tables that [`Self::find_used`] has looked up or that expressions use.
     pub used: RefCell<IndexSet<(&'static str, String)>>,
 }
 
@@ -38,8 +38,8 @@ impl<'a> Scope<'a> {
     /// Evaluate the parameters, which may refer to each other in any order, and read the tables.
     ///
     /// # Errors
-    /// On an invalid name of a parameter or table, an unknown name, a circular definition, or an invalid
-    /// table.
+    /// On an invalid title or name, an invalid expression or unknown name in a parameter, a circular
+    /// definition, or an invalid table.
     pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {
             source,
@@ -58,7 +58,7 @@ impl<'a> Scope<'a> {
         Ok(scope)
     }
 
-    /// Call a function with a scope that has a further parameter.
+    /// Add a parameter to the scope, call a function with this scope, and remove the parameter.
     pub fn with_parameter<T>(
         &mut self,
         name: &str,
@@ -94,13 +94,13 @@ impl<'a> Scope<'a> {
         Ok(index)
     }
 
-    /// Evaluate a finite number.
+    /// Evaluate a number; a value that is not finite is an error.
     pub fn number(&self, number: &Number, key: &str) -> Result<f64> {
         let value = self.expression(number, key, &[])?.as_constant();
         Ok(value.expect("an expression without variables is a constant"))
     }
 
-    /// Return a whole number below 2⁶³, the limit of TOML integers.
+    /// Return a whole number; a number of 2⁶³ or more, the limit of TOML integers, is an error.
     pub fn whole(&self, number: &Spanned<u64>, key: &str) -> Result<u64> {
         let (value, most) = (*number.get_ref(), i64::MAX);
         if value <= most as u64 {
@@ -197,7 +197,7 @@ impl<'a> Scope<'a> {
         self.finite(parsed, number, key)
     }
 
-    /// Return the name of a table.
+    /// Return the name of a table; empty for a table of another deck.
     pub fn table_name(&self, table: &Arc<Table>) -> &str {
         let mut tables = self.tables.iter();
         let found = tables.find(|(_, known)| Arc::ptr_eq(known, table));
@@ -210,7 +210,7 @@ impl<'a> Scope<'a> {
         self.used.borrow_mut().insert(("table", name));
     }
 
-    /// Return the expression, or an error if it is a constant that is not finite.
+    /// Return the expression, or an error if the expression is a constant that is not finite.
     fn finite(&self, expression: Expression, number: &Number, key: &str) -> Result<Expression> {
         match expression.as_constant() {
             Some(value) if !value.is_finite() => {

@@ -12,7 +12,7 @@ use crate::error::{Error, Result, Warning};
 /// Largest size of a deck, bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// Largest number of characters of an error, unless the path is very long.
+/// Approximate largest number of characters of an error, unless the path is very long.
 const MOST_SHOWN: usize = 790;
 
 /// Largest number of characters of the message of an error.
@@ -57,7 +57,8 @@ impl Source {
     }
 
     /// Return the path and text of the file that a span comes from, and the span in this file. The last entry
-    /// is [`CHANGED`] for a span that is in no file, and empty otherwise.
+    /// is then empty. For a span that comes from no file, return the path of the deck, the merged text, the
+    /// unchanged span and [`CHANGED`].
     fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
         let Some(origins) = &self.origins else {
             return (&self.path, &self.text, span, "");
@@ -156,7 +157,7 @@ impl Source {
 /// Excerpt of a line in an error.
 struct Window {
     text: String,
-    /// Blanks below the text before the mark; tabs are kept as tabs.
+    /// Blanks of the same width as the text before the marked column; tabs are kept as tabs.
     indent: String,
 }
 
@@ -189,13 +190,14 @@ impl Window {
         }
     }
 
-    /// Return the number of characters from the mark to the end of the excerpt.
+    /// Return the number of characters from the marked column to the end of the excerpt.
     fn rest(&self) -> usize {
         self.text.chars().count() - self.indent.chars().count()
     }
 }
 
-/// Return a message on one line, cut after `most` characters with an ellipsis.
+/// Return a message with escaped control characters. A message of more than `most` characters is cut, and
+/// ends with an ellipsis.
 fn shortened(message: &str, most: usize) -> String {
     let mut shown = String::new();
     for c in message.chars() {

@@ -30,7 +30,8 @@ const TIME: [&str; 2] = ["t", "time"];
 /// Read the tables, and store them in the scope.
 ///
 /// # Errors
-/// On a name that no expression can use, and on an invalid table.
+/// On a name that no expression can use or that is already the name of a parameter or function, and on an
+/// invalid table.
 pub fn read(scope: &mut Scope, deck: &Deck) -> Result<()> {
     for (name, spanned) in &deck.table {
         let key = format!("[table.{name}]");
@@ -197,7 +198,7 @@ fn from_file(
         .map_err(|(row, message)| at(lines.get(row).copied().unwrap_or(header.line), message))
 }
 
-/// Return the indices of the columns of time and value.
+/// Return the indices in `names` of the columns of time and value.
 fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usize; 2], String> {
     let find = |wanted: &str| {
         let missing = || {

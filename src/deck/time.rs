@@ -11,7 +11,7 @@ use crate::problem::{self, Method, StepRule};
 /// Relative tolerance of times that are computed in different ways.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
-/// Largest number of halvings of a load step; 20 halvings give about a million parts.
+/// Largest allowed value of `max_halvings`; 20 halvings divide a load step into about a million parts.
 const MOST_HALVINGS: u64 = 20;
 
 /// The run or a stage, with the keys of `[time]` or `[[stage]]`.

@@ -85,7 +85,7 @@ fn places(deck: &Deck) -> problem::Places {
     }
 }
 
-/// Return the dimension of the problem, with thickness or cross-section.
+/// Return the dimension of the problem, with the thickness, or with cross-section and constraint.
 ///
 /// # Errors
 /// On a key that belongs to another dimension, and on an invalid number.

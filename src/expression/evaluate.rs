@@ -7,11 +7,11 @@ use super::{Table, Variable};
 /// Largest absolute integer exponent for which a power is computed by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
 
-/// Stack size that is enough for nearly all expressions; zeroing it is cheap.
+/// Stack size, in values, that is enough for nearly all expressions. A small stack is cheap to set to zero.
 const SHALLOW_STACK: usize = 16;
 
-/// Stack size for the most deeply nested expression. A level of nesting holds at most two pending operands,
-/// the first two of three arguments.
+/// Stack size, in values, for the most deeply nested expression. A level of nesting holds at most two pending
+/// operands, the first two of three arguments.
 const DEEP_STACK: usize = 2 * super::parse::DEEPEST_NESTING + 1;
 
 /// One step of postfix code.
@@ -227,13 +227,14 @@ fn maximum(left: f64, right: f64) -> f64 {
     }
 }
 
-/// Return the exponent as an integer, if the power is computed by multiplication.
+/// Return the exponent as an integer, if the power is computed by multiplication; otherwise, return `None`.
 fn small_integer(exponent: f64) -> Option<i32> {
     (exponent.abs() <= LARGEST_INTEGER_EXPONENT && exponent.fract() == 0.0)
         .then_some(exponent as i32)
 }
 
-/// Append an instruction. If all its operands are constants, replace the operands by the result.
+/// Append an instruction. If all operands of the instruction are constants, replace the operands by the
+/// result. A power with a small constant integer as exponent becomes [`Unary::IntegerPower`].
 ///
 /// A constant at the end of postfix code is always a complete operand. It is therefore enough to check the
 /// last instructions.
@@ -278,7 +279,8 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Test whether the code always returns 0 or 1, as a comparison does.
+/// Return true if the operations of the code show that its value is always 0 or 1, as for a comparison. The
+/// values of constants and variables are not combined, so the function returns false for `0*x`, for example.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);

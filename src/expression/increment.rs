@@ -1,10 +1,10 @@
-//! Change of an expression's value over a time interval, without cancellation.
+//! Change of an expression's value over a time interval, for most operations without cancellation.
 //!
 //! The difference of two computed values of size |u| has a round-off of ε|u|, where ε is the machine epsilon.
-//! Dividing a second difference by the square of a small step amplifies this error. Here most operations
-//! compute the change of their result from the changes of their operands, so the error is relative to the
-//! change. For example, the change of sin from a to b is 2 cos((a + b)/2) sin((b − a)/2). The other
-//! operations, such as `tan` and `atan2`, subtract two values.
+//! Dividing a second difference of such values by the square of a small step amplifies this error. In this
+//! module, most operations compute the change of their result from the changes of their operands. Their
+//! round-off is therefore ε times the size of the change. For example, the change of sin from a to b is
+//! 2 cos((a + b)/2) sin((b − a)/2). The other operations, such as `tan` and `atan2`, subtract two values.
 
 use std::sync::Arc;
 
@@ -24,7 +24,8 @@ impl Moving {
     }
 }
 
-/// Compute the change of the code's value from the variables x, y, z, t when the time grows by `step`.
+/// Compute the change of the code's value when the time grows from t to t + `step`. `variables` are x, y, z
+/// and t.
 pub(super) fn increment(
     code: &[Instruction],
     tables: &[Arc<Table>],
@@ -88,7 +89,7 @@ fn unary(operation: Unary, a: Moving) -> Moving {
     Moving { value, change }
 }
 
-/// Compute to^n − from^n, where to = from + change.
+/// Compute to^n − from^n, where n is `power` and to = from + change.
 fn power_change(from: f64, to: f64, change: f64, power: i32) -> f64 {
     let count = power.unsigned_abs() as i32;
     let sum: f64 = (0..count)

@@ -30,9 +30,9 @@
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
 //! - `step(a)`: 0 if `a < 0`, otherwise 1;
 //! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
-//!   after `start`, it jumps at `end`;
-//! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The other argument has no effect,
-//!   even if it is infinite or NaN.
+//!   after `start`, the value jumps from 0 to 1 at `end`;
+//! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The argument that is not returned
+//!   has no effect, even if it is infinite or NaN.
 //!
 //! # Powers
 //!
@@ -108,7 +108,7 @@ impl Variable {
 pub struct ExpressionError {
     /// Index of the first byte.
     pub start: usize,
-    /// Index after the last byte; equal to `start` at the end of the text.
+    /// Index after the last byte; equal to `start` for an error at the end of the text.
     pub end: usize,
     /// Message: what is wrong, and what is allowed.
     pub message: String,
@@ -239,8 +239,8 @@ impl Expression {
         &self.tables
     }
 
-    /// Test whether the code equals that of another expression, and each table starts with all rows of the
-    /// other's table.
+    /// Test whether this expression has the same code as `other`, and each of its tables starts with all rows
+    /// of the corresponding table of `other`.
     pub fn extends(&self, other: &Self) -> bool {
         let mut tables = self.tables.iter().zip(&other.tables);
         self.code == other.code
@@ -280,18 +280,19 @@ impl Expression {
         self.evaluate(position, time) != 0.0
     }
 
-    /// Test whether the expression always returns 0 or 1, as a comparison does.
+    /// Return true if the operations of the expression show that its value is always 0 or 1, as for a
+    /// comparison. For other expressions whose value is always 0 or 1, such as `0*x`, return false.
     pub fn is_condition(&self) -> bool {
         evaluate::is_truth(&self.code)
     }
 
-    /// Test whether the value depends on this variable; tables depend on `t`.
+    /// Test whether the expression contains this variable; a table counts as `t`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.code.contains(&Instruction::Variable(variable))
             || variable == Variable::T && !self.tables.is_empty()
     }
 
-    /// Return the value of an expression without variables and tables.
+    /// Return the value of an expression without variables and tables; `None` for other expressions.
     pub fn as_constant(&self) -> Option<f64> {
         match self.code[..] {
             [Instruction::Constant(value)] => Some(value),

@@ -53,7 +53,7 @@ struct Parser<'a> {
     text: &'a str,
     /// Meaning of the names.
     scope: &'a Scope<'a>,
-    /// All tokens of the text; the last one is [`Kind::End`].
+    /// All tokens of the text; the last token is [`Kind::End`].
     tokens: Vec<Token>,
     /// Index of the next token.
     next: usize,

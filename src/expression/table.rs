@@ -46,8 +46,9 @@ impl Table {
         self.times.starts_with(&other.times) && self.values.starts_with(&other.values)
     }
 
-    /// Return the value at a time (s). The first and the last segment extend beyond the rows: the last step
-    /// of a run may pass its end, and the velocity of a support is a difference around a time.
+    /// Return the value at a time (s). The first and the last segment extend beyond the rows. Times beyond
+    /// the rows occur, because the last step of a run may pass the end of the run, and the velocity of a
+    /// support is computed from values before and after a time.
     pub(super) fn at(&self, time: f64) -> f64 {
         let k = self.segment(time);
         let [from, to] = [self.values[k], self.values[k + 1]];
@@ -57,8 +58,8 @@ impl Table {
         from + (to - from) * ((time - self.times[k]) / (self.times[k + 1] - self.times[k]))
     }
 
-    /// Compute the change of the value from a time over a step, s. Within a segment, round-off is relative to
-    /// the change, not to the value.
+    /// Compute the change of the value from `time` to `time + step` (s); `step` may be negative. Within a
+    /// segment, round-off is relative to the change, not to the value.
     pub(super) fn increment(&self, time: f64, step: f64) -> f64 {
         let end = time + step;
         let k = self.segment(0.5 * (time + end));

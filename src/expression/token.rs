@@ -131,7 +131,8 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token>, ExpressionError> {
     Ok(tokens)
 }
 
-/// Return the first token of the text and its length, or the length of the wrong part and a message.
+/// Return kind and length (bytes) of the first token of the text, or the length of the wrong part and a
+/// message. `character` is the first character of the text.
 fn first_token(text: &str, character: char) -> Result<(Kind, usize), (usize, String)> {
     let number_length = number_length(text.as_bytes());
     if number_length > 0 {
@@ -174,7 +175,7 @@ fn first_token(text: &str, character: char) -> Result<(Kind, usize), (usize, Str
     }
 }
 
-/// Return the length of the number at the start of the text, or 0.
+/// Return the length (bytes) of the number at the start of the text; 0 without a number.
 fn number_length(text: &[u8]) -> usize {
     let digits = |from: usize| {
         text.get(from..)

@@ -72,8 +72,9 @@ const BY_ENERGY: [&str; 3] = [
 /// The bond-based laws among the laws that an import writes.
 const BOND_BASED: [&str; 1] = ["pmb"];
 
-/// Write the damage law of a body and return its name. Return `None` if the law breaks bonds by energy only
-/// and the elastic constants determine no fracture energy.
+/// Write the damage law of a body and return the name of the damage law. `horizon` is the horizon of the
+/// body, m. Return `None` if the material law breaks bonds by energy only and the elastic constants do not
+/// determine the fracture energy.
 ///
 /// # Errors
 /// At present, the function returns no errors.
@@ -106,7 +107,9 @@ pub fn damage(
                 translation.log.left_out(&model.node, note);
                 return Ok(None);
             };
-            // Silling & Askari (2005), for a state-based solid: G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)).
+            // State-based form of the relation of Silling & Askari (2005):
+            // G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)). For k = 5 G/3, this is the relation 9 k δ s0²/5 of
+            // bond-based solids.
             let energy = stretch
                 * stretch
                 * horizon
@@ -127,7 +130,8 @@ pub fn damage(
             tension_only,
         } => {
             let bond_based = BOND_BASED.contains(&material.law);
-            // Bonds of a bond-based law break in tension only.
+            // Bonds of a bond-based law break in tension only, so the damage law for such a body differs from
+            // that for other bodies.
             let name = if bond_based && !tension_only {
                 translation.name("damage", &format!("{} of bonds", model.read))
             } else {
@@ -156,9 +160,9 @@ pub struct Body {
     pub material: String,
     /// Name of the damage law.
     pub damage: Option<String>,
-    /// Horizon as written in the source deck.
+    /// Horizon, m.
     pub horizon: Value,
-    /// Key and value of the points: `points` or `shape.box`.
+    /// Key and value of the points; the key is `points`, or the shape such as `shape.box`.
     pub points: (String, Value),
 }
 

@@ -80,8 +80,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Write a rectangle as a pre-crack; in 2-D its bottom edge.
 ///
-/// The edges are ub·b from the corner and (ub × n)·a, with the bottom unit vector ub, the normal n, and the
-/// lengths b and a.
+/// From the corner, the bottom edge is b·ub and the side edge is a·(ub × n). ub is the bottom unit vector, n
+/// the normal, b the bottom length and a the side length.
 fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
     let written = translation.name("crack", name);
     let shape = match translation.dimension {
@@ -94,7 +94,8 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
     let given = unit(vector(translation, filter, "Bottom Unit Vector", &header)?);
     let bottom_length = length(translation, filter, "Bottom Length", &header)?;
     // Peridigm and PeriLab project the position of an intersection on ub and on ub × n. If ub is not in the
-    // plane, both edges are therefore longer by the factor 1/|ub_t|, with the part ub_t of ub in the plane.
+    // plane, both edges are therefore longer by the factor 1/|ub_t|, where ub_t is the part of ub in the
+    // plane.
     let along: f64 = given.iter().zip(&normal).map(|(g, n)| g * n).sum();
     let (mut bottom, mut stretch) = (given, 1.0);
     if along.abs() > SLANT {

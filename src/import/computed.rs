@@ -50,7 +50,7 @@ impl Written {
 }
 
 impl<'n> Quantity<'n> {
-    /// Create the quantity of a table.
+    /// Create the quantity that a table of the source deck describes.
     pub(super) fn new(label: &'n str, table: &'n Node) -> Self {
         let word = |key: &str| table.get(key).and_then(Node::text).unwrap_or("");
         Self {
@@ -61,7 +61,8 @@ impl<'n> Quantity<'n> {
         }
     }
 
-    /// Write the quantity to the new deck.
+    /// Write the quantity to the new deck. `bodies` has pairs of the name of a block and the name of the body
+    /// of this block. `has_temperature` is whether points have temperatures.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.
@@ -119,7 +120,8 @@ impl<'n> Quantity<'n> {
         ))
     }
 
-    /// Write the values of the nearest point. A probe reports displacement and velocity without further keys.
+    /// Write a probe, which records the variable at the nearest point. A probe records displacement and
+    /// velocity without further keys.
     fn probe(&self, translation: &mut Translation) -> Result<Written> {
         let mut position = Vec::new();
         for axis in ["X", "Y", "Z"].iter().take(translation.dimension) {
@@ -158,7 +160,7 @@ impl<'n> Quantity<'n> {
         })
     }
 
-    /// Write a sum or an extreme over a set, one table per component.
+    /// Write a sum, a mean or an extreme over a set, one table per component.
     fn statistics(&self, translation: &mut Translation, set: String) -> Result<Written> {
         let calculation = self.table.get("Calculation Type").and_then(Node::text);
         let calculation = calculation.unwrap_or("");

@@ -17,7 +17,7 @@ pub enum Quantity {
     BodyForce,
     /// Force on each point of the set, N.
     ForceOfPoint,
-    /// Temperature, from which this reference temperature is subtracted, if there is one.
+    /// Temperature; if there is a reference temperature, it is subtracted from the prescribed value.
     Temperature(Option<Value>),
 }
 
@@ -31,11 +31,12 @@ struct Initial {
     node: Node,
 }
 
-/// Writer of conditions; collects initial values until the end.
+/// Writer of conditions; collects initial values until [`Self::finish`] writes them.
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act.
+    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act; no
+    /// numbers mean all steps.
     pub written: Vec<(String, Vec<u64>)>,
     /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,
@@ -53,7 +54,8 @@ pub struct Given<'n> {
     pub steps: Vec<u64>,
 }
 
-/// Return the component of a condition: its node, its name and its index.
+/// Return the component of a condition: the node of the key `Coordinate`, the name x, y or z, and the index
+/// 0, 1 or 2.
 fn component<'n>(
     translation: &Translation,
     node: &'n Node,
@@ -75,7 +77,7 @@ impl Conditions {
     /// Write a condition.
     ///
     /// # Errors
-    /// If a key is missing, `Coordinate` is not x, y or z, or the node set is unknown.
+    /// If a key is missing or not a text, `Coordinate` is not x, y or z, or the node set is unknown.
     pub fn add(
         &mut self,
         translation: &mut Translation,
@@ -211,7 +213,8 @@ impl Conditions {
         Ok(())
     }
 
-    /// Write the initial values, one table per set.
+    /// Write the initial values, one table per set. Log the initial values that a table of another set may
+    /// replace by 0.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self

@@ -47,7 +47,7 @@ impl Value {
         Self::Text(text.into())
     }
 
-    /// Create a value from a computed number. The text has 15 digits, which hides round-off.
+    /// Create a value from a computed number. The number is rounded to 15 digits, which hides round-off.
     pub fn number(value: f64) -> Self {
         let rounded = format!("{value:.14e}").parse::<f64>().unwrap_or(value);
         Self::Number(if rounded.is_nan() {
@@ -128,7 +128,7 @@ impl Section {
         }
     }
 
-    /// Test whether this is the section with a header.
+    /// Test whether this section has the header `header` and is written.
     fn is(&self, header: &str) -> bool {
         !self.is_left_out && self.header == header
     }
@@ -200,7 +200,7 @@ impl Draft {
         self.sections.iter().any(|section| section.is(header))
     }
 
-    /// Test whether a condition prescribes displacement or velocity.
+    /// Test whether any condition of the deck prescribes displacement or velocity.
     pub fn has_support(&self) -> bool {
         let prescribes = |section: &Section, key: &str| section.get(key).is_some();
         self.sections.iter().any(|section| {

@@ -58,7 +58,8 @@ impl Constants {
         self.given.len()
     }
 
-    /// Return bulk and shear modulus of the solid in 3-D, Pa, if two constants determine these.
+    /// Return bulk and shear modulus of the solid in 3-D, Pa; `None` if the constants do not determine both
+    /// moduli.
     pub fn moduli(&self) -> Option<[f64; 2]> {
         let get = |key| self.get(key);
         let of_young = |e: f64, nu: f64| [e / (3.0 * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))];
@@ -85,8 +86,8 @@ impl Constants {
     /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return false if
     /// the constants determine neither modulus.
     ///
-    /// A bulk modulus of the plane is converted: `factor` is Young's modulus divided by this bulk modulus.
-    /// `factor` is `None` for the bulk modulus of a solid.
+    /// If `factor` is given, a bulk modulus is that of the plane, and `factor` is Young's modulus divided by
+    /// this bulk modulus. Without `factor`, a bulk modulus is that of a solid.
     pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {

@@ -28,7 +28,8 @@ pub type Names<'a> = &'a dyn Fn(&str) -> Option<String>;
 /// Translate an expression.
 ///
 /// # Errors
-/// If the result is not an expression of these variables; `Err` holds a message.
+/// If the text cannot be translated, is too long, or the result is not an expression of `variables`. `Err`
+/// holds a message.
 pub fn rewrite(
     text: &str,
     dialect: Dialect,
@@ -182,7 +183,7 @@ struct Rewriter<'a> {
 }
 
 impl Rewriter<'_> {
-    /// Return the expression that all statements assign to `value`.
+    /// Return the expression of `value` after all statements.
     fn statements(&self, tokens: &[Token]) -> Result<String, String> {
         let (value, end) = self.block(tokens, 0, None, 0)?;
         if end < tokens.len() {
@@ -191,8 +192,8 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// Translate the statements from `at` to the end or a `}`. Return the new `value` and the index after the
-    /// last statement.
+    /// Translate the statements from `at` to the end or a `}`. `value` is the expression that earlier
+    /// statements assign to `value`. Return the new expression and the index after the last statement.
     fn block(
         &self,
         tokens: &[Token],
@@ -213,7 +214,7 @@ impl Rewriter<'_> {
         Ok((value, at))
     }
 
-    /// Translate the statement at `at`. Return the new `value` and the index after the statement.
+    /// Translate the statement at `at`. Parameters and result are those of [`block`](Self::block).
     fn statement(
         &self,
         tokens: &[Token],
@@ -282,7 +283,8 @@ impl Rewriter<'_> {
         }
     }
 
-    /// Translate a formula in which `value` stands for its earlier expression.
+    /// Translate a formula in which the name `value` stands for the expression `value`, or for 0 without such
+    /// an expression.
     fn with_value(
         &self,
         tokens: &[Token],

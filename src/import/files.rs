@@ -58,10 +58,10 @@ pub struct PointFile {
 }
 
 impl PointFile {
-    /// Read a point file; `order` gives the columns of a file without header. Rows that are not points are
-    /// not counted.
+    /// Read a point file; `order` gives the columns of a file without header. The header, comments and blank
+    /// rows are not counted.
     ///
-    /// `None` if the file cannot be read.
+    /// Return `None` if the file cannot be read.
     pub fn read(path: &Path, order: &[&str]) -> Option<Self> {
         let heading = heading(path).ok()?;
         let names = match &heading {

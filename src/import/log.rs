@@ -33,13 +33,13 @@ impl fmt::Display for Fate {
 pub struct Entry {
     /// Line, from 1.
     pub line: usize,
-    /// Path of keys from the top of the deck, or the command.
+    /// Path of keys from the top of the deck, or the name of the command.
     pub key: String,
     /// Value of the key; empty for a table.
     pub value: String,
     /// Outcome of the key.
     pub fate: Fate,
-    /// The key in the new deck, or the reason for leaving it out.
+    /// The key in the new deck, or the reason why the key is approximated or left out.
     pub note: String,
 }
 
@@ -91,7 +91,7 @@ impl Losses {
             .iter()
             .filter(|entry| entry.fate == Fate::LeftOut && entry.note != UNUSED_DAMAGE);
         for entry in lost {
-            // The arguments of a LAMMPS fix are its name, group and style.
+            // The first three arguments of a LAMMPS fix are id, group and style.
             let style = entry.value.split_whitespace().nth(2).unwrap_or("");
             if entry.key == "fix" && LOADS_OF_SCRIPTS.contains(&style) {
                 losses.conditions.push(entry.line);
@@ -220,8 +220,8 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. A key without a note has the
-    /// outcome `LeftOut`.
+    /// Return the outcomes of all keys of a tree, in the order of the text. A value or an empty table without
+    /// a note has the outcome `LeftOut`. Any other table without a note is not listed, but its keys are.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);

@@ -1,8 +1,8 @@
 //! Translation of decks of other codes into Fissure decks: `fissure import`.
 //!
-//! A source deck becomes a tree of parameters (`tree`) or a list of commands (`script`). One translator per
-//! code reads it. The translator logs the outcome of every key in a [log], and fills a `draft` of the new
-//! deck, which is written as TOML. Keys that no translator reads are logged as left out.
+//! A source deck becomes a tree of parameters (`tree`) or a list of commands (`script`). For each code, one
+//! translator reads the tree or the list. The translator logs the outcome of every key in a [log], and fills
+//! a `draft` of the new deck, which is written as TOML. Keys that no translator reads are logged as left out.
 
 mod bodies;
 mod bond_filters;
@@ -66,12 +66,12 @@ pub struct Import {
     pub text: String,
     /// Outcome of each key.
     pub entries: Vec<Entry>,
-    /// Error of the new deck, if it is not valid yet.
+    /// Error of the new deck; `None` if the new deck is valid.
     pub fault: Option<Error>,
 }
 
 impl Import {
-    /// Return the number of keys with an outcome.
+    /// Return the number of keys with the outcome `fate`.
     pub fn count(&self, fate: Fate) -> usize {
         self.entries
             .iter()
@@ -85,8 +85,8 @@ impl Import {
     }
 }
 
-/// Translate the deck at `path`. `target` is the path of the new deck, to which file names are relative.
-/// Without `code` the code is detected from the text.
+/// Translate the deck at `path`. `target` is the path of the new deck; paths of files in the new deck are
+/// relative to the folder of the new deck. Without `code`, the code is detected from the text.
 ///
 /// # Errors
 /// If the file cannot be read, the code is unknown, or the deck lacks data that a run needs. The message
@@ -124,7 +124,8 @@ pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<I
     let parsed = if is_xml {
         xml::parse(text)
     } else {
-        // Decks of Peridigm escape the braces of statements, which YAML does not allow.
+        // Decks of Peridigm escape the braces of statements with backslashes, and YAML does not allow these
+        // escapes.
         yaml::parse(&text.replace("\\{", "{").replace("\\}", "}"))
     };
     let root = parsed.map_err(|(line, message)| line_error(source, line, message))?;

@@ -173,7 +173,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Create an empty list. `has_temperature` is whether points have temperatures.
+    /// Create outputs without fields and intervals. `has_temperature` is whether points have temperatures.
     pub fn new(has_temperature: bool) -> Self {
         Self {
             has_temperature,
@@ -211,7 +211,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Read an output: its variables, and its interval if it has one.
+    /// Read the variables of an output, and the interval if the output has one.
     ///
     /// # Errors
     /// If the frequency is not a whole number above 0.
@@ -328,7 +328,8 @@ impl Outputs {
         Some(smallest.interval)
     }
 
-    /// Return kind, outcome and note of an output variable.
+    /// Return kind, outcome and note of an output variable. Add the field of the variable to the output, if
+    /// there is one.
     fn variable(&mut self, translation: &Translation, name: &str) -> (Kind, Fate, String) {
         let mut computed = self.computed.iter();
         if let Some((_, fate, note)) = computed.find(|(label, ..)| is_key(label, name)) {
@@ -392,7 +393,7 @@ impl Outputs {
     }
 }
 
-/// Test whether the first interval is longer; intervals of different kinds are not compared.
+/// Test whether the first interval is longer; return false for intervals of different kinds.
 fn is_longer(one: &Frequency, other: &Frequency) -> bool {
     match (one.interval, other.interval) {
         (Interval::Steps(a), Interval::Steps(b)) => a > b,

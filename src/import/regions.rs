@@ -12,7 +12,8 @@ const MARGIN: f64 = 1e-6;
 pub enum Region {
     /// Lower and upper corner; infinite where the region is unbounded.
     Block([f64; 3], [f64; 3]),
-    /// Axis, the other two coordinates of the axis, radius, lower and upper end.
+    /// Direction of the axis (0 to 2 for x to z), the other two coordinates of the axis, radius, lower and
+    /// upper end.
     Cylinder(usize, [f64; 2], f64, [f64; 2]),
     /// Centre and radius.
     Sphere([f64; 3], f64),
@@ -107,7 +108,7 @@ pub fn region(
 }
 
 impl Region {
-    /// Return the corners of a bounding box.
+    /// Return the lower and the upper corner of a box that contains the region.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         match self {
             Self::Block(lower, upper) => [*lower, *upper],
@@ -139,7 +140,7 @@ impl Region {
         }
     }
 
-    /// Replace infinite bounds by those of a box.
+    /// Replace infinite bounds of the region by the bounds of a box.
     pub fn within(&self, bounds: [[f64; 3]; 2]) -> Self {
         let clamp = |value: f64, k: usize| {
             if value.is_finite() {
@@ -175,7 +176,7 @@ impl Region {
         }
     }
 
-    /// Return the shape as a table with one key.
+    /// Return the shape of the region, enlarged by `MARGIN` times the spacing, as a table with one key.
     pub fn shape(&self, spacing: f64) -> Value {
         let margin = MARGIN * spacing;
         let (name, value) = match self {
@@ -228,7 +229,7 @@ impl Region {
     }
 }
 
-/// Return the two other directions of an axis, in the order of LAMMPS.
+/// Return the two directions perpendicular to an axis, in the order of LAMMPS.
 pub fn others(axis: usize) -> [usize; 2] {
     match axis {
         0 => [1, 2],

@@ -57,7 +57,7 @@ pub fn is_script(text: &str) -> bool {
     })
 }
 
-/// Split a script into commands, and replace each `$` by the value of the variable at this command.
+/// Split a script into commands. Replace each variable or formula after a `$` by its value at this command.
 ///
 /// # Errors
 /// If a quote or bracket is not closed, a variable is not defined, a formula in `$(…)` is invalid or changes
@@ -129,7 +129,7 @@ fn words(text: &str) -> Result<Vec<String>, String> {
 }
 
 impl Script {
-    /// Add the command of a line.
+    /// Add the command of a line; a blank line adds none.
     fn command(
         &mut self,
         variables: &mut Variables,
@@ -145,7 +145,7 @@ impl Script {
         if self.commands.len() >= MOST_NODES {
             return Err((line, format!("has more than {MOST_NODES} commands")));
         }
-        // The key of the node is the name of the command.
+        // The node holds the arguments only: the name of the command becomes the key of the node in the tree.
         let node = Node {
             id: self.commands.len() + 1,
             line,
@@ -246,7 +246,7 @@ impl Variables {
         })
     }
 
-    /// Evaluate a formula that is constant in time.
+    /// Evaluate a formula; a formula that changes with time is an error.
     fn constant(&self, formula: &str) -> Result<String, String> {
         if formula.trim().parse::<f64>().is_ok() {
             return Ok(formula.trim().to_owned());
@@ -261,7 +261,7 @@ impl Variables {
     /// Return a number: a literal, or the constant value of a variable `v_name`.
     ///
     /// # Errors
-    /// If the word is neither.
+    /// If the word is neither a finite number nor the name of a constant variable.
     pub fn number(&self, word: &str) -> Result<f64, String> {
         let number = word.parse::<f64>().ok().or_else(|| {
             let name = word.strip_prefix("v_")?;

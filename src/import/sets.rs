@@ -27,8 +27,8 @@ pub struct Sets<'n> {
 }
 
 impl<'n> Sets<'n> {
-    /// Create an empty collection. `mesh_prefix` is the kind of the mesh's groups that are node sets, written
-    /// before their names; `None` without a mesh.
+    /// Create an empty collection. `mesh_prefix` is the text that the new deck needs before the names of node
+    /// sets of the mesh; `None` without a mesh.
     pub fn new(mesh_prefix: Option<&'static str>) -> Self {
         Self {
             defined: Vec::new(),
@@ -108,7 +108,8 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Log the node sets that are unused.
+    /// Log the declared node sets that nothing uses. Unused entries that are not declared as node sets stay
+    /// without a note.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
             if set.written.is_none() && set.is_declared {

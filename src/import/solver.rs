@@ -71,8 +71,8 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Read a solver that starts at a time, s. `damage_by_default` is whether damage models are active if the
-/// deck does not switch them on or off.
+/// Read a solver that starts at the time `start` (s), and return its stages. `damage_by_default` is whether
+/// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
 /// If no solver is known, the end is missing or not after the start, or a key is not a number.
@@ -238,7 +238,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Log the keys of a static solver that have no counterpart.
+/// Log the keys of a static solver that the new deck does not contain.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));

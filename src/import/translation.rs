@@ -108,7 +108,7 @@ impl<'a> Translation<'a> {
     /// Return a whole number.
     ///
     /// # Errors
-    /// If the value is not a whole number.
+    /// If the value is negative, not whole, or 10¹⁵ or more.
     pub fn count(&self, node: &Node, key: &str) -> Result<u64> {
         let number = self.number(node, key)?;
         let is_whole = (0.0..1e15).contains(&number) && number.fract() == 0.0;
@@ -165,7 +165,8 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// Return the name of a table in the new deck, unique in its section.
+    /// Return the name in the new deck for a table of the source deck. The name is unique in its section. The
+    /// same source name always gets the same name.
     pub fn name(&mut self, section: &'static str, name: &str) -> String {
         let same = |(s, read, _): &&(&str, String, String)| *s == section && read == name;
         if let Some((.., written)) = self.names.iter().find(same) {
@@ -256,7 +257,8 @@ pub fn line_error(source: &Source, line: usize, message: impl AsRef<str>) -> Err
     )
 }
 
-/// Return a name in lower case, with letters, digits and underscores only.
+/// Return a name in lower case, with letters, digits and underscores only, and with at most `LONGEST_NAME`
+/// characters.
 fn slug(name: &str) -> String {
     let mut slug = String::new();
     for c in name.trim().chars().take(LONGEST_NAME) {

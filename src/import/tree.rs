@@ -32,7 +32,7 @@ pub enum Content {
 }
 
 impl Node {
-    /// Return the value of a key. Keys are compared without case, and `_` equals a space.
+    /// Return the value of a key; names are compared with the key by [`is_key`].
     pub fn get(&self, key: &str) -> Option<&Self> {
         let (_, node) = self.entries().iter().find(|(name, _)| is_key(name, key))?;
         Some(node)
@@ -46,7 +46,7 @@ impl Node {
         }
     }
 
-    /// Return the values of a table that are tables.
+    /// Return name and value of those entries of a table that are tables.
     pub fn tables(&self) -> impl Iterator<Item = (&str, &Self)> {
         let entries = self.entries().iter();
         entries
@@ -63,7 +63,7 @@ impl Node {
     }
 }
 
-/// Test whether a name equals a key, without regard to case and to `_` or spaces.
+/// Test whether a name equals a key. Case is ignored, and any sequence of `_` and spaces equals one space.
 pub fn is_key(name: &str, key: &str) -> bool {
     let plain = |text: &str| {
         let words = text.split([' ', '_']).filter(|word| !word.is_empty());

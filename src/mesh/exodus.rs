@@ -61,7 +61,8 @@ mod orders {
     ];
 }
 
-/// Return the element type of a block from its name, such as `HEX8` or `TETRA`, and the number of nodes.
+/// Return the element type with this name, such as `HEX8` or `TETRA`, and this number of nodes; `None` for an
+/// unsupported type.
 fn kind(name: &str, nodes: usize) -> Option<Kind> {
     let letters = name
         .trim_end_matches(|c: char| c.is_ascii_digit())
@@ -278,8 +279,10 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
     Ok(())
 }
 
-/// Return the number (from 1), id and name of each block or set with a prefix such as `eb`. A missing name
-/// becomes `DEFAULT_ID`, such as `block_3`.
+/// Return the number (from 1), id and name of each block or set. Ids and names are in variables whose names
+/// start with `prefix`, such as `eb`. Without ids in the file, the blocks or sets are those with a variable
+/// `VARIABLE1`, `VARIABLE2`, …; their ids are their numbers. A missing name becomes `DEFAULT_ID`, such as
+/// `block_3`.
 fn entities(
     file: &Netcdf,
     prefix: &str,

@@ -66,7 +66,8 @@ mod orders {
     ];
 }
 
-/// Return the type of an element by its number in the file, and the order of the nodes after the corners.
+/// Return the element type with this number in the format, and the order of the nodes after the corners.
+/// Return `None` for an unsupported type.
 fn kind(number: i64) -> Option<(Kind, &'static [Between])> {
     let (form, nodes) = match number {
         15 => (Form::Point, 1),
@@ -139,7 +140,7 @@ struct File<'a> {
     indices: FxHashMap<u64, u32>,
     /// Names of physical groups by dimension and tag.
     names: FxHashMap<(i64, i64), String>,
-    /// Tags of the physical groups of an entity, by its dimension and tag.
+    /// Tags of the physical groups of an entity, by the dimension and the tag of the entity.
     physical: FxHashMap<(i64, i64), Vec<i64>>,
     /// Elements of physical groups.
     groups: Grouping,
@@ -227,7 +228,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Read the names of physical groups, which are text in binary files, too.
+    /// Read the names of physical groups. These names are text even in binary files.
     fn read_names(&mut self) -> Result<()> {
         let count = self.cursor.text_number()?;
         for _ in 0..count {
@@ -337,7 +338,8 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Return the type of an element, and for each node its position in the order of the file.
+    /// Return the element type with this number, and for each node in the order of [`super::kind`] its
+    /// position in the order of the file.
     fn kind(&self, number: i64) -> Result<(Kind, Vec<usize>)> {
         let Some((kind, order)) = kind(number) else {
             let message = format!(
@@ -367,7 +369,8 @@ impl File<'_> {
         self.mesh.elements.push(*kind, (number, line), nodes);
     }
 
-    /// Add the last element to its geometrical entity and to its physical groups. The tag 0 means none.
+    /// Add the last element to its geometrical entity and to its physical groups. The tag 0 means no entity
+    /// and no group.
     fn add_to_groups(&mut self, dimension: usize, entity: i64, physical: &[i64]) {
         let last = self.mesh.elements.len() as u64 - 1;
         if entity != 0 {
@@ -465,7 +468,7 @@ impl File<'_> {
     }
 
     fn finish(mut self) -> Result<Mesh> {
-        // Entities are the groups of the dimensions that have no physical group.
+        // In a dimension without physical groups, the geometrical entities become the groups.
         let physical = self.groups.groups;
         let mut has_groups = [false; 4];
         for ((dimension, _), _) in &physical {
@@ -476,7 +479,7 @@ impl File<'_> {
         let entities = entities.into_iter().map(|group| (true, group));
         let physical = physical.into_iter().map(|group| (false, group));
         for (is_entity, (key, elements)) in entities.chain(physical) {
-            // The names of the file belong to physical groups.
+            // The names in the file are names of physical groups.
             let name = self.names.get(&key).filter(|_| !is_entity);
             self.mesh.groups.push(Group {
                 name: name.cloned(),
@@ -616,8 +619,8 @@ impl<'a> Cursor<'a> {
             .map_err(|_| self.fault(format!("must be a whole number, is {}", excerpt(word))))
     }
 
-    /// Read a number of entries of version 2. The number is text even in binary files; there, the rest of its
-    /// line is skipped too.
+    /// Read a number of entries of version 2. The number is text even in binary files. In binary files, the
+    /// rest of the line is skipped too.
     fn count_line(&mut self) -> Result<i64> {
         let count = self.text_number()?;
         if matches!(self.encoding, Encoding::Binary { .. }) {

@@ -1,8 +1,8 @@
 //! Types of elements: corners, dimension and the order of their nodes.
 //!
-//! All types have the node order of VTK here. A node of a second-order element is described by the corners
-//! between which it lies. A node on an edge lies between two corners, a node on a face between three or
-//! four, and a node at the element's centre between all corners. The order of another format is a list of
+//! In this module, all types have the node order of VTK. Each node after the corners is described by the
+//! corners between which it lies. A node on an edge lies between two corners, a node on a face between three
+//! or four, and a node at the element's centre between all corners. The order of another format is a list of
 //! such descriptions, which can be compared with the manual of that format.
 
 /// The shape of an element, without its polynomial order.
@@ -60,16 +60,19 @@ pub const KINDS: [Kind; 19] = [
     Kind::new(Pyramid, 14),
 ];
 
-/// The corners that a node lies between.
+/// Indices of the corners between which a node lies.
 pub type Between = &'static [usize];
 
 impl Kind {
-    /// Create a type, which must be in [`KINDS`].
+    /// Create a type; only the types in [`KINDS`] are supported.
     pub const fn new(form: Form, nodes: usize) -> Self {
         Self { form, nodes }
     }
 
-    /// Return the position in [`KINDS`].
+    /// Return the index of the type in [`KINDS`].
+    ///
+    /// # Panics
+    /// If the type is not in [`KINDS`].
     pub fn index(self) -> usize {
         let found = KINDS.iter().position(|kind| *kind == self);
         found.expect("elements have a type of the list")
@@ -98,7 +101,7 @@ impl Kind {
         }
     }
 
-    /// Return for each node after the corners the corners between which it lies.
+    /// Return, for each node after the corners, the corners between which this node lies.
     pub fn between(self) -> &'static [Between] {
         let all: &[Between] = match self.form {
             Point => &[],
@@ -158,6 +161,9 @@ impl Kind {
 
     /// Return for each node in VTK's order its position in another order. `other` describes the nodes after
     /// the corners in the other order.
+    ///
+    /// # Panics
+    /// If `other` lacks a node.
     pub fn permutation(self, other: &[Between]) -> Vec<usize> {
         let same = |a: &[usize], b: &[usize]| a.len() == b.len() && a.iter().all(|k| b.contains(k));
         let position = |node: &Between| {
@@ -168,7 +174,7 @@ impl Kind {
         (0..self.corners()).chain(others).collect()
     }
 
-    /// Return a name for messages.
+    /// Return the name of the form, for messages.
     pub fn name(self) -> &'static str {
         match self.form {
             Point => "point",

@@ -1,7 +1,8 @@
-//! Exact volume and centroid of an element, which becomes a point.
+//! Exact volume and centroid of an element; the element becomes a point with this volume at the centroid.
 //!
-//! An element is the image of its reference element under its shape functions. Volume ∫ det J and first
-//! moments ∫ x det J are integrals of polynomials, for which the Gauss rules here are exact.
+//! The shape functions map the reference element to the element; J is the Jacobian matrix of this map. The
+//! volume ∫ det J and the first moments ∫ x det J over the reference element are integrals of polynomials.
+//! The Gauss rules of this module are exact for these polynomials.
 
 use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
@@ -23,7 +24,7 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate along an axis.
+    /// Return the reference coordinate with this value along an axis.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
@@ -84,7 +85,7 @@ struct GaussPoint {
 /// The Gauss rules of all types, in the order of [`KINDS`].
 static RULES: LazyLock<Vec<Vec<GaussPoint>>> = LazyLock::new(|| KINDS.map(rule).into());
 
-/// Return points and weights of the Gauss rule on [−1, 1].
+/// Return points and weights of the Gauss rule on [−1, 1] with 1 to 4 points.
 fn gauss(points: usize) -> Vec<(f64, f64)> {
     let symmetric = |pairs: &[(f64, f64)]| {
         let mirrored = pairs.iter().rev().map(|(x, weight)| (-x, *weight));
@@ -107,11 +108,11 @@ fn gauss(points: usize) -> Vec<(f64, f64)> {
     }
 }
 
-/// Return the Gauss rule of a type, exact for volume and first moments.
+/// Return the Gauss rule of a type, exact for volume and first moments; empty for a point.
 fn rule(kind: Kind) -> Vec<GaussPoint> {
     let second_order = kind.nodes > kind.corners();
-    // n points are exact up to the degree 2n − 1 in each coordinate. Collapsing the coordinates raises the
-    // degree by up to 2.
+    // A Gauss rule of n points is exact up to the degree 2n − 1 in each coordinate. Collapsing the
+    // coordinates raises the degree by up to 2.
     let points = match (kind.form, second_order) {
         (Form::Point, _) => return Vec::new(),
         (Form::Triangle | Form::Tetrahedron, false) => 1,
@@ -168,7 +169,7 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
         }
     }
     // det J of a quadrilateral is linear. If the edges cross one another, det J is negative along an edge,
-    // which the Gauss points can miss. The middles of the edges are therefore added with weight 0.
+    // but may be positive at all Gauss points. The middles of the edges are therefore added with weight 0.
     if kind == Kind::new(Form::Quadrilateral, 4) {
         for at in [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]] {
             add([at[0], at[1], 0.0], 0.0);
@@ -182,7 +183,7 @@ const SQUARE: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0
 
 /// Compute the shape functions of all nodes at a position in the reference element.
 ///
-/// - Lines, quadrilaterals and hexahedra: [−1, 1]^D.
+/// - Lines, quadrilaterals and hexahedra in D dimensions: [−1, 1]^D.
 /// - Triangles and tetrahedra: r, s, t ≥ 0, r + s + t ≤ 1.
 /// - Wedges: a triangle × [−1, 1].
 /// - Pyramids: collapsed coordinates u, v in [−1, 1] and w in [0, 1]. At the height w, a pyramid is the
@@ -606,12 +607,12 @@ mod tests {
 
     #[test]
     fn a_frustum_as_one_hexahedron_has_its_volume() {
-        // A 2 × 2 base, a 1 × 1 top, height 3: V = h/3 (A + a + √(A a)) = 7.
+        // Base area A = 2 × 2, top area a = 1 × 1, height h = 3: V = h/3 (A + a + √(A a)) = 7.
         let layer = |half: f64, z: f64| SQUARE.map(|[a, b]| [half * a, half * b, z]);
         let nodes = [layer(1.0, 0.0), layer(0.5, 3.0)].concat();
         let measure = measure(Kind::new(Form::Hexahedron, 8), &nodes);
         assert!((measure.size - 7.0).abs() < 1e-14);
-        // z̄ = h/4 (A + 2 √(A a) + 3 a)/(A + √(A a) + a).
+        // Height of the centroid: h/4 (A + 2 √(A a) + 3 a)/(A + √(A a) + a).
         assert!((measure.centroid[2] - 0.75 * 11.0 / 7.0).abs() < 1e-14);
     }
 }

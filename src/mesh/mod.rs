@@ -1,7 +1,8 @@
 //! Meshes of finite elements in the formats of other programs. Elements become points.
 //!
-//! A reader checks every count in its file against the number of remaining bytes. A damaged file therefore
-//! needs no more memory than a valid file of the same size.
+//! A reader compares a count in a file with the number of bytes before it allocates memory for the counted
+//! entries, or reads the entries one by one. A damaged file therefore needs no more memory than a valid file
+//! of the same size.
 
 mod abaqus;
 mod exodus;
@@ -59,7 +60,7 @@ const ENDINGS: [(&str, Format); 7] = [
 ];
 
 impl Format {
-    /// Return the format of a file from the ending of its name.
+    /// Return the format of a file from the ending of its name; `None` for an unknown ending.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?;
         let same = |(known, _): &&(&str, Format)| known.eq_ignore_ascii_case(ending);
@@ -79,8 +80,8 @@ pub struct Mesh {
     pub nodes: Vec<[f64; 3]>,
     /// The elements, in the order of the file.
     pub elements: Elements,
-    /// Volumes of single-node elements by the index of the element, in the units of the file. The volume is 0
-    /// for all other elements, also for those beyond the end of the list.
+    /// Volumes of single-node elements by the index of the element, in the units of the file. For all other
+    /// elements, the entry is 0 or missing at the end of the list.
     volumes: Vec<f64>,
     /// Named or numbered groups of elements and of nodes.
     pub groups: Vec<Group>,
@@ -95,7 +96,8 @@ pub struct Elements {
     starts: Vec<usize>,
     nodes: Vec<u32>,
     numbers: Vec<u64>,
-    /// Lines of the elements in the file; 0 in binary files.
+    /// Lines of the elements in the file, from 1; 0 if the reader does not know the line, as in VTU, Exodus
+    /// and binary Gmsh files.
     lines: Vec<u32>,
     /// Files of the elements, each with the index of its first element.
     files: Vec<(usize, PathBuf)>,
@@ -164,7 +166,7 @@ impl Elements {
         self.numbers[element]
     }
 
-    /// Return an error about an element, with file, line (in text files), number and type.
+    /// Return an error about an element, with file, line (if known), number and type.
     pub fn fault(&self, element: usize, message: impl fmt::Display) -> Error {
         let after = self.files.partition_point(|(first, _)| *first <= element);
         let file = self.files[after - 1].1.display();
@@ -188,8 +190,8 @@ pub struct Group {
     pub number: Option<i64>,
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
-    /// Whether the group is a geometrical entity. A number without a kind stands for an entity only if no
-    /// other group has this number.
+    /// Whether the group is a geometrical entity. In a deck, a number without the kind of the group means an
+    /// entity only if no other group has this number.
     pub is_entity: bool,
     /// Members of the group.
     pub members: Members,
@@ -251,11 +253,13 @@ impl Mesh {
 
     /// Find the group of a key among the groups that `is_wanted` accepts.
     ///
-    /// A key is a name or a number. The kind of the group may come before it, such as in `side set 1`. For a
-    /// number without a kind, geometrical entities come after all other groups.
+    /// A key is a name or a number. The kind of the group may come before the name or number, such as in
+    /// `side set 1`. A number without a kind means a geometrical entity only if no other group has this
+    /// number. If the key means several groups of one kind, return the first of these groups. If the key
+    /// means no group, return `None`.
     ///
     /// # Errors
-    /// If the key refers to groups of different kinds; the message lists these groups.
+    /// If the key means groups of different kinds; the message lists these groups.
     pub fn find(
         &self,
         key: &GroupKey,
@@ -381,7 +385,8 @@ pub fn load(path: &Path) -> std::io::Result<Vec<u8>> {
 /// Read a mesh from the bytes of a file.
 ///
 /// # Errors
-/// If the bytes do not follow the format; the message gives file, line and the expected content.
+/// If the bytes do not follow the format, or the mesh has no elements. The message gives the file, the line
+/// (only for Abaqus files and text files of Gmsh) and the expected content.
 pub fn parse(format: Format, path: &Path, bytes: &[u8]) -> Result<Mesh> {
     let mesh = match format {
         Format::Gmsh => gmsh::parse(path, bytes),
@@ -422,6 +427,6 @@ const FARTHEST: f64 = 1e30;
 /// Result with an error message that does not name the file.
 type Fault<T> = std::result::Result<T, String>;
 
-/// Upper limit of zlib's compression ratio: the content of a file is at most this ratio times the file's
-/// size.
+/// Upper limit of zlib's compression ratio: the decompressed content of a file is at most this ratio times
+/// the file's size.
 const LARGEST_RATIO: usize = 1100;

@@ -181,7 +181,7 @@ struct Variable {
     is_record: bool,
 }
 
-/// Return the size of a number of a type, bytes.
+/// Return the size of a number of the netCDF type `kind`, bytes.
 fn size_of_kind(kind: u32) -> Fault<usize> {
     match kind {
         1 | 2 | 7 => Ok(1),
@@ -192,7 +192,7 @@ fn size_of_kind(kind: u32) -> Fault<usize> {
     }
 }
 
-/// Position in the header.
+/// The bytes after the part of the header that has been read.
 struct Cursor<'a> {
     rest: &'a [u8],
     version: u8,

@@ -43,7 +43,7 @@ impl Runs {
         &self.ranges
     }
 
-    /// Return the union of several sets, after the offset of each set is added to its numbers.
+    /// Return the union of several sets, each with an offset that is first added to all numbers of the set.
     pub fn union<'a>(sets: impl Iterator<Item = (&'a [[u64; 2]], u64)>) -> Self {
         let raised = sets.flat_map(|(ranges, offset)| {
             ranges

@@ -15,8 +15,8 @@ use crate::error::{Result, excerpt};
 /// Largest number of different values of an array that describes groups.
 const MOST_GROUPS: usize = 1000;
 
-/// Return the type of a cell by its number in the file, and the node order if it differs from that of
-/// [`super::kind`].
+/// Return the type of the cells with this VTK number, and their node order if the order differs from that of
+/// [`super::kind`]. Return `None` for an unsupported type.
 fn kind(number: i64) -> Option<(Kind, Option<&'static [usize]>)> {
     let (form, nodes) = match number {
         1 => (Form::Point, 1),
@@ -57,7 +57,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
 }
 
 fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
-    // Appended data may not be XML, so separate them from the XML text.
+    // Raw appended data are not valid XML, so separate the appended data from the XML text.
     let mark = b"<AppendedData";
     let start = bytes.windows(mark.len()).position(|window| window == mark);
     let (text, appended) = match start {
@@ -128,13 +128,13 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     Ok(mesh)
 }
 
-/// Members of groups, by kind (true for nodes), name of the array, and value.
+/// Members of groups, by kind (true for nodes, false for elements), name of the array, and value.
 type Groups = IndexMap<(bool, String, i64), Runs>;
 
 /// Encoding of the arrays of a file.
 struct File<'a> {
     is_big: bool,
-    /// Size of a number in a header, bytes.
+    /// Size of a number in the header of a binary array, bytes.
     header: usize,
     is_compressed: bool,
     /// Appended data, and whether the data are raw.
@@ -229,7 +229,7 @@ impl File<'_> {
                 Some(order) => order.iter().map(|k| index(*k)).collect(),
                 None => (0..nodes.len()).map(index).collect(),
             };
-            // The manual of VTK and its programs disagree on which triangle of a wedge comes first. Swap the
+            // The manual and the programs of VTK disagree on which triangle of a wedge comes first. Swap the
             // triangles if the volume is negative.
             if kind == Kind::new(Form::Wedge, 6) {
                 let places: Vec<[f64; 3]> = indices
@@ -287,7 +287,7 @@ impl File<'_> {
             different.insert(*value);
             if different.len() > MOST_GROUPS {
                 // Add an empty group for each of these values. `read` then removes all groups of this array,
-                // because they are more than the limit.
+                // because their number exceeds the limit.
                 for value in different {
                     groups
                         .entry((of_nodes, name.to_owned(), value))
@@ -395,7 +395,7 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Take the next bytes.
+    /// Take the next `count` bytes; base-64 text is decoded.
     fn take(&mut self, count: usize) -> Fault<Vec<u8>> {
         let left = if self.is_raw {
             self.bytes.len()

@@ -14,8 +14,9 @@ use crate::deck::spanned::Spanned;
 pub struct Body {
     /// Name of the material.
     pub material: Text,
-    /// Name of the damage law. Without a damage law, bonds never break. Exceptions are bonds of
-    /// `softening_pmb` and `fatigue_pmb`, and pairs of bodies with their own damage law.
+    /// Name of the damage law. Without a damage law, bonds within the body never break, except bonds of
+    /// `softening_pmb` and `fatigue_pmb`. Bonds to another body can break by the damage law of that body or
+    /// of the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
@@ -37,9 +38,9 @@ pub struct Body {
     pub horizon: Option<Number>,
 }
 
-/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are `x
-/// [y [z]] volume block`, separated by commas, semicolons or white space, unless `columns` or a header names
-/// other columns.
+/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are
+/// `x [y [z]] volume block`, separated by commas, semicolons or white space, unless `columns` or a header
+/// names other columns.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {
@@ -53,7 +54,8 @@ pub struct Points {
     /// elements that belong to no other body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
-    /// Names of the columns of a file without a header: coordinates, `volume`, `block`, and any other names.
+    /// Names of the columns of the file, which take precedence over a header of the file: coordinates,
+    /// `volume`, `block`, and any other names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<Spanned<Vec<String>>>,
     /// Metres per unit of length of the mesh; 1 if not given.
@@ -65,53 +67,53 @@ pub struct Points {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// A box (interval, rectangle) between two corners, in m.
+    /// A box between two corners; a rectangle in plane problems, an interval in 1-D.
     Box {
-        /// Lower corner.
+        /// Lower corner, m.
         lower: Vector,
-        /// Upper corner.
+        /// Upper corner, m.
         upper: Vector,
     },
     /// A disc (plane problems).
     Disc {
-        /// Centre.
+        /// Centre, m.
         centre: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
     },
     /// A cylinder (3-D) between the centres of its two ends.
     Cylinder {
-        /// Centre of one end.
+        /// Centre of one end, m.
         from: Vector,
-        /// Centre of the other end.
+        /// Centre of the other end, m.
         to: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
     },
     /// A ball (3-D).
     Sphere {
-        /// Centre.
+        /// Centre, m.
         centre: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
     },
     /// A polygon (plane problems).
     Polygon {
-        /// Corners [x, y] in order.
+        /// Corners [x, y] in order along the border, m.
         vertices: Spanned<Vec<Vector>>,
     },
     /// A polygon in x and y, extruded along z (3-D).
     Prism {
-        /// Corners [x, y] in order.
+        /// Corners [x, y] in order along the border, m.
         vertices: Spanned<Vec<Vector>>,
-        /// Lower z.
+        /// Lower z, m.
         bottom: Number,
-        /// Upper z.
+        /// Upper z, m.
         top: Number,
     },
     /// The union of the shapes.
     Union(Spanned<Vec<Spanned<Shape>>>),
-    /// The first shape without the parts that lie in any other shape.
+    /// The first shape without the parts that lie in any of the other shapes.
     Difference(Spanned<Vec<Spanned<Shape>>>),
 }
 
@@ -122,7 +124,7 @@ pub struct Set {
     /// A condition on the reference position, such as `"x < 2*dx && y > 0"`.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<Number>,
-    /// A region.
+    /// Region that contains the points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<Spanned<Shape>>,
     /// The points' global ids, from 0.
@@ -134,20 +136,20 @@ pub struct Set {
     /// Number that the file uses for the first point; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
-    /// Name of a group in the meshes that define the points of bodies.
+    /// Name or number of a group in the meshes that define the points of bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Spanned<GroupName>>,
 }
 
-/// A surface that cuts bonds.
+/// A pre-crack: bonds that cross this surface (in plane problems, this line) start broken.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Crack {
-    /// A straight cut (plane problems).
+    /// A straight line (plane problems).
     Segment {
-        /// One end.
+        /// One end, m.
         from: Vector,
-        /// The other end.
+        /// The other end, m.
         to: Vector,
         /// Width of a slot in m, half on each side of the segment; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -155,7 +157,7 @@ pub enum Crack {
     },
     /// A parallelogram (3-D).
     Rectangle {
-        /// A corner.
+        /// A corner, m.
         corner: Vector,
         /// The vector in m from `corner` to an adjacent corner.
         edge_a: Vector,
@@ -167,11 +169,11 @@ pub enum Crack {
     },
     /// A flat disc (3-D).
     Disc {
-        /// Centre.
+        /// Centre, m.
         centre: Vector,
         /// Normal, of any length.
         normal: Vector,
-        /// Radius.
+        /// Radius, m.
         radius: Number,
         /// Width of a slot in m, half on each side of the surface; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -19,15 +19,15 @@ pub struct Initial {
     /// Velocity in m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
-    /// Path of a text file with a row of values for each point, in place of `displacement` and
-    /// `velocity`; relative to the deck.
+    /// Path, relative to the deck, of a text file with a row of values for each point. The file replaces
+    /// `displacement` and `velocity`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
 }
 
-/// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x,
-/// y, z and t for each component. A component of displacement or velocity with the string `"free"` is not
-/// prescribed.
+/// A load, support or temperature of a set. It gives exactly one quantity, such as `displacement` or
+/// `pressure`: an expression of x, y, z and t for each component. A component of displacement or velocity
+/// with the string `"free"` is not prescribed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
@@ -54,8 +54,8 @@ pub struct Condition {
     /// Prescribed temperature, in the unit of the materials' `reference_temperature`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Number>,
-    /// Thickness in m of the layer that carries a traction or pressure; the spacing of the body to which a point
-    /// belongs if not given.
+    /// Thickness in m of the layer that carries a traction or pressure. If not given, the spacing of the body
+    /// to which a point belongs; required for bodies without a single spacing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth: Option<Number>,
     /// Outward normal for a pressure, of any length.

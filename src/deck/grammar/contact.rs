@@ -14,16 +14,17 @@ use crate::deck::spanned::Spanned;
 pub struct Contact {
     /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon.
     /// `"short-range"`: short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`:
-    /// contact only between pairs with their own rule.
+    /// contact only for pairs of bodies with their own `model`.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of both materials in
-    /// series. With `"short-range"`, the spring constant in Pa; by default 15 times the smaller bulk modulus.
+    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of two equally thick
+    /// layers of the two materials in series. With `"short-range"`, the spring constant in Pa; by default 15
+    /// times the smaller bulk modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Distance in m at which contact begins. The default is the mean edge of the two cells, or 1.35 times
-    /// this edge with `"short-range"`. For points that start closer, contact begins below their initial
-    /// distance (0.9 times this distance with `"short-range"`).
+    /// Distance in m of two points at which contact begins. The default is the mean edge of the cells of the
+    /// two points, or 1.35 times this edge with `"short-range"`. Even if `radius` is larger, contact of two
+    /// points begins at most at their initial distance, or at 0.9 times this distance with `"short-range"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
@@ -45,7 +46,8 @@ pub struct Contact {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactPair {
-    /// Names of the two bodies, in any order; the same name twice for contact of a body with itself.
+    /// Names of the two bodies; the same name twice for contact of a body with itself. The order matters only
+    /// for the sign of the contact force in the history.
     pub bodies: Spanned<Vec<Text>>,
     /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -8,13 +8,13 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A count of at least 1 and below 2⁶³, the limit of TOML integers.
+/// A positive integer. In a deck, it must be below 2⁶³, the limit of TOML integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Count(NonZeroU64);
 
 impl Count {
-    /// Wrap a count.
+    /// Create a count.
     ///
     /// # Panics
     /// If `number` is 0.

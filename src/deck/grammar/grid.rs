@@ -7,15 +7,17 @@ use super::{Tables, Text};
 use crate::deck::number::{Edges, Number, Vector};
 use crate::deck::spanned::Spanned;
 
-/// The lattice and the range of the bonds.
+/// The lattice of the points, the horizon, and the storage of the bonds.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Edge of a lattice cell in m, or a list with one edge for each dimension; for bodies given as shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
-    /// Horizon δ in m: points up to this distance are bonded. In an expression, `spacing` is the mean spacing of
-    /// the points of each body without its own horizon, such as `"3.015 * spacing"`.
+    /// Horizon δ in m: points up to this distance are bonded; with the volume corrections `"exact"` and
+    /// `"linear"`, also points that are slightly farther apart. In an expression such as `"3.015 * spacing"`,
+    /// `spacing` is the mean spacing of the points of a body; the expression is evaluated for each body
+    /// without its own horizon.
     pub horizon: Number,
     /// Position in m of a corner of a lattice cell. The default is chosen separately for each
     /// spacing. In each direction it follows from the first body with this spacing that is a whole
@@ -68,8 +70,9 @@ pub enum Family {
 pub enum VolumeCorrection {
     /// No correction: points within the horizon have their full volume.
     None,
-    /// The factor on the volume is clamp((δ + dx/2 − |ξ|)/dx, 0, 1), also for points beyond the horizon
-    /// (PA-HHB).
+    /// The factor on the volume is clamp((δ + dx/2 − |ξ|)/dx, 0, 1), also for points beyond the horizon (Hu,
+    /// Ha & Bobaru 2010; PA-HHB in Seleson 2014). δ is the horizon, dx the spacing, and |ξ| the length of the
+    /// bond.
     Linear,
     /// As `linear`, without points beyond the horizon (LAMMPS; Dipasquale et al. 2014, eq. 1 with eq. 10).
     LinearInside,
@@ -112,9 +115,9 @@ pub struct Pair {
     /// As in `[interface]`; the rule of `[interface]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With
-    /// `"none"` these bonds never break. If neither `damage` nor `strength` is given, the bonds
-    /// break at the smaller threshold of the two bodies.
+    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
+    /// these bonds never break. If neither `damage` nor `strength` is given, the bonds break by the damage
+    /// laws of the two bodies; if the horizons are equal, at the smaller of the two thresholds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical

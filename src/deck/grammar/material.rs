@@ -31,7 +31,7 @@ pub type LawTable = IndexMap<Text, Number>;
 /// Key of the density ρ in kg/m³.
 pub const DENSITY: &str = "density";
 
-/// Key of the viscous damping r in 1/s, a force density −r ρ u̇; 0 if not given.
+/// Key of the viscous damping r in 1/s, which exerts the force density −r ρ u̇; 0 if not given.
 pub const DAMPING: &str = "damping";
 
 /// Key of the coefficient of thermal expansion α in 1/K; 0 if not given.
@@ -80,7 +80,7 @@ impl<'de> Deserialize<'de> for Material {
     }
 }
 
-/// Schema with one property per law; its value is the table of the law's keys.
+/// Schema with one property per law; the value of the property is the table of the law's keys.
 impl JsonSchema for Material {
     fn schema_name() -> Cow<'static, str> {
         "Material".into()
@@ -179,10 +179,12 @@ pub struct CriticalStretch {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
+    /// Fracture energy in J/m² of cracks along `direction`: the normal of the crack is perpendicular to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
+    /// Fracture energy in J/m² of cracks across `direction`: the normal of the crack is parallel to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
     /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
@@ -191,7 +193,8 @@ pub struct CriticalStretch {
     /// The critical stretch s0 itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub critical_stretch: Option<Number>,
-    /// α in the criterion s ≥ s0 − α s_min. The default 0 gives a constant critical stretch.
+    /// α in the critical stretch s0 − α s_min, where s_min is the smallest stretch of the intact bonds of a
+    /// point. The default 0 gives a constant critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
@@ -216,10 +219,12 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// Fracture energy in J/m² of cracks along `direction`, whose normal is perpendicular to `direction`.
+    /// Fracture energy in J/m² of cracks along `direction`: the normal of the crack is perpendicular to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_along: Option<Number>,
-    /// Fracture energy in J/m² of cracks across `direction`, whose normal is parallel to `direction`.
+    /// Fracture energy in J/m² of cracks across `direction`: the normal of the crack is parallel to
+    /// `direction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_across: Option<Number>,
     /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
@@ -232,16 +237,17 @@ pub struct BondEnergy {
     /// "peridigm2021": as Peridigm computed it in 2021; 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
-    /// Whether only bonds that are longer than initially can break. Otherwise compressed bonds break too, as
-    /// in a shear crack.
+    /// Whether only bonds that are longer than initially can break; true if not given. If false, compressed
+    /// bonds break too, as in a shear crack.
     #[serde(default = "yes")]
     pub tension_only: bool,
     /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
-    /// surfaces have fewer bonds, so each bond stores more energy at the same strain and the body breaks at
-    /// its surfaces first. With 1, the critical work of these bonds is larger by the same factor.
+    /// surfaces have fewer bonds, so each bond stores more energy at the same strain, and the body breaks at
+    /// its surfaces first. With 1, the critical work of a bond is larger by the same factor as its energy.
     #[serde(default = "nothing")]
     pub family_correction: Number,
-    /// α: the threshold is computed for the stretch s0 − α s_min instead of s0; 0 if not given.
+    /// α: the threshold is computed for the stretch s0 − α s_min instead of s0, where s_min is the smallest
+    /// stretch of the intact bonds of a point; 0 if not given.
     #[serde(default = "nothing")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
@@ -264,7 +270,7 @@ pub struct Stress {
     pub measure: StressMeasure,
     /// Stress at which bonds break, in Pa.
     pub strength: Number,
-    /// Whether only bonds that are longer than initially can break.
+    /// Whether only bonds that are longer than initially can break; true if not given.
     #[serde(default = "yes")]
     pub tension_only: bool,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not

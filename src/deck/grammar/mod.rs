@@ -1,8 +1,9 @@
 //! Grammar of the deck: the keys and values of each section of the TOML file.
 //!
-//! A number may be a string with an expression of the `[parameters]`, except counts, levels, ids
-//! and seeds. All values are in SI units. Unknown keys are errors. A choice is a table with the
-//! name of the variant (`[material.glass.pmb]`), so that error messages keep the source location.
+//! A number may be a string with an expression of the `[parameters]`, except counts, levels, ids and seeds.
+//! All values are in SI units. Unknown keys are errors. A choice, such as the law of a material, is a table
+//! with the name of the chosen variant (`[material.glass.pmb]`), so that error messages keep the source
+//! location.
 
 mod bodies;
 mod conditions;
@@ -119,7 +120,7 @@ pub struct Deck {
     pub balance: Option<Spanned<Balance>>,
 }
 
-/// Dimension of the problem; in the plane, also its stress state.
+/// Dimension of the problem; for plane problems, also whether the stress or the strain across the plane is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum DimensionName {
     /// A bar.

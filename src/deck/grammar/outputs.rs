@@ -113,7 +113,7 @@ pub struct Output {
     /// Simulated times of outputs in s, in addition to those of `every` or `every_steps`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<Vector>,
-    /// Names of the fields.
+    /// Names of the fields. If not given: `displacement`, `velocity`, `damage` and `strain_energy_density`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
     /// Precision of the fields that change in time: `"double"` (8 bytes per number) or `"single"` (4 bytes).
@@ -152,15 +152,16 @@ pub struct History {
     /// Forces of supports along a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether the number of fragments and the mass of the fragment with the most points are recorded; false
-    /// if not given.
+    /// Whether the number of fragments is recorded, with mass and momentum of the fragment with the most
+    /// points; false if not given.
     #[serde(default)]
     pub fragments: bool,
     /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not
     /// given.
     #[serde(default)]
     pub angular_momentum: Spanned<bool>,
-    /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
+    /// Damage above which a point counts as cracked; 0.35 if not given. Cracked points are counted, and their
+    /// smallest and largest coordinates are recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage_threshold: Option<Number>,
     /// Sums, means and extremes of fields over sets and bodies, by name.
@@ -172,7 +173,8 @@ pub struct History {
     /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks by name. The path and the length of each crack are computed, in 3-D the area and the front.
+    /// Cracks by name. In plane problems, the path and the length of each crack are computed; in 3-D, the
+    /// area and the front.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
     /// Crack tips that are tracked, by name.
@@ -187,8 +189,8 @@ pub struct History {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if
-    /// nothing is given.
+    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if the
+    /// section gives none of its keys.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Text>,
     /// Steps between checkpoints.
@@ -199,8 +201,9 @@ pub struct Checkpoint {
     pub every_time: Option<Number>,
 }
 
-/// Points are rebalanced when rank loads drift apart. The ranks' times in the loops over bonds are compared
-/// at regular intervals. Results do not depend on the rebalancing.
+/// Rebalancing: points are distributed over the ranks again when the loads of the ranks drift apart. The load
+/// of a rank is its time in the loops over bonds; these times are compared at regular intervals. Results do
+/// not depend on the rebalancing.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Balance {
@@ -250,7 +253,7 @@ pub struct CrackPath {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// Position in m; the probe records the nearest point.
+    /// Position in m; the probe records values of the nearest point.
     pub at: Vector,
     /// Names of output fields, such as `"stress"` and `"strain"`, that are recorded in addition to
     /// displacement and velocity.
@@ -265,7 +268,8 @@ pub struct FieldStatistics {
     /// Name of an output field.
     pub field: Text,
     /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
-    /// `"principal_1"`. The magnitude of a vector if not given.
+    /// `"principal_1"`. If not given, the magnitude of a vector; required for tensors, and not allowed for
+    /// fields with one number per point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// A set or a body; all points if not given.
@@ -292,8 +296,8 @@ pub enum Statistic {
 }
 
 /// A front: the position that a field has reached along a line. The search finds the farthest point near the
-/// line whose value exceeds the threshold. Linear interpolation to the next point ahead gives the position
-/// where the value crosses the threshold.
+/// line at which the absolute value of the field exceeds the threshold. Linear interpolation to the next
+/// point ahead gives the position where the absolute value crosses the threshold.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {
@@ -310,7 +314,8 @@ pub struct Front {
     /// Name of an output field.
     pub field: Text,
     /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
-    /// `"principal_1"`. The magnitude of a vector if not given.
+    /// `"principal_1"`. If not given, the magnitude of a vector; required for tensors, and not allowed for
+    /// fields with one number per point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// Threshold that the absolute value of the field must exceed, in the unit of the field.

@@ -12,7 +12,7 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
-    /// The finest level; its spacing is the spacing of the grid divided by 2^levels.
+    /// The finest level; its spacing is the spacing of level 0 divided by 2^levels.
     pub levels: Spanned<u64>,
     /// How the horizon depends on the spacing: with `"delta"`, m = δ/dx is constant; with `"delta-m"`, m
     /// rises with the level.
@@ -21,8 +21,8 @@ pub struct Refinement {
     /// With `"delta-m"`: m of each level from 1 on. If not given, m rises by 1 from level to level.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
-    /// Factor on the horizon of points with a coarser level inside their horizon, so that their families do
-    /// not lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
+    /// Factor on the horizon of points that have points of a coarser level inside their horizon, so that
+    /// their families do not lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
     /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with
@@ -52,14 +52,15 @@ pub struct Trigger {
     /// Smallest damage of a trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Number>,
-    /// A condition on the reference position and t.
+    /// A condition on the reference position and t that makes a point a trigger.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<Number>,
     /// A condition on the reference position and t that every trigger must fulfil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time in s after which points become coarser if no trigger and no point with broken bonds is nearby.
-    /// Each evaluation coarsens by one level. If not given, points never become coarser.
+    /// Time in s after which points become coarser if, during this time, they were not within the horizon of
+    /// a trigger or of a point with broken bonds. Each evaluation coarsens by one level. If not given, points
+    /// never become coarser.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }
@@ -94,7 +95,7 @@ pub enum LevelBonds {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RefinedRegion {
-    /// A condition on the reference position.
+    /// A condition on the reference position that selects the points.
     #[serde(rename = "where")]
     pub condition: Number,
     /// Lowest level of points in this region; the finest level if not given.

@@ -8,8 +8,8 @@ use crate::deck::number::{Number, Vector};
 use crate::deck::spanned::Spanned;
 
 /// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when the
-/// distance of the point to the surface is half the edge of the point's cell, or the initial distance if that
-/// is smaller.
+/// distance of the point to the surface is half the edge of the point's cell, or the initial distance if the
+/// initial distance is smaller.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
@@ -31,20 +31,20 @@ pub struct Rigid {
     /// Initial angular velocity of a free body, 1/s: a vector, or one number in plane problems.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angular_velocity: Option<Spanned<Vec<Number>>>,
-    /// Force at the centre of a free body in N: an expression of t for each component.
+    /// Force in N at the centre of a free body: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Vector>,
     /// Young's modulus in Pa of the layer between points and surface; the modulus of the points' material if
     /// not given. The layer is half a horizon thick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// As in `[contact]`.
+    /// Coefficient of friction, as in `[contact]`; 0 if not given, even if `[contact]` has a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
-    /// As in `[contact]`.
+    /// Coefficient of static friction, as in `[contact]`; `friction` of this body if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// As in `[contact]`.
+    /// Coefficient of restitution, as in `[contact]`; 1 if not given, even if `[contact]` has a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
 }

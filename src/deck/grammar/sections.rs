@@ -41,7 +41,8 @@ pub enum Form {
 pub enum Restart {
     /// No changes.
     Fixed,
-    /// No changes, and no other order of the tables: later tables take precedence over earlier tables.
+    /// No changes, and no other order of the tables. Later bodies, initial values and conditions take
+    /// precedence over earlier ones.
     FixedOrder,
     /// Tables may be added or removed. A table that both decks have must not change.
     WhereUsed,

@@ -12,7 +12,7 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// Text file whose first row names its columns, relative to the deck.
+    /// Path, relative to the deck, of a text file whose first row names the columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
     /// Name of the column of values. If not given and the file has two columns, the column that is not the
@@ -26,7 +26,7 @@ pub struct Table {
     /// Strictly increasing times in s, instead of a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<Spanned<Vec<Number>>>,
-    /// Values at these times.
+    /// Values at `times`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values: Option<Spanned<Vec<Number>>>,
 }

@@ -16,7 +16,7 @@ pub struct Time {
     /// A fixed time step in s; automatic if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
-    /// Automatic step as a fraction of the stable step.
+    /// Upper limit of the automatic step, as a fraction of the stable step.
     #[serde(default = "default_safety")]
     pub safety: Number,
     /// Solution method: `"explicit"` integrates the equation of motion; `"relaxation"` and `"static"` compute
@@ -33,7 +33,7 @@ pub struct Time {
     /// loading.
     #[serde(default = "default_density_scale")]
     pub density_scale: Number,
-    /// Settings of a step that adapts to the number of bonds that break in it.
+    /// Settings of an adaptive time step, which depends on the number of bonds that break in a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
 }
@@ -46,7 +46,8 @@ fn default_safety() -> Number {
     default_number(0.8)
 }
 
-/// A stage of the run. Keys that are not given are as in `[time]`.
+/// A stage of the run. Keys that are not given are as in `[time]`, except `step` and `adaptive` in stages
+/// that are not explicit.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
@@ -56,7 +57,7 @@ pub struct Stage {
     /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Spanned<Method>>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// As in `[time]`; in an explicit stage, the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
     /// As in `[time]`; the value of `[time]` if not given.
@@ -71,13 +72,14 @@ pub struct Stage {
     /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_scale: Option<Number>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// As in `[time]`; in an explicit stage, the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
-    /// Names of the loads and supports that act; all if neither this nor `off` is given.
+    /// Names of the conditions (loads, supports and temperatures) that act; all conditions if neither `on`
+    /// nor `off` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on: Option<Spanned<Vec<Text>>>,
-    /// Names of the loads and supports that do not act.
+    /// Names of the conditions (loads, supports and temperatures) that do not act.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off: Option<Spanned<Vec<Text>>>,
 }
@@ -94,7 +96,7 @@ pub enum Method {
     Explicit,
     /// Adaptive dynamic relaxation in load steps; t is the load parameter.
     Relaxation,
-    /// Newton's method in load steps.
+    /// Newton's method in load steps; t is the load parameter.
     Static,
 }
 
@@ -114,12 +116,12 @@ impl Method {
     }
 }
 
-/// A time step that adapts to the number of bonds that break in it.
+/// An adaptive time step dt, which depends on the number of bonds that break in a step.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
     /// Largest number of bonds of one point that may break in a step. If more bonds break, the step is
-    /// repeated with a smaller dt.
+    /// repeated with a smaller dt, unless dt is already `smallest`.
     #[serde(default = "default_most_broken")]
     pub most_broken: Count,
     /// Largest number of bonds of one point that break in a calm step.
@@ -128,10 +130,10 @@ pub struct Adaptive {
     /// Number of consecutive calm steps after which dt is raised.
     #[serde(default = "default_calm_steps")]
     pub steps: Count,
-    /// Factor on dt when a step is repeated.
+    /// Factor on dt when a step is repeated; dt does not become smaller than `smallest`.
     #[serde(default = "default_reduce")]
     pub reduce: Number,
-    /// Factor by which dt is raised.
+    /// Factor by which dt is raised; dt does not become larger than `largest`.
     #[serde(default = "default_raise")]
     pub raise: Number,
     /// The smallest step in s; 1/100 of the largest if not given.
@@ -169,10 +171,11 @@ pub struct Relaxation {
     /// Number of load steps.
     #[serde(default = "default_load_steps")]
     pub load_steps: Count,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by the sum of the norms of loads and
+    /// reactions.
     #[serde(default = "default_tolerance")]
     pub tolerance: Number,
-    /// Largest number of iterations of a load step.
+    /// Largest number of iterations in a load step; the count restarts whenever bonds break.
     #[serde(default = "default_iterations")]
     pub iterations: Count,
 }
@@ -203,17 +206,17 @@ fn default_iterations() -> Count {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Static {
-    /// Number of load steps; the value of the relaxation if not given.
+    /// Number of load steps; `load_steps` of the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
-    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions. The value of
-    /// the relaxation if not given.
+    /// Largest residual: norm of the unbalanced force, divided by the sum of the norms of loads and
+    /// reactions; `tolerance` of the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Number>,
-    /// Largest number of iterations of a load step.
+    /// Largest number of iterations in a load step; the count restarts whenever bonds break.
     #[serde(default = "default_max_iterations")]
     pub max_iterations: Count,
-    /// Largest number of halvings of a load step without an equilibrium.
+    /// Largest number of times that a load step is halved because no equilibrium is found.
     #[serde(default = "default_max_halvings")]
     pub max_halvings: Spanned<u64>,
 }

@@ -9,14 +9,14 @@ use crate::import::translation::Translation;
 use crate::import::tree::Node;
 use std::f64::consts::PI;
 
-/// Coefficients of a pair of types.
+/// Coefficients of a pair of atom types; the type 0 stands for all types.
 pub(super) struct Coefficients {
     pub(super) types: [u32; 2],
     pub(super) values: Vec<f64>,
     pub(super) node: Node,
 }
 
-/// Return the last coefficients that the script gives for a type.
+/// Return the last coefficients that the script gives for bonds between atoms of a type.
 fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
     let fits = |of: u32| of == 0 || of == kind;
     let found = model.coefficients.iter().rev();
@@ -24,7 +24,8 @@ fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
     found.next()
 }
 
-/// Write materials, damage and bodies. Return type, region and name of each body.
+/// Write materials, damage and bodies. Return for each body its atom type, the name of its region and its
+/// name in the new deck.
 pub(super) fn write_bodies(
     translation: &mut Translation,
     model: &mut Model,
@@ -105,7 +106,8 @@ pub(super) fn write_bodies(
     Ok(names)
 }
 
-/// Write the material and the damage of a type; return both with the horizon.
+/// Write the material and the damage law of an atom type. Return the material, the name of the damage law and
+/// the horizon.
 fn write_material(
     translation: &mut Translation,
     model: &Model,

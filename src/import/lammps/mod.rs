@@ -28,7 +28,7 @@ struct Velocity {
     /// Node id of the command.
     node: usize,
     group: String,
-    /// Velocity components; `None` if neither this command nor an earlier command sets them.
+    /// Velocity components; `None` for a component that neither this command nor an earlier command sets.
     components: [Option<f64>; 3],
 }
 
@@ -55,7 +55,7 @@ struct Model {
     fields: Vec<&'static str>,
 }
 
-/// Return the tree of a script; its keys are the commands.
+/// Return the tree of a script. The keys of the tree are the names of the commands.
 pub fn tree(script: &Script) -> Node {
     let commands = script.commands.iter();
     let entries = commands.map(|command| (command.name().to_owned(), command.node.clone()));
@@ -90,8 +90,8 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     }
     let bodies = write_bodies(translation, &mut model)?;
     let mut run = Run::default();
-    // Fixes and outputs read their variables at the start of a run, so they are translated after all
-    // definitions.
+    // LAMMPS evaluates the variables of fixes and outputs at the start of a run, so fixes and outputs are
+    // translated after all definitions.
     for command in before {
         if !without.contains_key(&command.node.id) {
             simulate(
@@ -111,7 +111,8 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     run.write(translation, &model)
 }
 
-/// Return the node ids of fixes that are defined before the first run but inactive in it, with the reason.
+/// Return the node ids of fixes that are defined before the first run but inactive during this run, with the
+/// reason.
 fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
     let mut acting: HashMap<&str, usize> = HashMap::new();
     let mut without = HashMap::new();

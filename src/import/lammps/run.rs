@@ -121,7 +121,7 @@ pub(super) fn set(
     }
 }
 
-/// Read a number of steps; it must be at least `least`.
+/// Read a number of steps from the argument with the index `k`. The number must be at least `least`.
 fn steps(
     translation: &Translation,
     variables: &Variables,

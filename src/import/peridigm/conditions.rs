@@ -102,8 +102,8 @@ fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
 /// Write a prescribed temperature.
 ///
 /// The reference of thermal expansion is the temperature at the start. If `uniform`, the start temperature is
-/// the reference temperature of all materials. Otherwise, the start temperature is subtracted from the
-/// prescribed temperature.
+/// the reference temperature of all materials that expand. Otherwise, the start temperature is subtracted
+/// from the prescribed temperature.
 fn temperature<'n>(
     translation: &mut Translation,
     sets: &mut Sets<'n>,

@@ -118,7 +118,8 @@ pub(super) fn note_influence(
     }
 }
 
-/// Write the materials. Return the materials, and the headers of those with thermal expansion.
+/// Write the materials. Return the materials, and the section headers of the materials with thermal
+/// expansion.
 pub(super) fn read_materials(
     translation: &mut Translation,
     node: &Node,
@@ -153,8 +154,8 @@ pub(super) fn read_materials(
         let constants = Constants::read(translation, table)?;
         let enough = match *law {
             "pmb" => {
-                // In 2-D Peridigm's bulk modulus is that of the plane. It is k = E/(2(1 − ν)) with ν = 1/3 in
-                // plane stress, and E/(2(1 + ν)(1 − 2ν)) with ν = 1/4 in plane strain.
+                // In 2-D, Peridigm's bulk modulus k is that of the plane. In plane stress, k = E/(2(1 − ν))
+                // with ν = 1/3. In plane strain, k = E/(2(1 + ν)(1 − 2ν)) with ν = 1/4.
                 let factor = if table
                     .get("Plane Stress")
                     .is_some_and(|node| translation.is_true(node))

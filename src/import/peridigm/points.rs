@@ -130,7 +130,7 @@ pub(super) struct Influence {
     pub(super) difference: &'static str,
 }
 
-/// Read the influence function, which holds for all materials.
+/// Read the influence function, which is the same for all materials; `None` if the deck gives none.
 pub(super) fn influence(translation: &Translation, node: &Node) -> Result<Option<Influence>> {
     let Some(function) = node.get("Influence Function") else {
         return Ok(None);

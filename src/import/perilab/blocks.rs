@@ -8,7 +8,8 @@ use crate::import::draft::Value;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Return the `block` of the points of a block; `None` if its body has all elements of the mesh.
+/// Return the value of the key `block` in the `points` of the body of a block; `None` if the body has all
+/// elements of the mesh. `id` is the number of the block, `is_only` is whether the deck has no other block.
 fn block_of_points(
     translation: &Translation,
     points: &Points,

@@ -20,13 +20,14 @@ pub(super) enum MeshBlocks {
     /// The numbers of groups of the mesh. The only block of a deck has all elements if its number is 1,
     /// because the import does not read the mesh, which may have no groups.
     NumbersOrAll,
-    /// Positions, from 1, in this list of element sets; `None` if the mesh cannot be read. The only block of
-    /// a deck has all elements if its number is 1.
+    /// Positions, from 1, in this list of the names of element sets; `None` if the mesh cannot be read. The
+    /// only block of a deck has all elements if its number is 1.
     Sets(Option<Vec<String>>),
 }
 
 impl MeshBlocks {
-    /// Return the kind of groups that are node sets, as a prefix of their names in the new deck.
+    /// Return the prefix that the new deck needs before the name of a node set of the mesh: the kind of the
+    /// groups that PeriLab uses as node sets, or an empty text.
     pub(super) fn prefix_of_sets(&self) -> &'static str {
         match self {
             Self::Sets(_) => "element set ",

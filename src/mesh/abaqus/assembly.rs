@@ -9,7 +9,7 @@ use super::super::{Elements, Group, Members, Mesh, Runs, fault, position};
 use super::{Place, Reader};
 use crate::error::{Result, excerpt};
 
-/// Largest number of nodes, and of elements, of all instances.
+/// Largest total number of nodes, and of elements, of the model and all instances.
 const LARGEST: usize = u32::MAX as usize;
 
 /// Nodes, elements and sets of the model, of a part or of an instance.
@@ -40,14 +40,15 @@ pub(super) struct Set {
     pub(super) numbers: Vec<u64>,
     /// Ranges of numbers: first, last and step.
     pub(super) ranges: Vec<[u64; 3]>,
-    /// Names of other sets, which this set includes.
+    /// Names of other sets, which this set includes, or numbers with the name of an instance, such as
+    /// `part-1-1.7`.
     pub(super) names: Vec<String>,
     /// Whether the members are all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
     pub(super) place: Place,
 }
 
-/// An instance that has been appended to the mesh.
+/// An instance, or the model, that has been appended to the mesh.
 pub(super) struct Placed {
     name: String,
     node_indices: FxHashMap<u64, u32>,
@@ -93,7 +94,7 @@ impl Reader {
         self.append(part)
     }
 
-    /// Append a part, or the model, with its sets to the mesh.
+    /// Append the nodes, elements and sets of an instance, or of the model, to the mesh.
     fn append(&mut self, part: Part) -> Result<()> {
         let (first_node, first_element) = (self.mesh.nodes.len(), self.mesh.elements.len());
         if first_node + part.nodes.len() > LARGEST || first_element + part.elements.len() > LARGEST
@@ -158,7 +159,8 @@ impl Reader {
         });
     }
 
-    /// Return the indices in the mesh of the members of a set. `known` holds the earlier sets of the part.
+    /// Return the indices in the mesh of the members of a set. `own` is the index in `placed` of the instance
+    /// or model that contains the set. `known` holds the earlier sets of this instance or model.
     fn members(
         &self,
         set: &Set,
@@ -297,8 +299,8 @@ impl Reader {
         Ok(self.mesh)
     }
 
-    /// Add a group for each set name of the instances, with the members of all instances. A set of the
-    /// assembly with this name takes precedence.
+    /// For each set name that occurs in instances, add a group with the members of all sets of instances with
+    /// this name. If the assembly has a set with this name, no group is added.
     fn add_bare_names(&mut self) {
         let prefixes: FxHashSet<String> = self
             .placed

@@ -1,6 +1,7 @@
 //! Input files of Abaqus: nodes, elements, sets, surfaces, parts, instances and included files.
 //!
-//! Keywords that would change the mesh are errors. Other keywords are skipped.
+//! Keywords that generate or move nodes or elements are errors. All other keywords that do not describe the
+//! mesh are skipped.
 
 mod assembly;
 mod names;
@@ -20,7 +21,7 @@ use names::{GENERATORS, Keyword, kind};
 /// Largest depth of files that include one another.
 const DEEPEST: usize = 16;
 
-/// Largest number of included files: files can include one another several times.
+/// Largest number of included files. A file that is included several times counts each time.
 const MOST_INCLUDED: usize = 1000;
 
 /// Read a mesh and the files that it includes.
@@ -52,9 +53,9 @@ impl Place {
 enum Data {
     #[default]
     Skipped,
-    /// Nodes, and the index of the set to which they are added.
+    /// Nodes, and the index in `Part::sets` of the set to which the nodes are added.
     Nodes(Option<usize>),
-    /// Elements, and the index of the set to which they are added.
+    /// Elements, and the index in `Part::sets` of the set to which the elements are added.
     Elements(Kind, Option<usize>),
     Set {
         is_generated: bool,
@@ -74,7 +75,7 @@ struct Reader {
     instance: Option<Instance>,
     placed: Vec<Placed>,
     data: Data,
-    /// Numbers of an element whose nodes continue on the next line.
+    /// Number of the element that is being read, followed by the numbers of its nodes that have been read.
     pending: Vec<u64>,
     included: usize,
     place: Place,
@@ -130,8 +131,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Read an included file at the position of its `*INCLUDE` line, or of the keyword line with its
-    /// `INPUT` parameter.
+    /// Read an included file at the position of the `*INCLUDE` line, or of another keyword line, whose
+    /// `INPUT` parameter names the file.
     fn include(&mut self, from: &Path, input: &str, depth: usize) -> Result<()> {
         self.included += 1;
         if depth == DEEPEST || self.included > MOST_INCLUDED {
@@ -291,7 +292,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Begin the data lines of a set. Return the index of these lines in `sets`.
+    /// Begin the data lines of a set. Return the index of these lines in `Part::sets`.
     fn begin_set(&mut self, of: MemberKind, name: &str, keyword: &Keyword) -> usize {
         let set = Set {
             of,

@@ -2,12 +2,12 @@
 
 use super::super::kind::{Form, Kind};
 
-/// Keywords that generate or move nodes or elements.
+/// Keywords that generate or move nodes or elements, or (`SUBMODEL`) refer to the mesh of another model.
 pub(super) const GENERATORS: [&str; 8] = [
     "NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM", "SUBMODEL",
 ];
 
-/// Return the type of an element from its name, such as `C3D8R`.
+/// Return the type with a name such as `C3D8R`; `None` for an unsupported type.
 pub(super) fn kind(name: &str) -> Option<Kind> {
     const SOLIDS: [&str; 6] = ["C3D", "AC3D", "DC3D", "DCC3D", "Q3D", "SC"];
     const FACES: [&str; 12] = [
@@ -44,7 +44,7 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
         };
     }
     if let Some(count) = nodes(&FACES) {
-        // `STRI65` has 6 nodes and 5 degrees of freedom each.
+        // `STRI65` has 6 nodes with 5 degrees of freedom per node.
         return match count {
             3 | 6 => of(Form::Triangle, count),
             65 => of(Form::Triangle, 6),
