@@ -471,7 +471,7 @@ pub fn run_time(
     let explicit = explicit.filter(|(stage, _)| !stage.time.is_quasi_static());
     let explicit: f64 = explicit.map(|(_, (_, steps))| steps).sum();
     if explicit > 0.0 {
-        let whole = duration(seconds.step * explicit / parts);
+        let whole = duration(seconds.evaluation * explicit / parts);
         let rows = duration(seconds.row * cost.rows as f64 / parts);
         let outputs = cost.results.iter().zip(&seconds.outputs);
         let outputs = outputs.map(|(result, seconds)| seconds * result.outputs as f64);
@@ -484,7 +484,7 @@ pub fn run_time(
             ),
         );
     }
-    let evaluation = duration(seconds.step / parts);
+    let evaluation = duration(seconds.evaluation / parts);
     if problem.has_relaxation() {
         report.line(
             "run time",

@@ -51,7 +51,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
             "[time] static: is for `method = \"static\"`; give this `method`, or remove the table";
         return Err(scope.error(table.span(), message));
     }
-    let stretch = TimeSegment {
+    let segment = TimeSegment {
         key: "[time]",
         length: end,
         end,
@@ -69,7 +69,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         density_scale: &time.density_scale,
         adaptive: time.adaptive.as_ref(),
     };
-    stretch.time(scope)
+    segment.time(scope)
 }
 
 /// Validate the stages of the run, whose time axis is `whole`.
@@ -98,7 +98,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
         }
         let inherited_step = time.step.as_ref().filter(|_| is_explicit);
         let inherited_rule = time.adaptive.as_ref().filter(|_| is_explicit);
-        let stretch = TimeSegment {
+        let segment = TimeSegment {
             key: "[[stage]]",
             length: end - start,
             end,
@@ -111,7 +111,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
             adaptive: stage.adaptive.as_ref().or(inherited_rule),
         };
         stages.push(problem::Stage {
-            time: stretch.time(scope)?,
+            time: segment.time(scope)?,
             acting: acting(scope, deck, stage)?,
         });
         start = end;

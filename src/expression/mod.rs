@@ -53,6 +53,7 @@ use std::sync::Arc;
 use crate::error::{self, Error};
 use evaluate::Instruction;
 pub use table::Table;
+pub(crate) use token::number_length;
 
 /// A variable of expressions, as opposed to a named parameter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

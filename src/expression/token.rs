@@ -176,7 +176,7 @@ fn first_token(text: &str, character: char) -> Result<(Kind, usize), (usize, Str
 }
 
 /// Return the length (bytes) of the number at the start of the text; 0 without a number.
-fn number_length(text: &[u8]) -> usize {
+pub fn number_length(text: &[u8]) -> usize {
     let digits = |from: usize| {
         text.get(from..)
             .unwrap_or_default()

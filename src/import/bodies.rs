@@ -6,7 +6,6 @@ use super::elastic::Constants;
 use super::log::{Fate, UNUSED_DAMAGE};
 use super::translation::Translation;
 use super::tree::{Node, is_key};
-use crate::error::Result;
 
 /// A material of the new deck.
 #[derive(Debug, Clone)]
@@ -75,15 +74,12 @@ const BOND_BASED: [&str; 1] = ["pmb"];
 /// Write the damage law of a body and return the name of the damage law. `horizon` is the horizon of the
 /// body, m. Return `None` if the material law breaks bonds by energy only and the elastic constants do not
 /// determine the fracture energy.
-///
-/// # Errors
-/// At present, the function returns no errors.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,
     material: &Material,
     horizon: f64,
-) -> Result<Option<String>> {
+) -> Option<String> {
     let by_energy = BY_ENERGY.contains(&material.law);
     match &model.criterion {
         Criterion::Stretch(value, _) if !by_energy => {
@@ -96,7 +92,7 @@ pub fn damage(
                 .draft
                 .section(&header)
                 .set("critical_stretch", value.clone());
-            Ok(Some(name))
+            Some(name)
         }
         Criterion::Stretch(_, stretch) => {
             let Some([bulk, shear]) = material.constants.moduli() else {
@@ -105,7 +101,7 @@ pub fn damage(
                     material.law
                 );
                 translation.log.left_out(&model.node, note);
-                return Ok(None);
+                return None;
             };
             // State-based form of the relation of Silling & Askari (2005):
             // G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)). For k = 5 G/3, this is the relation 9 k δ s0²/5 of
@@ -123,7 +119,7 @@ pub fn damage(
             translation.log.approximated(&model.node, note);
             let section = translation.draft.section(&header);
             section.set("fracture_energy", Value::number(energy));
-            Ok(Some(name))
+            Some(name)
         }
         Criterion::Energy {
             energy,
@@ -147,7 +143,7 @@ pub fn damage(
             if !tension_only && !bond_based {
                 section.set("tension_only", Value::Flag(false));
             }
-            Ok(Some(name))
+            Some(name)
         }
     }
 }

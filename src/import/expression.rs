@@ -3,7 +3,7 @@
 //! Peridigm uses statements of C, such as `if(t<=1){value=2*t;} else{value=2;}`. PeriLab uses Julia, and the
 //! short form `if t>2 0 else 20 end`. LAMMPS uses formulas of variables.
 
-use crate::expression::{Expression, Variable};
+use crate::expression::{Expression, Variable, number_length};
 
 /// Maximum nesting depth of parentheses and blocks.
 const DEEPEST: usize = 48;
@@ -100,32 +100,6 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
         rest = rest[length..].trim_start();
     }
     Ok(tokens)
-}
-
-/// Return the length of the number at the start of a text, or 0.
-fn number_length(text: &[u8]) -> usize {
-    let digits = |from: usize| {
-        text[from.min(text.len())..]
-            .iter()
-            .take_while(|b| b.is_ascii_digit())
-    };
-    let whole = digits(0).count();
-    let mut length = whole;
-    if text.get(length) == Some(&b'.') {
-        let fraction = digits(length + 1).count();
-        if whole + fraction == 0 {
-            return 0;
-        }
-        length += 1 + fraction;
-    }
-    if length > 0 && matches!(text.get(length), Some(b'e' | b'E')) {
-        let sign = usize::from(matches!(text.get(length + 1), Some(b'+' | b'-')));
-        let exponent = digits(length + 1 + sign).count();
-        if exponent > 0 {
-            length += 1 + sign + exponent;
-        }
-    }
-    length
 }
 
 fn is_symbol(token: &Token, symbol: &str) -> bool {

@@ -255,6 +255,7 @@ impl Outputs {
             };
             let section = if is_history { "history" } else { "output" };
             let note = match (index, text.contains(' ')) {
+                (0, true) => "every_steps; the first number counts for all steps",
                 (_, true) => "every; the first number counts for all steps",
                 (0, _) => "every_steps",
                 _ => "every: the length of the run over it",

@@ -71,12 +71,18 @@ impl EnergyWatch {
     }
 
     /// Check the energy gain of a row of the history. Return a warning at the first row with a gain above
-    /// [`WARNING_GAIN`]. The result is the same on all ranks.
+    /// [`WARNING_GAIN`]. `is_last`: whether this is the last row of the run. The result is the same on all
+    /// ranks.
     ///
     /// # Errors
-    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last row of a stage, above
+    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
     /// [`CERTAIN_GAIN`] in one row, or NaN.
-    pub fn check(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
+    pub fn check(
+        &mut self,
+        row: &HistoryRow,
+        clock: &Clock,
+        is_last: bool,
+    ) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
         // Negative fracture energy means that breaking bonds have added energy, which would hide part of the
         // gain.
@@ -95,7 +101,7 @@ impl EnergyWatch {
         };
         let fatal = relative_gain > FATAL_GAIN;
         let certain = relative_gain.is_nan() || relative_gain > CERTAIN_GAIN;
-        if certain || (fatal && (self.suspected || clock.is_over())) {
+        if certain || (fatal && (self.suspected || is_last)) {
             let message = format!("{}; reduce the time step ({})", text(), self.steps);
             return Err(Error::run(message));
         }

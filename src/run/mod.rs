@@ -352,7 +352,7 @@ impl<'a> Job<'a> {
                 if let (Some(energy), Some(row), false) =
                     (&mut energy, recorder.row_of(&clock), is_quasi_static)
                 {
-                    let growth = energy.check(row, &clock);
+                    let growth = energy.check(row, &clock, complete);
                     let of_breaking = energy.check_breaking(row, &clock);
                     match growth {
                         Ok(text) => {

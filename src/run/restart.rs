@@ -1,9 +1,12 @@
 //! Restart from a checkpoint.
 
+use std::time::Instant;
+
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::output::checkpoint::{Checkpoints, Header, read_header, read_saved};
 use crate::solver::Simulation;
+use crate::solver::simulation::Times;
 
 use super::checkpoints::{CheckpointWriter, fingerprint};
 use super::files::Files;
@@ -29,6 +32,7 @@ pub fn restart<const D: usize>(
     physics: String,
     observer: &mut dyn Observer,
 ) -> Result<Restart> {
+    let start = Instant::now();
     let comm: &dyn Communicator = simulation.comm;
     let mut warn = |message| observer.message(&Message::Warning(message));
     let (checkpoints, path) = Checkpoints::open(comm, &files.folder, &mut warn)?;
@@ -53,6 +57,11 @@ pub fn restart<const D: usize>(
     let order = simulation.id_order();
     let saved = read_saved(comm, &path, &order)?;
     simulation.restore(&order, &saved)?;
+    // Restoring belongs to the set-up; the times of the time loop start from 0.
+    simulation.times = Times {
+        set_up: simulation.times.set_up + start.elapsed(),
+        ..Times::default()
+    };
     Ok(Restart {
         checkpoints: CheckpointWriter::after(checkpoints, physics, fingerprint),
         header,

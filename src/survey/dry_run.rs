@@ -44,8 +44,9 @@ pub struct DryRun {
 /// Measured wall-clock times on one rank, s.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seconds {
-    /// A time step; with load steps, an iteration.
-    pub step: f64,
+    /// A force evaluation in the first stage: an explicit time step makes one; an iteration of a load step,
+    /// one or more.
+    pub evaluation: f64,
     /// A row of the history.
     pub row: f64,
     /// The fields of an output, without writing them to the disk, for each of [`Problem::outputs`].
@@ -53,7 +54,7 @@ pub struct Seconds {
 }
 
 /// Set up a problem on one rank, and compute its figures for `ranks` ranks. With `measure`, also measure the
-/// times of a step, a history row and the outputs.
+/// times of a force evaluation, a history row and the outputs.
 ///
 /// # Errors
 /// Same as for a run before its first step.
@@ -111,7 +112,7 @@ fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
     })
 }
 
-/// Measure the wall-clock times of a step, a history row and the outputs.
+/// Measure the wall-clock times of a force evaluation, a history row and the outputs.
 fn measured_times<const D: usize>(
     problem: &Problem,
     simulation: Simulation<'_, D>,
@@ -119,12 +120,14 @@ fn measured_times<const D: usize>(
     let mut stepper = Stepper::new(simulation);
     // The first step warms the caches.
     stepper.advance();
+    let before = stepper.times().evaluations;
     let (start, mut steps) = (Instant::now(), 0);
     while start.elapsed() < MEASUREMENT && steps < MAX_STEPS {
         stepper.advance();
         steps += 1;
     }
-    let step = start.elapsed().as_secs_f64() / f64::from(steps);
+    let evaluations = stepper.times().evaluations - before;
+    let evaluation = start.elapsed().as_secs_f64() / evaluations as f64;
     let simulation = stepper.at_full_step();
     let mut observer = HistoryObserver::new(simulation)?;
     let start = Instant::now();
@@ -140,5 +143,9 @@ fn measured_times<const D: usize>(
         start.elapsed().as_secs_f64()
     });
     let outputs = outputs.collect();
-    Ok(Seconds { step, row, outputs })
+    Ok(Seconds {
+        evaluation,
+        row,
+        outputs,
+    })
 }

@@ -123,7 +123,8 @@ fn without_effect<const D: usize>(
                     let expansion = simulation.model.expansion_of(*point as usize);
                     expansion.stretch_per_kelvin != 0.0
                 };
-                if !own.iter().any(expands) {
+                let expanding = own.iter().filter(|point| expands(point)).count();
+                if total(simulation.comm, expanding as u64) == 0 {
                     let words = "acts on bodies without `thermal_expansion` and has no effect";
                     warn(condition, words, warnings);
                 }

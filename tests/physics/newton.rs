@@ -295,14 +295,14 @@ fn the_worst_point_is_named_where_halving_does_not_help() {
                 assert!(!simulation.is_over());
             }
         });
-        let wanted = "t = 2.500000e-1 s: no equilibrium within 1 iterations, the load step halved 2 times; the forces \
-                      out of balance are still ";
+        let wanted = "t = 2.500000e-1 s: no equilibrium after 1 iteration(s), the load step halved 2 times: the \
+                      unbalanced forces are still ";
         assert!(texts[0].starts_with(wanted), "{}", texts[0]);
         for words in [
             " of loads and reactions, most of them ",
             " N at point ",
             " of body `b`, [",
-            "Otherwise give [time.static] more `load_steps`, `max_iterations` or `max_halvings` or a larger `tolerance`",
+            "If the body can carry the loads, give [time.static] more `load_steps`, `max_iterations` or `max_halvings` or a larger `tolerance`",
         ] {
             assert!(texts[0].contains(words), "{}", texts[0]);
         }

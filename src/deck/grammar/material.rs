@@ -195,7 +195,7 @@ pub struct CriticalStretch {
     pub critical_stretch: Option<Number>,
     /// α in the critical stretch s0 − α s_min, where s_min is the smallest stretch of the intact bonds of a
     /// point. The default 0 gives a constant critical stretch.
-    #[serde(default = "default_alpha")]
+    #[serde(default = "zero")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
     /// given.
@@ -244,11 +244,11 @@ pub struct BondEnergy {
     /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
     /// surfaces have fewer bonds, so each bond stores more energy at the same strain, and the body breaks at
     /// its surfaces first. With 1, the critical work of a bond is larger by the same factor as its energy.
-    #[serde(default = "nothing")]
+    #[serde(default = "zero")]
     pub family_correction: Number,
     /// α: the threshold is computed for the stretch s0 − α s_min instead of s0, where s_min is the smallest
     /// stretch of the intact bonds of a point; 0 if not given.
-    #[serde(default = "nothing")]
+    #[serde(default = "zero")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
     /// given.
@@ -320,10 +320,6 @@ fn yes() -> bool {
     true
 }
 
-fn nothing() -> Number {
-    default_number(0.0)
-}
-
-fn default_alpha() -> Number {
+fn zero() -> Number {
     default_number(0.0)
 }

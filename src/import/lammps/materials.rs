@@ -201,7 +201,7 @@ fn write_material(
         criterion: Criterion::Stretch(Value::number(stretch), stretch),
         node: node.clone(),
     };
-    let damage = bodies::damage(translation, &damage, &material, horizon)?;
+    let damage = bodies::damage(translation, &damage, &material, horizon);
     if let (Some(damage), true) = (&damage, alpha != 0.0) {
         let kind = if law == "ordinary_plastic" {
             "energy"

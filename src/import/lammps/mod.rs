@@ -51,7 +51,6 @@ struct Model {
     drag: Option<f64>,
     /// Velocities of groups in the order of the commands.
     velocities: Vec<Velocity>,
-    computes: Vec<(String, String)>,
     fields: Vec<&'static str>,
 }
 

@@ -224,8 +224,6 @@ pub(super) fn simulate(
             match FIELDS.iter().find(|(known, _)| *known == style) {
                 Some((_, field)) => {
                     translation.log.taken(node, format!("field {field}"));
-                    let id = arguments.first().copied().unwrap_or("");
-                    model.computes.push((id.to_owned(), style.to_owned()));
                     if !model.fields.contains(field) {
                         model.fields.push(field);
                     }

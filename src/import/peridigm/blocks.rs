@@ -58,7 +58,7 @@ pub(super) fn read_blocks(
             let model_name = translation.text(damage_node, "Damage Model")?;
             match damages.iter().find(|model| is_key(&model.read, model_name)) {
                 Some(model) => {
-                    damage = bodies::damage(translation, model, material, horizon)?;
+                    damage = bodies::damage(translation, model, material, horizon);
                     translation.log.taken(damage_node, "damage of the bodies");
                 }
                 None => translation

@@ -231,10 +231,7 @@ fn law_keys(
             take(section, "tau b", "relaxation_time")?;
         }
         "correspondence" => {
-            let model = table
-                .get("Material Model")
-                .and_then(Node::text)
-                .unwrap_or("");
+            let model = model.unwrap_or("");
             if model.contains("Plastic") && !model.contains("Visco") || model.contains("Hardening")
             {
                 let disabled = table.get("Disable Plasticity");

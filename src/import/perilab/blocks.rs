@@ -180,7 +180,7 @@ pub(super) fn read_blocks(
                 .find(|model| is_key(&model.read, model_name))
             {
                 Some(model) => {
-                    damage = bodies::damage(translation, model, &material, horizon)?;
+                    damage = bodies::damage(translation, model, &material, horizon);
                     translation.log.taken(damage_node, "damage of the body");
                 }
                 None => translation

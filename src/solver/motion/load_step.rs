@@ -80,7 +80,7 @@ impl LoadStep {
     /// Return the beginning of the error message for a load step that failed at `time` (s).
     fn failure(&self, time: f64) -> String {
         let iterations = self.since_breaking;
-        format!("t = {time:.6e} s: no equilibrium within {iterations} iterations")
+        format!("t = {time:.6e} s: no equilibrium after {iterations} iteration(s)")
     }
 
     /// Compute the residual from the squared norms: the values of [`balance`], summed over all points.
@@ -321,20 +321,21 @@ impl<const D: usize> Simulation<'_, D> {
             self.check_pieces_are_held(&failure)?;
         }
         let residual = self.load_step.residual;
-        let balance = if residual.is_finite() {
-            let worst = self.worst_point();
+        let remedy = self.time_rule().method.remedy();
+        let cause = if residual.is_finite() {
             format!(
-                "are still {residual:.1e} of loads and reactions{worst}. More load than the body bears?"
+                "the unbalanced forces are still {residual:.1e} of loads and reactions{}. If the body can carry \
+                 the loads, {remedy} or a larger `tolerance`",
+                self.worst_point()
             )
         } else if residual.is_nan() {
-            "are not finite.".to_owned()
+            "forces are not finite; reduce the loads".to_owned()
         } else {
-            "are more than round-off, without loads and reactions.".to_owned()
+            format!(
+                "the unbalanced forces are more than round-off, but there are no loads and reactions; {remedy}"
+            )
         };
-        Err(Error::run(format!(
-            "{failure}; the forces out of balance {balance} Otherwise {} or a larger `tolerance`",
-            self.time_rule().method.remedy()
-        )))
+        Err(Error::run(format!("{failure}: {cause}")))
     }
 
     /// Return a text for error messages that describes the point with the largest unbalanced force; empty if
