@@ -5,7 +5,7 @@ use fissure::run::{Outcome, Phases, Summary};
 
 use super::format::{count, si};
 
-/// Print the figures of a run with at least one step. For rank 0.
+/// Print the figures of a run with at least one step. Call on rank 0 only.
 pub fn print(outcome: &Outcome, threads: usize) {
     let summary = &outcome.summary;
     let (energies, broken) = match &outcome.last_row {
@@ -29,8 +29,8 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    // After a refinement, the number of bonds is known for the last points only, so the rate is omitted.
-    // After a rebalance, the rate is omitted too, because the time of a rebalance also counts as
+    // The rate is omitted after a refinement, because the number of bonds before the refinement is not
+    // known. The rate is omitted after a rebalance too, because the time of a rebalance also counts as
     // `regridding`.
     let regrids = summary.seconds.regridding > 0.0;
     if !regrids {
