@@ -55,7 +55,8 @@ def horizons(rule, level):
 def deck(rule, levels, margin, factor, bonds, seen, end):
     """Return the text of the deck with an output at the time `seen`; 0 levels mean no refinement.
 
-    The patch of each level has a radius of `margin` horizons of the next coarser level.
+    The patch of each level has a radius of `margin` horizons of the next coarser level. `factor` is the value of the key
+    `interface_factor` (None for its default), and `bonds` the value of the key `bonds`.
     """
     text = DECK.read_text()
     text = re.sub(r"(?m)^end = 0\.17 .*$", f"end = {end}", text)
