@@ -51,9 +51,9 @@ pub struct Figures {
     pub bonds: f64,
     /// Number of ranks.
     pub ranks: usize,
-    /// Threads of rank 0.
+    /// Number of threads of rank 0.
     pub threads: usize,
-    /// Threads of all ranks.
+    /// Number of threads of all ranks together.
     pub cores: f64,
     /// Number of measured steps.
     pub steps: f64,

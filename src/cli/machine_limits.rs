@@ -20,7 +20,7 @@ pub struct Limits {
     pub arithmetic: f64,
 }
 
-/// Measure both rates. Collective.
+/// Measure the memory bandwidth and the rate of floating-point operations. Collective.
 pub fn measure(comm: &dyn Communicator, threads: usize) -> Limits {
     Limits {
         bandwidth: bandwidth(comm, threads),

@@ -276,8 +276,8 @@ struct BenchArguments {
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Do not measure the memory bandwidth and the arithmetic rate, which needs some 100 MiB and several
-    /// seconds.
+    /// Do not measure the memory bandwidth and the arithmetic rate. This measurement needs some 100 MiB and
+    /// several seconds.
     #[arg(long)]
     no_limits: bool,
 

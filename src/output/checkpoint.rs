@@ -171,7 +171,7 @@ impl Checkpoints {
     }
 
     /// Find the newest intact checkpoint of the folder. Return the checkpoints of the folder, and the path of
-    /// the newest one. `warn` receives a message for each damaged checkpoint. Collective.
+    /// the found checkpoint. `warn` receives a message for each damaged checkpoint. Collective.
     ///
     /// # Errors
     /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint,

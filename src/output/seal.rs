@@ -124,8 +124,8 @@ fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
     Ok(crate::comm::total(comm, own))
 }
 
-/// Sum the words `first` to `end` − 1 of the first `length` bytes of a file, each word mixed with its index.
-/// The last word of the file is padded with zeros.
+/// Sum the 8-byte words `first` to `end` − 1 of the first `length` bytes of a file, each word mixed with its
+/// index. The last word of these bytes is padded with zeros.
 fn sum_words(path: &Path, first: u64, end: u64, length: u64) -> std::io::Result<u64> {
     let mut file = File::open(path)?;
     file.seek(SeekFrom::Start(8 * first))?;

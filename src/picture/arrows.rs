@@ -19,8 +19,8 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Length of the vectors, projected to the drawing plane, whose arrows are the longest; the arrows of
-    /// longer vectors are cut. `None` to choose this length from the drawn points.
+    /// Length, in the drawing plane, of the vector that the longest arrow represents. The arrows of longer
+    /// vectors are cut. `None` to choose this length from the drawn points.
     pub longest_arrow: Option<f64>,
 }
 
@@ -85,7 +85,7 @@ struct Root {
     place: [f64; 2],
     /// Vector from the tail to the tip of the arrow, to the right and down, in pixels.
     arrow: [f64; 2],
-    /// The vector is longer than the vectors of the longest arrows, so the arrow is cut.
+    /// The vector is longer than the vector that the longest arrow represents, so the arrow is cut.
     is_cut: bool,
     /// Depth of the point, m; points with a larger depth are nearer to the camera. 0 in flat views.
     depth: f64,

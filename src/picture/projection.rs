@@ -331,7 +331,7 @@ mod tests {
             assert!((direction[0] - outward[0]).abs() < 1e-12, "{direction:?}");
             assert!((direction[1] - outward[1]).abs() < 1e-12, "{direction:?}");
         }
-        // A map, seen from above: x below, y on the left.
+        // A map, seen from above: the ruler of x is below, the ruler of y on the left.
         let camera = Camera::new(-90.0, 90.0);
         assert_eq!(camera.outer_edge(Axis::X), Some(([false; 3], [0.0, 1.0])));
         assert_eq!(camera.outer_edge(Axis::Y), Some(([false; 3], [-1.0, 0.0])));

@@ -72,8 +72,8 @@ pub struct Scene<'a> {
     /// Value of each point, which determines the colour; a point whose value is NaN is grey, or pale blue in
     /// the grey map.
     pub values: &'a [f64],
-    /// Name of the values, for the colour bar. A name that contains "damage" is a damage: by default, it has
-    /// the colour map of damage and a range from 0.
+    /// Name of the values, for the colour bar. If the name contains "damage", the values have by default the
+    /// colour map of damage and a range from 0.
     pub field: &'a str,
     /// Unit of the values without prefix; empty if dimensionless.
     pub unit: &'a str,
@@ -309,11 +309,12 @@ impl Marks<'_> {
         all.filter(|(_, vector)| vector.iter().all(|component| component.is_finite()))
     }
 
-    /// Return the length of the projected vectors whose arrows are the longest; 0 without vectors.
+    /// Return the length, in the drawing plane, of the vector that the longest arrow represents; 0 without
+    /// vectors.
     ///
-    /// This length is the largest length of a projected vector. If few vectors are much longer than all
-    /// others, such as the velocities of splinters, this length is a percentile of the lengths, and longer
-    /// arrows are cut.
+    /// Usually, this vector is the longest of the projected vectors. If few vectors are much longer than all
+    /// others, such as the velocities of splinters, the returned length is a percentile of the lengths, and
+    /// longer arrows are cut.
     pub fn longest_arrow(&self) -> f64 {
         let Some(vectors) = &self.scene.vectors else {
             return 0.0;

@@ -228,7 +228,7 @@ def run(options, limit, law, dx, ratio):
         if len(earlier["time"]) and earlier["time"][-1] > 0.999 * DURATION:
             return earlier
     common.run(options, folder, deck(law, dx), [f"dx={dx!r}", f"m={ratio!r}", "outputs=1"])
-    # Fields are not needed.
+    # Remove the fields and the checkpoints, which are not needed.
     for name in ("result.vtkhdf", "result.xdmf", "checkpoint_0.h5", "checkpoint_1.h5"):
         (folder / name).unlink(missing_ok=True)
     return common.history(folder)

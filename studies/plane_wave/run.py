@@ -131,7 +131,7 @@ def main():
         name = f"{rule}_{level}_{margin}_{factor}_{bonds}"
         result = run(arguments, name, deck(rule, level, margin, factor, bonds, seen, after))
         energy = Energy(result)
-        # The output times of the two runs differ slightly, because their time steps differ.
+        # The output times of this run and of the uniform run differ slightly, because the time steps differ.
         shift = SPEED * (energy.time - uniform.time)
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
         near = np.abs(energy.places - np.array(CENTRE)).max(axis=1) < 5 * DX

@@ -388,7 +388,7 @@ class Runner:
             with self.lock:
                 if self.stopped:
                     return STOPPED
-                # In a separate session, the run does not receive the signal of Ctrl-C; this script sends it a signal.
+                # In a separate session, the run does not receive the signal of Ctrl-C. This script signals the run instead.
                 child = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
                 self.children.add(child)
             if self.stopped:
