@@ -90,7 +90,8 @@ impl Figures {
         self.phases.last().map_or(f64::NAN, |phase| phase.slowest)
     }
 
-    /// Return the number of neighbours visited per second.
+    /// Return the bond updates per second. One update is the work of a step on one directed bond, in all
+    /// passes.
     fn updates(&self) -> f64 {
         self.bonds * self.steps / self.seconds()
     }

@@ -199,7 +199,8 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
 /// Largest number of bodies for which the contact rule of every pair is listed.
 const MOST_PAIRS: usize = 6;
 
-/// Append the numbers of bonds between bodies, and the thresholds at which these bonds break.
+/// Append the numbers of bonds between bodies, and the damage thresholds of the pairs of bodies for which the
+/// deck gives the damage.
 pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;

@@ -56,7 +56,8 @@ fn tolerance(text: &str) -> std::result::Result<(Option<String>, f64), String> {
     }
 }
 
-/// Allowed differences, as fractions of the largest value in the first result.
+/// Allowed differences of fields and columns, each as a fraction of the largest absolute value of the field
+/// or column in the first result.
 struct Tolerances<'a> {
     general: f64,
     named: Vec<(&'a str, f64)>,

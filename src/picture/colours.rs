@@ -73,8 +73,8 @@ impl ColourMap {
     }
 }
 
-/// Test whether the name of a field contains "damage", in small or capital letters. The values of such a field
-/// are at least 0.
+/// Test whether the name of a field contains "damage", in small or capital letters. The values of such a
+/// field are at least 0.
 pub fn is_damage(field: &str) -> bool {
     field.to_lowercase().contains("damage")
 }

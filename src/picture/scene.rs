@@ -357,8 +357,8 @@ pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> boo
     (place[axis.index()] - position).abs() <= 0.75 * edge
 }
 
-/// Return the range from `low` to `high`, or a wider range if both ends are equal up to round-off. If an end
-/// is not finite, return the range from 0 to 1.
+/// Return the range from `low` to `high`. If both ends are equal up to round-off, return a wider range, which
+/// is 0 to 1 for damage. If an end is not finite, return the range from 0 to 1.
 fn widened(low: f64, high: f64, is_damage: bool) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     let spread = high - low;

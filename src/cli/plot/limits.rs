@@ -189,7 +189,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Return a frame that encloses the frames of several outputs; `None` if no output has points.
+    /// Return a frame that encloses the frames of several outputs; `None` if no output has a frame.
     ///
     /// # Errors
     /// If an output is damaged.

@@ -86,7 +86,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "FIELD")]
     pub(super) vectors: Option<String>,
 
-    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: damage for the field damage, otherwise viridis].
+    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: coolwarm with --minus, damage for the
+    /// field damage, otherwise viridis].
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
