@@ -110,7 +110,10 @@ def replace_once(text, old, new, deck):
 
 
 def run(options, folder, text, assignments=()):
-    """Write the text of a deck into a folder and run the deck, with the result in the folder and `--set` for each assignment."""
+    """Write the text of a deck into a folder and run the deck, with the result in the folder and `--set` for each assignment.
+
+    If the run fails, exit with the exit code of the run.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / "deck.toml"
     written.write_text(text)

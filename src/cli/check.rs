@@ -25,7 +25,7 @@ const MAX_BONDS: f64 = 1.5e8;
 /// Validate the decks and print a report on each deck.
 ///
 /// # Errors
-/// If a deck is invalid or the output cannot be written.
+/// If a deck is invalid, if the output cannot be written, or if the threads cannot be started.
 pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     launch::start_threads(launch::threads(None))?;
     each(&arguments.decks, |deck| {

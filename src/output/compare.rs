@@ -424,7 +424,7 @@ mod tests {
         let block = Block::of(&ids(&[1, 3, 4, 9], &[1, 2, 4, 5]), [true, true]);
         assert_eq!(block.pairs, [[0, 0], [2, 2]]);
         assert_eq!(block.used, [4, 4]);
-        // The second result has further blocks, and 9 may be in one of them.
+        // The second result has further blocks, one of which may have the id 9.
         let block = Block::of(&ids(&[1, 9], &[1, 2, 4]), [true, false]);
         assert_eq!((block.pairs.len(), block.used), (1, [1, 3]));
         let block = Block::of(&ids(&[], &[7, 8]), [true, true]);

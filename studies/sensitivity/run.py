@@ -339,7 +339,10 @@ def chosen_rows(text, count):
 
 
 def prepare(study, options):
-    """Create the output folder; fail if it contains another study."""
+    """Create the output folder with the table of values.
+
+    If the folder contains another study, delete the runs of that study with --overwrite, and fail without this option.
+    """
     table = options.output / "table.txt"
     # The values of `fixed` are part of the table, so a study with other fixed values is another study.
     shared = "".join(f"# {name} = {value}\n" for name, value in study.fixed.items())
@@ -427,7 +430,7 @@ class Runner:
 
 
 def submit(study, options, rows):
-    """Submit the rows as a Slurm array."""
+    """Submit the rows as a Slurm array; return the exit code of sbatch. Rows without a checkpoint start again from an empty folder."""
     for row in rows:
         folder = options.output / f"row_{row}"
         if folder.exists() and not any(folder.glob("checkpoint_[01].h5")):

@@ -33,7 +33,8 @@ pub enum Range {
 /// Read the argument of `--range`.
 ///
 /// # Errors
-/// If the text is neither two values, nor two percentiles, nor `all`.
+/// If the text is neither two values, nor two percentiles from 0 to 100, nor `all`, or if the first number is
+/// not below the second number.
 pub fn range_of(text: &str) -> Result<Range> {
     let wanted = "--range must be LOW,HIGH, percentiles such as 5%,95%, or `all`";
     if text == "all" {
