@@ -1,6 +1,6 @@
-"""Model of the time per step and of the first resource limits on many ranks, with given inputs.
+"""Model of the time per step on many ranks, and of the resource limits that are reached first.
 
-The points of a rank are assumed to fill a cube. The rank exchanges the points of a layer one horizon thick with its
+The points of a rank are assumed to fill a cube. The rank exchanges a layer of points, one horizon thick, with its
 neighbours. The bonds of interior points are computed while the messages are under way, so the time per step is
 
     border bonds + packing + max(interior bonds, messages · latency + bytes / bandwidth)
@@ -37,19 +37,21 @@ HISTORY_BYTES = 30 * 69 * 8
 METIS_SECONDS = 0.24 / 216_000
 # Bytes per cell on every rank: occupation twice (the sum needs a copy), owner three times.
 CELL_BYTES = 2 * 8 + 3 * 4
-# Bytes per cell on rank 0: 26 edges of index, weight and its real value, and METIS's copies.
+# Bytes per cell on rank 0: for each of 26 edges the index of the neighbour, the weight as an integer and the weight as
+# a real number; and METIS's copies.
 GRAPH_BYTES = 26 * (4 + 4 + 8) + 26 * 2 * 8
-# Limit of 2³¹ edges of the graph, 26 per cell.
+# Largest number of cells: the graph may have 2³¹ edges, and each cell has 26 edges.
 GRAPH_CELLS = 2**31 / 26
 
 
 def step(given, points):
-    """Return the parts of the time per step (s), the messages and the bytes of a rank with this number of points."""
+    """Return for a rank with this number of points: the parts of the time per step (s), and the messages and bytes per step."""
     edge = points ** (1 / 3)
     layers = given["layers"]
     ghosts = (edge + 2 * layers) ** 3 - points
     interior = max(0.0, edge - 2 * layers) ** 3 / points
-    # Number of ranks within the layer of ghosts; the layer contains several cubes if they are thinner than the layer.
+    # Number of ranks with points in the layer of ghosts. If the cubes of the ranks are thinner than the layer, the layer
+    # contains several cubes in each direction.
     messages = (2 * math.ceil(layers / edge) + 1) ** 3 - 1
     bonds = given["imbalance"] * points * given["neighbours"] / (given["rate"] * given["cores"])
     size = 8 * given["values"] * ghosts
@@ -69,7 +71,7 @@ def step(given, points):
 
 
 def predict(given, points_of):
-    """Return a row for each number of ranks; `points_of` returns the points of one rank."""
+    """Return a row for each number of ranks; `points_of` returns the number of points of one rank."""
     rows = []
     for ranks in RANKS:
         row = {"ranks": ranks, **step(given, points_of(ranks))}
@@ -82,9 +84,9 @@ def predict(given, points_of):
 
 
 def limits(given, ranks, points):
-    """Return the limits for a number of ranks and points: (name, amount, limit) in the same unit, worst
-    first."""
-    # As in src/partition/cells.rs: at most one cell per horizon in each direction.
+    """Return the limits for these numbers of ranks and of points: (name, amount, limit) with the amount in the unit of
+    the limit, the largest ratio of amount to limit first."""
+    # As in src/partition/cells.rs. The edges of a cell have at least the length of the horizon.
     cells = min(points / given["layers"] ** 3, max(1e5, 2000 * ranks), max(4e6, 64 * ranks))
     own = points / ranks
     found = [

@@ -53,12 +53,12 @@ class Panel:
             return
         edge = max(self.left, self.x(max(self.least, cores)) + 8)
         width = self.left + WIDTH - edge
-        # First in the file, so that the axes are drawn above it.
+        # Insert the rectangle at the start, so that the axes are drawn above the rectangle.
         self.parts.insert(0, f'<rect x="{edge:.1f}" y="{TOP}" width="{width:.1f}" height="{HEIGHT}" class="beyond"/>')
         self.text(self.left + WIDTH - 4, TOP + HEIGHT - 8, "more than the cores", "small", "end")
 
     def line(self, number, name, points):
-        """Draw a line through (count, amount), with its name at the lower left."""
+        """Draw a line through points (count, amount), and write its name into the legend at the lower left."""
         colour = COLOURS[number % len(COLOURS)]
         places = [(self.x(count), self.y(amount)) for count, amount in points]
         line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)

@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::process::Command;
 
-/// Set `FISSURE_COMMIT` for the crate in release builds. Debug builds do not set it, because they would be
-/// rebuilt after each commit. Builds outside a checkout do not set it either.
+/// Set the environment variable `FISSURE_COMMIT` for the crate in release builds, from git or from the file
+/// of `cargo package`. Debug builds do not set this variable, because they would be rebuilt after each
+/// commit.
 pub fn set_environment() {
     if std::env::var("PROFILE").as_deref() != Ok("release") {
         return;
@@ -42,7 +43,7 @@ pub fn set_environment() {
     }
 }
 
-/// Return the commit in the text of the file written by `cargo package`.
+/// Return the commit in the text of the file that `cargo package` writes; `None` if the text has no commit.
 fn sha1(information: &str) -> Option<&str> {
     let (_, rest) = information.split_once("\"sha1\"")?;
     let commit = rest.split('"').nth(1)?;

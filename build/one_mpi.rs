@@ -12,10 +12,10 @@ pub struct Mpi {
     pub is_open_mpi: bool,
 }
 
-/// Find MPI and HDF5 and compare their MPI libraries.
+/// Find MPI and HDF5, and check that HDF5 needs the MPI library that is linked.
 ///
 /// # Errors
-/// If HDF5 was built with another MPI; the message names the fix.
+/// If no MPI is found, or if HDF5 was built with another MPI; the message then names the fix.
 pub fn check() -> Result<Mpi, String> {
     let mpi = build_probe_mpi::probe().map_err(|errors| {
         let reasons: Vec<String> = errors.iter().map(ToString::to_string).collect();
@@ -36,7 +36,7 @@ pub fn check() -> Result<Mpi, String> {
     let needed: Vec<String> = (needed_libraries(&hdf5).into_iter())
         .filter(|name| name.starts_with("libmpi"))
         .collect();
-    // A list of names is empty for a static library, or if the tool that reads the library is missing.
+    // A list of names is empty for a static library, or if the tool that reads the names is missing.
     if linked.is_empty() || needed.is_empty() || needed.iter().any(|name| linked.contains(name)) {
         return Ok(Mpi { is_open_mpi });
     }
@@ -52,7 +52,8 @@ pub fn check() -> Result<Mpi, String> {
     ))
 }
 
-/// Return a note with Debian's path of the HDF5 for this MPI, if installed.
+/// Return a note with Debian's path of the HDF5 that was built with the linked MPI; empty if this folder does
+/// not exist.
 fn example(linked: &[String]) -> String {
     let family = if linked.iter().any(|name| name.starts_with("libmpich")) {
         "mpich"
@@ -68,7 +69,7 @@ fn example(linked: &[String]) -> String {
     }
 }
 
-/// Find the shared library that `hdf5-metno-sys` links.
+/// Find the shared library of HDF5 that `hdf5-metno-sys` links; `None` if there is none.
 fn hdf5_library() -> Option<PathBuf> {
     let own = std::env::var_os("HDF5_DIR").map(|root| vec![PathBuf::from(root).join("lib")]);
     let folders = own.or_else(|| {
@@ -87,7 +88,7 @@ fn hdf5_library() -> Option<PathBuf> {
     files.into_iter().find(|file| file.exists())
 }
 
-/// Return the soname of a library linked with `-l NAME`.
+/// Return the soname of the library that `-l NAME` links; `None` if the library or its soname is not found.
 fn loader_name(name: &str, folders: &[PathBuf]) -> Option<String> {
     let system = ["/usr/lib64", "/usr/lib"].map(PathBuf::from);
     let files = folders.iter().chain(&system);
@@ -115,7 +116,7 @@ fn needed_libraries(file: &Path) -> Vec<String> {
     entries(file, "NEEDED")
 }
 
-/// Return the values of one tag in the dynamic section of an ELF file.
+/// Return all values of the tag `kind` in the dynamic section of an ELF file.
 fn entries(file: &Path, kind: &str) -> Vec<String> {
     let lines = printed("readelf", &["-d", "-W"], file).unwrap_or_default();
     let value = |line: &str| {

@@ -1,5 +1,5 @@
-//! Print the energy per area that separates a body, divided by the fracture energy, for laws, criteria and
-//! angles of opening. `studies/parting/run.py` plots this table:
+//! Print the separation energy of a body per area, divided by the fracture energy, for several laws, damage
+//! criteria and directions of separation. `studies/parting/run.py` plots this table:
 //!
 //! ```sh
 //! cargo run --release --example parting
@@ -19,8 +19,8 @@ use fissure::solver::calibration::separation_energy_ratio;
 /// m, the ratio of horizon to spacing.
 const RATIO: f64 = 4.0;
 
-/// Angles between the relative displacement of the halves and the normal of the cut, degrees: 0 is opening,
-/// 90 is sliding.
+/// Angles between the relative displacement of the two halves and the normal of the crack, degrees: 0 is
+/// opening, 90 is sliding.
 const ANGLES: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0];
 
 fn main() -> ExitCode {
@@ -72,7 +72,7 @@ fn rules() -> [(&'static str, DamageRule); 3] {
     ]
 }
 
-/// Return a body in plane strain whose bonds break at stretches of about 0.02.
+/// Return the problem of a body in plane strain whose bonds break at stretches of about 0.02.
 pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Problem> {
     let mut problem = Problem::new(Dimension::PlaneStrain { thickness: 1.0 }, RATIO, 1.0);
     let elastic = Isotropic {
@@ -81,7 +81,8 @@ pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Problem> 
     };
     let material = Material::new(Law::named(law)?, 1.0, elastic);
     let damage = Damage::new(rule, Toughness::FractureEnergy(2.0));
-    // The computation separates its own block of lattice points; the size of this shape has no effect.
+    // `separation_energy_ratio` creates its own block of lattice points, so the size of this shape has no
+    // effect.
     let cell = Shape::Box {
         lower: [0.0; 3],
         upper: [1.0, 1.0, 0.0],

@@ -1,5 +1,5 @@
-//! Run a glass plate with a notch that is pulled apart. The problem is built in Rust without a deck; the
-//! energies are printed every 50 steps:
+//! Pull apart a glass plate with a notch. The problem is built in Rust, without a deck, and the energies are
+//! printed every 50 steps:
 //!
 //! ```sh
 //! cargo run --release --example problem_in_rust
@@ -41,8 +41,8 @@ fn tear(end: f64) -> Result<()> {
     Ok(())
 }
 
-/// Return a plate of 60 mm × 30 mm whose ends move apart, each at 1 m/s after a ramp of 10 µs. `end` is the
-/// end time, s.
+/// Return the problem of a plate of 60 mm × 30 mm whose upper and lower edges move apart, each at 1 m/s after
+/// a ramp of 10 µs. `end` is the end time, s.
 pub fn plate(end: f64) -> Result<Problem> {
     let dimension = Dimension::PlaneStress { thickness: 1e-3 };
     let mut problem = Problem::new(dimension, 3.0 * SPACING, end);

@@ -17,10 +17,11 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Draw into files, without windows.
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# Set for the second start of a study, whose environment has the packages.
+# Environment variable that is set for the second start of a study. The environment then has the packages.
 STARTED = "FISSURE_STUDY_STARTED"
 
-# The study runs in the user's working directory.
+# Bash script that installs the packages, builds the program and starts the study again, in the working directory of the
+# user.
 PREPARE = """\
 set -euo pipefail
 root=$1 target=$2
@@ -72,9 +73,9 @@ def parser(path, description, epilog=None, output=None):
 
 
 def start(found, target="--bin fissure", check=None):
-    """Parse the arguments; on the first start, install packages, build the program and start again.
+    """Parse the arguments; on the first start, install packages, build the program and start the study again.
 
-    `target` are the arguments of `cargo build`; `check` returns an error message about the arguments, or None.
+    `target` are the arguments of `cargo build`. `check` returns an error message about the arguments, or None.
     """
     options = found.parse_args()
     if check is not None and (wrong := check(options)):
@@ -102,14 +103,17 @@ def several_of(known):
 
 
 def replace_once(text, old, new, deck):
-    """Replace the only occurrence of `old` in a text; exit with an error that names `deck` if it is not the only one."""
+    """Replace `old` in a text. If the text does not have `old` exactly once, exit with an error that names `deck`."""
     if text.count(old) != 1:
         sys.exit(f"error: {deck} has {text.count(old)} times `{old.strip()}`, and should have it once")
     return text.replace(old, new)
 
 
 def run(options, folder, text, assignments=()):
-    """Write the text of a deck into a folder and run it, with the results in the folder and `--set` for each assignment."""
+    """Write the text of a deck into a folder and run the deck, with the result in the folder and `--set` for each assignment.
+
+    If the run fails, exit with the exit code of the run.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / "deck.toml"
     written.write_text(text)

@@ -56,8 +56,8 @@ impl Law {
         }
     }
 
-    /// Return the number of floating-point operations per directed bond, for known ξ and |ξ|. With `failure`,
-    /// include the test for failure. See docs/src/developers/performance.md.
+    /// Return the number of floating-point operations per directed bond, without those that compute ξ and
+    /// |ξ|. With `failure`, include the test for failure. See docs/src/developers/performance.md.
     fn operations(self, failure: bool) -> u64 {
         match self {
             Self::Pmb => 23 + u64::from(failure),
@@ -93,7 +93,8 @@ impl Family {
 /// bond length apart.
 const MOST_TOUCHING: f64 = 0.25;
 
-/// Initial strain of the block along x with contact. It presses the faces of the cracks against each other.
+/// Initial strain of the block along x in a benchmark with contact. The strain presses the faces of each
+/// crack together.
 const PRESSED: f64 = -1e-5;
 
 /// Parse the fraction of the points that touch other points.
@@ -109,11 +110,11 @@ fn cracks(arguments: &BenchArguments) -> u64 {
     (0.5 * share * arguments.points[0] as f64).round() as u64
 }
 
-/// Minimum memory traffic of the motion in 3-D per point and step, bytes. Displacement, velocity and response
-/// are read and written, the block is read, and displacement is written once more for the bond loops.
+/// Minimum memory traffic of the motion in 3-D per point and step, bytes. Displacement, velocity and force
+/// density are read and written, the block is read, and displacement is written once more for the bond loops.
 const MOTION_BYTES: u64 = 170;
-/// Minimum memory traffic of a pass over the bonds in 3-D per point, bytes. Reference position, displacement
-/// and volume are read, and response is read and written.
+/// Minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the bonds. Reference
+/// position, displacement and volume are read, and the force density is read and written.
 const PASS_BYTES: u64 = 120;
 
 /// Parse `N` or `X,Y,Z` into the edges of a block, in points.
@@ -131,7 +132,7 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// Return the deck of the problem. A small initial displacement avoids zeros, with which processors could
+/// Return the deck of the benchmark. A small initial displacement avoids zeros, with which processors could
 /// compute faster.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
@@ -183,7 +184,7 @@ fn warm_up(arguments: &BenchArguments) -> u32 {
     arguments.steps.div_ceil(10)
 }
 
-/// Run the benchmark on all ranks, and print the figures on rank 0.
+/// Start MPI, run the benchmark on all ranks, print the figures on rank 0, and finalise MPI.
 pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
     launch::on_all_ranks(|world| {
         let threads = launch::threads(arguments.threads);
@@ -225,7 +226,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
     // `Speed::sent_without_overlap` counts only the exchange of displacements. Laws with two passes also
-    // exchange point numbers, so the measured time is multiplied by the ratio of the bytes.
+    // exchange point numbers, so the measured time is multiplied by the ratio of all bytes to these bytes.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let mut phases = vec![
         phase("bonds", times.forces.bonds),

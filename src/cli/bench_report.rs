@@ -19,7 +19,7 @@ pub struct Phase {
     pub slowest: f64,
 }
 
-/// Measured limits of all cores, and the rates of the time loop.
+/// Measured limits of all cores, and the rates that the time loop reaches.
 pub struct Limited {
     /// Triad bandwidth, bytes/s.
     pub bandwidth: f64,
@@ -31,7 +31,7 @@ pub struct Limited {
     pub done: f64,
 }
 
-/// Measured figures over all ranks; s and bytes.
+/// Measured figures over all ranks; times in s, sizes in bytes.
 pub struct Figures {
     /// The law of the bonds.
     pub law: Law,
@@ -43,7 +43,7 @@ pub struct Figures {
     pub failure: bool,
     /// Fraction of the points that touch other points; `None` without contact.
     pub touching: Option<f64>,
-    /// Points along each edge.
+    /// Number of points along x, y and z.
     pub edges: [u64; 3],
     /// Number of points.
     pub points: f64,
@@ -51,9 +51,9 @@ pub struct Figures {
     pub bonds: f64,
     /// Number of ranks.
     pub ranks: usize,
-    /// Threads of rank 0.
+    /// Number of threads of rank 0.
     pub threads: usize,
-    /// Threads of all ranks.
+    /// Number of threads of all ranks together.
     pub cores: f64,
     /// Number of measured steps.
     pub steps: f64,
@@ -63,7 +63,8 @@ pub struct Figures {
     pub set_up: f64,
     /// Phases of the time loop; the last entry is the total.
     pub phases: Vec<Phase>,
-    /// Memory of all ranks at several stages, bytes; the last entry is the peak.
+    /// Memory of all ranks by name, bytes: the memory of the processes at several times, and the stored
+    /// bonds. The last entry is the peak.
     pub memory: Vec<(&'static str, f64)>,
     /// Bytes that all ranks send per step.
     pub halo_bytes: f64,
@@ -89,13 +90,14 @@ impl Figures {
         self.phases.last().map_or(f64::NAN, |phase| phase.slowest)
     }
 
-    /// Return the number of neighbours visited per second.
+    /// Return the bond updates per second. One update is the work of a step on one directed bond, in all
+    /// passes.
     fn updates(&self) -> f64 {
         self.bonds * self.steps / self.seconds()
     }
 
-    /// Return the fraction of the communication time that overlaps with interior bonds; NaN without messages.
-    /// Waiting for other ranks can give a negative number, which counts as 0.
+    /// Return the fraction of the communication time that the computation of interior bonds hides; NaN
+    /// without messages. Waiting for other ranks can make the fraction negative; 0 is then returned.
     fn hidden(&self) -> f64 {
         if self.messages > 0.0 {
             (1.0 - self.messages_time / self.messages_time_alone).max(0.0)
@@ -104,7 +106,8 @@ impl Figures {
         }
     }
 
-    /// Return the mean time of contact divided by the mean time of the bonds; `None` without contact.
+    /// Return the time of the contact phase divided by the time of the bonds phase, both as means over the
+    /// ranks; `None` without contact.
     fn contact_over_bonds(&self) -> Option<f64> {
         let mean = |name: &str| {
             let phase = self.phases.iter().find(|phase| phase.name == name)?;

@@ -22,10 +22,10 @@ const MAX_CELLS: f64 = 1e7;
 const MAX_POINTS: f64 = 2e6;
 const MAX_BONDS: f64 = 1.5e8;
 
-/// Validate the decks and print their numbers.
+/// Validate the decks and print a report on each deck.
 ///
 /// # Errors
-/// If a deck is invalid or the output cannot be written.
+/// If a deck is invalid, if the output cannot be written, or if the threads cannot be started.
 pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     launch::start_threads(launch::threads(None))?;
     each(&arguments.decks, |deck| {
@@ -64,7 +64,8 @@ pub struct Request<'a> {
     pub path: &'a Path,
     pub deck: &'a Deck,
     pub ranks: u32,
-    /// Measure the time per step and the separation energies.
+    /// Measure the times of a step, a history row and the outputs. In a report as text, also compute the
+    /// separation energies.
     measure: bool,
     /// Print the report as one line of JSON.
     json: bool,
@@ -79,7 +80,8 @@ pub struct TimeEstimate {
     pub cost: Cost,
 }
 
-/// Return the report on a deck. Errors refer to positions in the deck by spans.
+/// Return the report on a deck. Errors have spans (positions in the deck), which the caller converts to
+/// file and line.
 fn report(request: &Request) -> Result<String> {
     let problem = request.deck.problem()?;
     let ranks = request.ranks as usize;
@@ -96,7 +98,8 @@ fn report(request: &Request) -> Result<String> {
     }
 }
 
-/// Compute the interior properties of each body; `None` for a body without such properties.
+/// Compute the properties of the interior of each body; `None` for a body for which they cannot be computed,
+/// such as a body that is not on a lattice.
 fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
     (0..problem.bodies.len())
         .map(|body| interior(problem, body))
@@ -158,7 +161,7 @@ fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<String>
         .flatten()
         .map(|interior| interior.stable_step)
         .fold(f64::INFINITY, f64::min);
-    // Without a lattice body, the stable step is unknown.
+    // The stable step is known only if the interior of at least one body has been computed.
     let time = if stable.is_finite() {
         let steps = choose_steps(problem, stable)?;
         let first = problem.all_stages()[0].time;

@@ -110,7 +110,7 @@ fn heading(problem: &Problem, request: &Request, is_estimate: bool) -> Map<Strin
     }))
 }
 
-/// Return the deck's data on a body, with the interior properties of the body.
+/// Return the data of the deck on a body, and the computed properties of the interior of the body.
 fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map<String, Value> {
     let elastic = body.material.elastic;
     let laws = block_laws(problem, &Block::unrefined(body));

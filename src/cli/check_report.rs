@@ -19,7 +19,7 @@ use fissure::survey::{BodyFigures, Cost, Interior, Seconds, Survey};
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
-/// Append path, title, dimension and horizon of the deck.
+/// Append path, title, dimension and horizon of the deck; in 1-D, also the constraint across the bar.
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.heading(format_args!(
         "{} is a valid deck: {}",
@@ -139,7 +139,8 @@ fn place(position: &[f64]) -> String {
     format!("[{}] m", entries.join(", "))
 }
 
-/// Append the computed properties of the interior of a body, with the exact values.
+/// Append the computed properties of the interior of a body, beside the values of the classical solid. Append
+/// nothing if these properties have not been computed.
 pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interior>) {
     let Some(interior) = interior else {
         return;
@@ -175,7 +176,8 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
     }
 }
 
-/// Append the separation energies of a body with energy-based damage.
+/// Append the separation energy ratios of a body with energy-based damage: for opening, and for sliding if
+/// compressed bonds can break.
 pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
@@ -194,10 +196,11 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     }
 }
 
-/// Largest number of bodies for which every pair is listed.
+/// Largest number of bodies for which the contact rule of every pair is listed.
 const MOST_PAIRS: usize = 6;
 
-/// Append the numbers of bonds between bodies, and their damage.
+/// Append the numbers of bonds between bodies, and the damage thresholds of the pairs of bodies for which the
+/// deck gives the damage.
 pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;
@@ -227,8 +230,8 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     }
 }
 
-/// Format the damage thresholds at both ends of the bonds of a pair; a single number if both thresholds are
-/// equal.
+/// Format the damage thresholds at both ends of the bonds between a pair of bodies; a single number if both
+/// thresholds are equal.
 fn pair_damage(laws: [DamageLaw; 2]) -> String {
     let [first, second] = laws.map(|law| format!("{:.4e}", law.critical()));
     let values = if first == second {
@@ -320,7 +323,7 @@ pub fn rigid(report: &mut Report, problem: &Problem) {
     }
 }
 
-/// Append the cracks and probes.
+/// Append the number of bonds that each crack cuts, and the point of each probe.
 pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
     if !problem.cracks.is_empty() {
         report.heading("cracks");
@@ -368,7 +371,7 @@ pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     report.line("bonds", count(bonds));
 }
 
-/// Append the memory and disk space. `ghosts` is the number of ghosts divided by the number of owned points.
+/// Append the memory of each rank and the disk space. `ghosts` is the number of ghosts per owned point.
 pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     let memory = bytes(cost.memory_of_a_rank(ranks, ghosts));
     report.line(
@@ -439,7 +442,8 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     }
 }
 
-/// Format the largest step (s) of a stage; empty unless the largest step exceeds the first step.
+/// Format the largest time step of a stage. `first` is the first time step (s) of the stage. Return an empty
+/// text unless the largest step exceeds the first step.
 fn largest_step(time: &Time, first: f64) -> String {
     match time.adaptive.and_then(|rule| rule.largest) {
         Some(largest) if largest > first => format!(" at first, then up to {}", si(largest, "s")),
@@ -454,8 +458,8 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Append the estimated run times of the steps, history rows and outputs, and of one force evaluation of a
-/// load step, on `ranks` ranks.
+/// Append the estimated run times on `ranks` ranks. For explicit stages: the times of all steps, history rows
+/// and outputs. For stages with load steps: the time of one force evaluation.
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

@@ -56,7 +56,8 @@ fn tolerance(text: &str) -> std::result::Result<(Option<String>, f64), String> {
     }
 }
 
-/// Allowed differences.
+/// Allowed differences of fields and columns, each as a fraction of the largest absolute value of the field
+/// or column in the first result.
 struct Tolerances<'a> {
     general: f64,
     named: Vec<(&'a str, f64)>,
@@ -99,8 +100,8 @@ impl<'a> Tolerances<'a> {
 /// Compare two results.
 ///
 /// # Errors
-/// Of kind `Run` if the results differ. Of kind `Input` if a file cannot be read or a tolerance has an
-/// unknown name.
+/// Of kind `Run` if the results differ. All other errors are of kind `Input`, for example if a file cannot be
+/// read or a tolerance has an unknown name.
 pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
     let as_input = |error: Error| Error {
         kind: ErrorKind::Input,
@@ -114,8 +115,8 @@ pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
     Err(Error::run(message))
 }
 
-/// Compare two results and print the comparison. Return the kinds of differences for the error message; empty
-/// if the results agree.
+/// Compare two results and print the comparison. Return the kinds of differences for the error message; the
+/// list is empty if the results agree.
 fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec<String>> {
     let paths = [&arguments.first, &arguments.second].map(|path| result_file(path));
     let [first, second] = [
@@ -170,8 +171,8 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// Format the comparison: the fields, columns, outputs, points and rows that only one result has, then a
-/// table of the fields and a table of the columns.
+/// Format the comparison. First list what only one result has (fields, columns, outputs, points and rows);
+/// then append a table of the fields and a table of the columns.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,

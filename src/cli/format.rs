@@ -1,6 +1,6 @@
 //! Formatting of numbers, times and sizes.
 
-/// Values of this size and above are formatted without an SI prefix.
+/// Absolute value from which on values are formatted without an SI prefix.
 const TOO_LARGE: f64 = 1e16;
 
 /// Format a value with an SI prefix and its unit, such as `50.0 µs`.
@@ -53,7 +53,7 @@ pub fn count(value: u64) -> String {
     text
 }
 
-/// Format a duration, such as `3 h 20 min`.
+/// Format a duration (s) in its two largest units, such as `3 h 20 min`.
 pub fn duration(seconds: f64) -> String {
     const UNITS: [(f64, &str); 4] = [
         (31_557_600.0, "a"),

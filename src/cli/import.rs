@@ -53,7 +53,8 @@ enum From {
 /// Translate a deck and write the new deck.
 ///
 /// # Errors
-/// If the deck cannot be translated, or if the new deck exists, has the same path or cannot be written.
+/// If the deck cannot be translated, if the new deck exists and may not be replaced, if both decks have the
+/// same path, or if the new deck cannot be written.
 pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let target = arguments.output.clone();
     let target = target.unwrap_or_else(|| default_target(&arguments.deck));

@@ -64,7 +64,7 @@ impl Template {
         }
     }
 
-    /// Return name and text of the file that the deck reads; `None` if it reads no file.
+    /// Return name and text of the data file that the deck reads; `None` if the deck reads no file.
     fn data(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::PointsFromFile => Some(("disc.csv", include_str!("../../inputs/disc.csv"))),
@@ -73,11 +73,11 @@ impl Template {
     }
 }
 
-/// Write a deck to a new file. Write the file that the deck reads into the same folder.
+/// Write a deck to a new file. If the deck reads a data file, write this file into the same folder.
 ///
 /// # Errors
-/// If the deck exists, if the other file exists with other content or is the deck itself, or if a file cannot
-/// be written.
+/// If the deck exists, if the data file exists with other content or has the path of the deck, or if a file
+/// cannot be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     let mut path = arguments.name.clone();
     if path.extension().is_none() {
@@ -85,7 +85,7 @@ pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     }
     let data = arguments.template.data();
     let mut data = data.map(|(name, text)| (path.with_file_name(name), text));
-    // Check both names before a file is written.
+    // Check both paths before a file is written.
     if path.symlink_metadata().is_ok() {
         return Err(exists(&path));
     }

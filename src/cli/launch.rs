@@ -1,4 +1,5 @@
-//! Start of MPI and of the threads; rank, cores and threads from the environment of the launcher.
+//! Start of MPI and of the threads. The environment variables of the launcher (the program that starts the
+//! ranks) give the rank, the number of ranks on the host and the number of threads.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -16,7 +17,8 @@ const ALWAYS_ALLOWED_THREADS: usize = 64;
 
 /// Start MPI, run `body` on all ranks and finalise MPI. `body` must return the same error on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
-    // MPI may set these variables for a single process, so read them before MPI starts.
+    // MPI may set the launcher's environment variables even for a single process that has no launcher, so
+    // read the variables before MPI starts.
     let (started, rank) = (started(), rank_from_environment());
     let world = match start_mpi() {
         Ok(world) => world,
@@ -25,7 +27,8 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
     if let Err(error) = joined(started, world.size()) {
         let speaks = rank.unwrap_or(0) == 0;
         if !speaks {
-            // The launcher kills all processes when one fails. Wait until rank 0 has printed the error.
+            // The launcher kills all processes when one process fails. Wait until rank 0 has printed the
+            // error.
             std::thread::sleep(EXIT_DELAY);
         }
         return finish(Err(error), speaks);
@@ -38,10 +41,11 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
         .unwrap_or_else(|error| finish(Err(error), speaks))
 }
 
-/// Delay before the other processes exit, so that rank 0 can print an error.
+/// Delay before the processes other than rank 0 exit, so that rank 0 can print an error.
 const EXIT_DELAY: Duration = Duration::from_secs(1);
 
-/// Environment variables with the number of launched processes, innermost launcher first.
+/// Environment variables with the number of launched processes, innermost launcher first. `MPI_LOCALNRANKS`
+/// counts only the processes on this host.
 const SIZES: [&str; 5] = [
     "OMPI_COMM_WORLD_SIZE",
     "MV2_COMM_WORLD_SIZE",
@@ -57,7 +61,7 @@ fn started() -> Option<(&'static str, usize)> {
         .find_map(|name| Some((*name, number(&[name])?)))
 }
 
-/// Check that launcher and MPI library match. Otherwise, the processes would run independently.
+/// Check that launcher and MPI library match. Without a match, each process would run alone, as rank 0.
 ///
 /// # Errors
 /// If MPI has one rank but the launcher started several processes.
@@ -94,7 +98,7 @@ pub fn rank_from_environment() -> Option<usize> {
     ])
 }
 
-/// Return the number of ranks on this host, from the launcher's environment.
+/// Return the number of ranks on this host, from the launcher's environment; 1 without a launcher.
 pub fn ranks_on_host() -> usize {
     number(&[
         "OMPI_COMM_WORLD_LOCAL_SIZE",
@@ -134,7 +138,7 @@ fn cores_of_host() -> usize {
     cores_in(&list).max(cores())
 }
 
-/// Return the number of cores in a Linux CPU list such as `0-3,8`.
+/// Return the number of cores in a CPU list in Linux's format, such as `0-3,8`.
 pub fn cores_in(list: &str) -> usize {
     let range = |range: &str| match range.split_once('-') {
         Some((first, last)) => match (first.parse::<usize>(), last.parse::<usize>()) {
@@ -147,7 +151,8 @@ pub fn cores_in(list: &str) -> usize {
     ranges.map(range).sum()
 }
 
-/// Print a warning if threads and cores do not match.
+/// Print a warning if there are more threads than cores: on this rank or, if the ranks are not bound to
+/// cores, on this host.
 pub fn warn(threads: usize) {
     if let Some(warning) = warning(threads) {
         errln!("warning: {warning}");
@@ -173,7 +178,8 @@ fn warning(threads: usize) -> Option<String> {
 /// Start the threads of this rank.
 ///
 /// # Errors
-/// If there are far more threads than cores, or the system cannot start the threads.
+/// If there are more than `ALWAYS_ALLOWED_THREADS` threads and more than four threads per core of the host,
+/// or if the system cannot start the threads.
 pub fn start_threads(threads: usize) -> Result<()> {
     let most = ALWAYS_ALLOWED_THREADS.max(4 * cores_of_host());
     if threads > most {

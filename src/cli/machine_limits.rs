@@ -12,13 +12,15 @@ use super::launch;
 /// Rates of the threads of this rank, measured on all ranks at once.
 #[derive(Clone, Copy)]
 pub struct Limits {
-    /// Triad a = b + s c, 24 bytes per entry as in STREAM (McCalpin 1995), bytes/s.
+    /// Memory bandwidth of the triad a = b + s c with arrays a, b and c and a number s, bytes/s. As in STREAM
+    /// (McCalpin 1995), 24 bytes are counted per entry.
     pub bandwidth: f64,
-    /// Multiply-adds with the widest vectors, two operations each, 1/s.
+    /// Rate of floating-point operations with the widest vectors, 1/s. A multiply-add counts as two
+    /// operations.
     pub arithmetic: f64,
 }
 
-/// Measure both rates. Collective.
+/// Measure the memory bandwidth and the rate of floating-point operations. Collective.
 pub fn measure(comm: &dyn Communicator, threads: usize) -> Limits {
     Limits {
         bandwidth: bandwidth(comm, threads),
@@ -29,8 +31,8 @@ pub fn measure(comm: &dyn Communicator, threads: usize) -> Limits {
 /// Repetitions of each measurement.
 const REPETITIONS: usize = 10;
 
-/// Return the time of `work` on the slowest rank, s, with all threads of all ranks at once: the best of
-/// several repetitions.
+/// Run `work` on all threads of all ranks at once, [`REPETITIONS`] times. Return the time of the slowest rank
+/// in the fastest repetition, s. Collective.
 fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     let once = |_| {
         // The sum acts as a barrier.
@@ -70,7 +72,8 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
     24.0 * length as f64 * rayon::current_num_threads() as f64 / seconds
 }
 
-/// Return the size of the last-level cache per thread, bytes.
+/// Return the size of the last-level cache, divided by the number of threads that share the cache, bytes. If
+/// the system does not tell the size, assume 64 MiB.
 fn share_of_cache(threads: usize) -> usize {
     let read = |name: &str| {
         let path = format!("/sys/devices/system/cpu/cpu0/cache/index3/{name}");
@@ -119,8 +122,8 @@ fn triad_any(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
     }
 }
 
-/// Number of independent sums. It exceeds the latency (4 or 5 cycles) times the throughput (2 per cycle) of
-/// multiply-adds, so that no multiply-add waits for another multiply-add.
+/// Number of independent sums. This number exceeds the latency (4 or 5 cycles) times the throughput (2 per
+/// cycle) of multiply-adds, so that no multiply-add waits for the result of another multiply-add.
 const SUMS: usize = 12;
 
 /// Multiply-adds per sum and repetition; a repetition takes some 30 ms.
@@ -133,7 +136,8 @@ fn arithmetic(comm: &dyn Communicator) -> f64 {
     operations * rayon::current_num_threads() as f64 / seconds
 }
 
-/// Return a function with [`LENGTH`] × [`SUMS`] multiply-adds in the widest vectors, and the vector width.
+/// Return a function with [`LENGTH`] × [`SUMS`] multiply-adds in the widest vectors, and the number of lanes
+/// of these vectors.
 fn multiply_adds() -> (fn(f64, f64), usize) {
     #[cfg(target_arch = "x86_64")]
     {
@@ -166,7 +170,8 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     (multiply_adds_any, 2)
 }
 
-/// Perform multiplications and additions without instructions of a particular processor.
+/// Perform [`LENGTH`] × [`SUMS`] multiplications and additions in two lanes, with instructions that every
+/// processor has.
 fn multiply_adds_any(factor: f64, term: f64) {
     let mut sums = [[term; 2]; SUMS];
     for _ in 0..LENGTH {

@@ -276,8 +276,8 @@ struct BenchArguments {
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Do not measure the memory bandwidth and the arithmetic rate, which needs some 100 MiB and several
-    /// seconds.
+    /// Do not measure the memory bandwidth and the arithmetic rate. This measurement needs some 100 MiB and
+    /// several seconds.
     #[arg(long)]
     no_limits: bool,
 
@@ -360,7 +360,7 @@ fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<
     latest
 }
 
-/// Print text to standard output; a closed pipe is not an error.
+/// Print text to standard output. A closed pipe is not an error.
 ///
 /// # Errors
 /// If the output cannot be written.
@@ -378,7 +378,7 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Return the exit code of an outcome. Print an error of the outcome if `prints`.
+/// Return the exit code of an outcome. If the outcome is an error and `prints` is true, print the error.
 fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -392,7 +392,7 @@ fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
     }
 }
 
-/// Return the path of a result file: `path` itself, or `result.vtkhdf` inside if `path` is a folder.
+/// Return the path of a result file: `path` itself, or `result.vtkhdf` in `path` if `path` is a folder.
 fn result_file(path: &Path) -> PathBuf {
     if path.is_dir() {
         path.join("result.vtkhdf")

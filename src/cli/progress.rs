@@ -1,4 +1,4 @@
-//! Progress display: a bar on a terminal, periodic lines otherwise, as under mpirun and Slurm.
+//! Progress display: a bar on a terminal, otherwise (for example under mpirun and Slurm) periodic lines.
 
 use crate::cli::errln;
 use std::io::IsTerminal;
@@ -10,9 +10,10 @@ use super::format::si;
 
 /// Time from the start to the first line, s.
 const FIRST_LINE: f64 = 5.0;
-/// Minimum interval between lines, s.
+/// Time from the start to the second line, and minimum interval between later lines, s.
 const MINUTE: f64 = 60.0;
-/// Minimum interval between lines, as a fraction of the elapsed time. A run of a day prints some sixty lines.
+/// Minimum interval between later lines, as a fraction of the elapsed time. A run of one day prints about
+/// sixty lines.
 const RELATIVE_INTERVAL: f64 = 0.1;
 
 /// Width of the bar in characters.
@@ -26,11 +27,11 @@ pub enum Progress {
     Bar(ProgressBar),
     /// Periodic lines.
     Lines {
-        /// Name of a step in the output, such as `step`.
+        /// Word for a step in the printed lines, such as `step` or `frame`.
         noun: &'static str,
         /// Start of the display.
         start: Instant,
-        /// Number of the step at the start.
+        /// Number of steps that were complete at the start.
         first: u64,
         /// Number of the last step.
         last: u64,
@@ -40,8 +41,8 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// Create a display for work from step `first` to step `last`. `noun` is the name of a step in the
-    /// output.
+    /// Create a display for the work after step `first` up to step `last`; no display unless `shown`. `noun`
+    /// is the word for a step in the display.
     pub fn new(shown: bool, noun: &'static str, first: u64, last: u64) -> Self {
         if !shown {
             return Self::Silent;
@@ -66,8 +67,8 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Update the display after a step that ends at `time` (s). `steps` is the current estimate of the number
-    /// of the last step.
+    /// Update the display after step number `step`, which ends at `time` (s). `steps` is the current estimate
+    /// of the number of the last step.
     pub fn update(&mut self, step: u64, steps: u64, time: f64) {
         match self {
             Self::Silent => {}
@@ -110,7 +111,7 @@ impl Progress {
         }
     }
 
-    /// End the display. `complete` is true at the end of the run.
+    /// End the display. `complete` is true if all steps are done.
     pub fn finish(&self, complete: bool) {
         match self {
             Self::Bar(bar) if complete => bar.finish(),
@@ -120,7 +121,7 @@ impl Progress {
     }
 }
 
-/// Return the time from the start to the next line, s, after a line at `elapsed`.
+/// Return the time (s) from the start to the next line, if a line is printed at the time `elapsed` (s).
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE

@@ -10,12 +10,12 @@ pub struct Report {
 }
 
 impl Report {
-    /// Append a line, such as a heading.
+    /// Append a line that is not indented, such as a heading or a warning.
     pub fn heading(&mut self, text: impl Display) {
         let _ = writeln!(self.text, "{text}");
     }
 
-    /// Append a name and its value.
+    /// Append an indented line with a name and its value.
     pub fn line(&mut self, name: &str, value: impl Display) {
         let _ = writeln!(self.text, "  {name:<24}{value}");
     }

@@ -20,10 +20,11 @@ use super::{RunArguments, Verbosity, launch, summary};
 /// Exit code of a stopped run that can be restarted: EX_TEMPFAIL of sysexits.h.
 const STOPPED: u8 = 75;
 
-/// Run a deck on all ranks and finalise MPI.
+/// Start MPI, run a deck on all ranks and finalise MPI.
 pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
     let started = Instant::now();
-    // MPI takes a while to start, so install the signal handlers first. An earlier signal ends the process.
+    // MPI takes a while to start, so install the signal handlers first. Without handlers, a signal would end
+    // the process.
     let signals = Signals::listen();
     launch::on_all_ranks(|world| {
         let signals = agree(world, signals)?;
@@ -55,7 +56,7 @@ fn run_deck(
     let stem = arguments.deck.file_stem().unwrap_or_default();
     let folder = arguments.output.clone();
     let hosts = world.hosts();
-    // Paths may have any bytes, but attributes of the result must be UTF-8.
+    // The words of the command line may have any bytes, but attributes of the result must be UTF-8.
     let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let command_line: Vec<String> = words.collect();
     let options = Options {
@@ -201,7 +202,7 @@ impl Observer for Log {
     }
 
     fn begin(&mut self, now: &mut dyn RunState) {
-        // The end of a restarted run may be before its checkpoint.
+        // A restarted run may end before the step of its checkpoint, if its deck has an earlier end.
         let left = now.last().saturating_sub(now.number());
         if self.prints && left > 0 {
             let step = si(now.step(), "s");

@@ -5,7 +5,7 @@ use fissure::run::{Outcome, Phases, Summary};
 
 use super::format::{count, si};
 
-/// Print the figures of a run with at least one step. For rank 0.
+/// Print the figures of a run with at least one step. Call on rank 0 only.
 pub fn print(outcome: &Outcome, threads: usize) {
     let summary = &outcome.summary;
     let (energies, largest, broken) = match &outcome.last_row {

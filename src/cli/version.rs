@@ -1,11 +1,12 @@
-//! `fissure --version`: versions of program and libraries, for bug reports.
+//! `fissure --version`: versions of the program and its libraries, for bug reports.
 
 use crate::cli::outln;
 use fissure::comm::mpi;
 use fissure::lanes::instructions::{BUILT, Instructions};
 use fissure::output;
 
-/// Print the versions of program and libraries, and the instruction sets.
+/// Print the versions of the program, MPI and HDF5, the best instruction set of this machine, and all
+/// instruction sets of this build.
 pub fn print() {
     let best = Instructions::of_this_machine();
     let all = BUILT.join(", ");

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// Parse `HH:MM`, `HH:MM:SS` or `D-HH:MM:SS`.
 ///
 /// # Errors
-/// If the text has another format; the message names the allowed formats.
+/// If the text has another format or a number is too large; the message names the allowed formats.
 pub fn wall_time(text: &str) -> std::result::Result<Duration, String> {
     let wrong = || format!("`{text}` must be HH:MM, HH:MM:SS or D-HH:MM:SS");
     let (days, clock) = match text.split_once('-') {

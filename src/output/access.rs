@@ -5,7 +5,7 @@ use hdf5_metno as hdf5;
 use hdf5_metno::file::{CacheDecreaseMode, CacheIncreaseMode, FileCloseDegree, FlashIncreaseMode};
 use std::path::Path;
 
-/// Limit of dirty metadata in the cache, bytes: the largest that HDF5 allows.
+/// Limit of the dirty (not yet written) metadata in the cache, bytes: the largest limit that HDF5 allows.
 const HELD_METADATA_BYTES: usize = 32 << 20;
 
 /// Handling of an existing file.
@@ -17,15 +17,15 @@ pub enum Creation {
     Truncate,
 }
 
-/// Open an existing file for reading.
+/// Open an existing file for reading; with a raw communicator, collectively.
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
     // No collective metadata reads: HDF5 1.10.8 deadlocks in such a read if the ranks have read different
-    // rows before, because their caches differ. All metadata of a new file is in memory, so a new file is
-    // safe.
+    // rows before, because the metadata caches of the ranks then differ. All metadata of a new file is in
+    // memory, so a new file is safe.
     options(raw, false)?.open(path)
 }
 
-/// Open an existing file for reading and writing.
+/// Open an existing file for reading and writing; with a raw communicator, collectively.
 pub(super) fn open_to_append(
     path: &Path,
     raw: Option<RawCommunicator>,

@@ -8,7 +8,7 @@ use super::field::{FieldData, FieldDescription, create_field, write_field};
 use super::vtkhdf::{MIN_CHUNK_ROWS, Piece, VTK_VERTEX};
 use crate::error::Result;
 
-/// VTKHDF's datasets of counts, one row per part.
+/// VTKHDF's datasets of counts, one row per step.
 const COUNTS: [&str; 3] = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
 
 /// The datasets of the points of all steps, concatenated.
@@ -63,7 +63,7 @@ impl ChangingPoints {
         })
     }
 
-    /// Append the points of a step. The file already holds `rows` points in `steps` steps.
+    /// Append the points of a step. The file already holds `rows` points in `steps` steps. Collective.
     pub fn write(
         &mut self,
         file: &mut CollectiveFile<'_>,
@@ -88,8 +88,8 @@ impl ChangingPoints {
         let own = piece.first as i64..(piece.first as usize + count) as i64;
         let own: Vec<i64> = own.collect();
         file.write_rows(&self.connectivity, first, &own)?;
-        // A step with n cells has n + 1 offsets: each rank writes the ends of its cells, and rank 0 also
-        // writes the start of the first cell.
+        // A step with n cells has n + 1 offsets: each rank writes the end offsets of its cells, and rank 0
+        // also writes the start offset of the first cell.
         file.resize(&mut self.offsets, end + steps + 1)?;
         let begin = piece.first + u64::from(!root);
         let ends: Vec<i64> = (begin..piece.first + count as u64 + 1)
@@ -103,7 +103,8 @@ impl ChangingPoints {
         Ok(())
     }
 
-    /// Copy the first `rows` points, which belong to `steps` steps, from another file.
+    /// Copy the first `rows` points, which belong to `steps` steps, from the file `old` to `file`.
+    /// Collective.
     pub fn copy(
         &mut self,
         old: &mut CollectiveFile<'_>,
@@ -132,7 +133,7 @@ impl ChangingPoints {
 }
 
 /// Copy the first `rows` rows to `dataset` from the dataset with the same path in the file `old`. Each rank
-/// copies a share of the rows.
+/// copies a share of the rows. Collective.
 pub fn copy<T: H5Type + bytemuck::Pod>(
     old: &mut CollectiveFile<'_>,
     file: &mut CollectiveFile<'_>,

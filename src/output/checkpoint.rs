@@ -28,12 +28,13 @@ const PART: &str = "checkpoint.part";
 /// Version of the file layout.
 const VERSION: i64 = 9;
 
-/// Test whether a path is in use; a link to a missing or unreadable file counts.
+/// Test whether a path is in use; a link to a missing or unreadable file is also in use.
 pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// Contents of a checkpoint without the state of the points and bonds and without the progress of the run.
+/// Contents of a checkpoint, without the state of the points and bonds and without the progress (clock, load
+/// step, load factors, rigid bodies).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// Number of the time step.
@@ -104,7 +105,8 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// Create the checkpoints of a new run. The first checkpoint is `checkpoint_0.h5`.
+    /// Return the checkpoints of a new run, before the first write. The first checkpoint will be
+    /// `checkpoint_0.h5`.
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -137,10 +139,10 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Write a checkpoint that replaces the older checkpoint. Collective.
+    /// Write a checkpoint that replaces the older of the two checkpoints. Collective.
     ///
     /// # Errors
-    /// If the checkpoint cannot be written, for example to a full disk; existing checkpoints are kept.
+    /// If the checkpoint cannot be written, for example to a full disk; the existing checkpoints are kept.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -168,8 +170,8 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Open the newest intact checkpoint of the folder. `warn` receives a message for each damaged
-    /// checkpoint. Collective.
+    /// Find the newest intact checkpoint of the folder. Return the checkpoints of the folder, and the path of
+    /// the found checkpoint. `warn` receives a message for each damaged checkpoint. Collective.
     ///
     /// # Errors
     /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint,
@@ -179,7 +181,8 @@ impl Checkpoints {
         folder: &Path,
         warn: &mut dyn FnMut(String),
     ) -> Result<(Self, PathBuf)> {
-        // Only rank 0 reads the folder, because the file system may be out of date on other ranks.
+        // Only rank 0 reads the folder, because the view of the file system may be out of date on other
+        // ranks.
         let slots = match comm.rank() {
             0 => newest_first(folder),
             _ => Ok(Vec::new()),
@@ -204,7 +207,7 @@ impl Checkpoints {
     }
 }
 
-/// Return the indices of existing checkpoints, in the order in which to try the files.
+/// Return the indices (into the names) of the existing checkpoints, in the order in which to try the files.
 fn newest_first(folder: &Path) -> Result<Vec<u8>> {
     let mut found: Vec<(Option<u64>, u8)> = Vec::new();
     for (slot, name) in (0..).zip(NAMES) {

@@ -13,7 +13,8 @@ use hdf5_metno::types::VarLenUnicode;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
-/// Upper bound on the space of an object, its attributes and its group entry, bytes.
+/// Upper bound on the space of an object without its rows, with its attributes and its group entry, bytes.
+/// The length of texts is added.
 const OBJECT_BYTES: u64 = 8192;
 
 /// An HDF5 file written collectively; without MPI, a serial file.
@@ -32,9 +33,9 @@ const OBJECT_BYTES: u64 = 8192;
 /// write of three or more ranks would make some of the ranks hang.
 ///
 /// # Kill and loss of power
-/// A killed process leaves the file as of its last flush, because metadata stays in memory until then. A loss
-/// of power leaves at least the state of the last [fsync](Self::sync): until the next fsync, flushed writes
-/// change values in place only, because a flush after growth includes an fsync.
+/// A killed process leaves the file in the state of the last flush, because metadata stays in memory between
+/// flushes. A loss of power leaves at least the state of the last [fsync](Self::sync): until the next fsync,
+/// flushed writes change values in place only, because a flush after growth includes an fsync.
 ///
 /// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
 pub struct CollectiveFile<'a> {
@@ -138,7 +139,7 @@ impl<'a> CollectiveFile<'a> {
         &self.path
     }
 
-    /// Rename the open file; an existing file of that name is replaced.
+    /// Rename the open file to `path`; an existing file at this path is replaced.
     ///
     /// # Errors
     /// If the file cannot be renamed.
@@ -162,7 +163,7 @@ impl<'a> CollectiveFile<'a> {
     /// Create a group; its parent must exist.
     ///
     /// # Errors
-    /// If the object exists or the parent does not.
+    /// If the object exists, or the parent does not exist.
     pub fn create_group(&mut self, path: &str) -> Result<()> {
         self.size += OBJECT_BYTES;
         self.collectively(&format!("cannot create the group {path}"), |file| {
@@ -202,7 +203,7 @@ impl<'a> CollectiveFile<'a> {
     /// Create a dataset of shape `[rows]` or `[rows, columns]`. Unwritten values are arbitrary.
     ///
     /// # Errors
-    /// If the object exists or the parent group does not.
+    /// If the object exists, or the parent group does not exist.
     pub fn create_dataset<T: hdf5::H5Type>(
         &mut self,
         path: &str,
@@ -328,7 +329,7 @@ impl<'a> CollectiveFile<'a> {
 
     /// Flush to the file system, so the file survives a kill of the process.
     ///
-    /// If the file has grown, this includes an fsync: a partial write of its metadata at a loss of power
+    /// If the file has grown, the flush includes an fsync: a partial write of the metadata at a loss of power
     /// could destroy the file.
     ///
     /// # Errors
@@ -360,7 +361,7 @@ impl<'a> CollectiveFile<'a> {
     fn flush_all(&mut self) -> Result<()> {
         self.reserve()?;
         self.collectively("cannot write out the file", |file| file.inner.flush())?;
-        // HDF5's flush truncates the file to its length, which frees reserved space.
+        // HDF5's flush truncates the file to its length, so the reserved space behind the end is freed.
         self.reserved = 0;
         if let Some(reservation) = &mut self.reservation {
             reservation.truncated();
@@ -382,7 +383,7 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// Reserve disk space for all created and extended objects. Call before the ranks write.
+    /// Reserve disk space for all created and extended objects. Writes of rows and flushes do this first.
     fn reserve(&mut self) -> Result<()> {
         if self.comm.raw().is_none() || !self.usable || self.size <= self.reserved {
             return Ok(());

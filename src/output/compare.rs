@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 /// Number of points that are read at once.
 const BLOCK: usize = 1 << 16;
 
-/// Largest difference of matched times, as a fraction of the interval of outputs or rows.
+/// Largest difference of matched times, as a fraction of the interval between outputs or rows.
 const TIME_TOLERANCE: f64 = 1e-6;
 
 /// Largest difference of matched times, as a fraction of the last time: round-off of a sum over many steps.
@@ -60,7 +60,7 @@ pub struct Difference {
     pub scale: f64,
     /// Number of compared values.
     pub values: u64,
-    /// Number of values that are not equal to the bit. NaN equals NaN.
+    /// Number of compared values that are not bit-identical. All NaNs count as identical.
     pub unequal: u64,
     /// Location of the largest difference; `None` if all values are equal.
     pub place: Option<Place>,
@@ -80,8 +80,8 @@ impl Difference {
         }
     }
 
-    /// Test whether the largest difference is at most `tolerance` times the largest value of the first
-    /// result. With a tolerance of 0, all values must be equal to the bit.
+    /// Test whether the largest difference is at most `tolerance` times the largest absolute value of the
+    /// first result. With a tolerance of 0, all values must be bit-identical.
     pub fn is_within(&self, tolerance: f64) -> bool {
         self.unequal == 0
             || tolerance > 0.0
@@ -179,7 +179,7 @@ pub fn compare(
 }
 
 /// Add the common fields, and the names of the fields that only one result has, to `comparison`. Return for
-/// each common field whether one of the results stores the field per step.
+/// each common field whether at least one of the results stores values of the field for each output.
 fn common_fields(
     first: &ResultReader,
     second: &ResultReader,
@@ -217,7 +217,7 @@ struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// Compare some of the fields, one block of points at a time.
+    /// Compare some of the fields, one block of points at a time. `fields` has their indices in `comparison`.
     fn compare(&self, fields: &[usize], comparison: &mut Comparison) -> Result<()> {
         let counts = [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]));
         let mut next = [0; 2];
@@ -251,8 +251,8 @@ impl Outputs<'_> {
         Ok(())
     }
 
-    /// Compare a field at the point pairs of a block. `start` is the index of the block's first point in each
-    /// output.
+    /// Compare a field at the point pairs of a block. `ids` has the ids of the block's points in the first
+    /// result, and `start` the index of the block's first point in each output.
     fn compare_block(
         &self,
         ids: &[u64],
@@ -298,15 +298,15 @@ impl Outputs<'_> {
     }
 }
 
-/// Points of a block of both results. `pairs` are the points with the same id, as indices into the block.
-/// `used` is the number of points of each result that the block uses up.
+/// Points of a block of both results. `pairs` has the points with equal ids, as indices into the block of
+/// each result. `used` is the number of points of each result that need not be considered again.
 struct Block {
     pairs: Vec<[usize; 2]>,
     used: [usize; 2],
 }
 
 impl Block {
-    /// Match two ascending lists of ids. Stop at the end of a list, unless the list is the last one of its
+    /// Match two ascending lists of ids. Stop at the end of a list, unless this list is the last list of its
     /// result.
     fn of(ids: &[Vec<u64>; 2], last: [bool; 2]) -> Self {
         let (mut pairs, mut used) = (Vec::new(), [0; 2]);
@@ -424,7 +424,7 @@ mod tests {
         let block = Block::of(&ids(&[1, 3, 4, 9], &[1, 2, 4, 5]), [true, true]);
         assert_eq!(block.pairs, [[0, 0], [2, 2]]);
         assert_eq!(block.used, [4, 4]);
-        // The second result has further blocks, and 9 may be in one of them.
+        // The second result has further blocks, one of which may have the id 9.
         let block = Block::of(&ids(&[1, 9], &[1, 2, 4]), [true, false]);
         assert_eq!((block.pairs.len(), block.used), (1, [1, 3]));
         let block = Block::of(&ids(&[], &[7, 8]), [true, true]);

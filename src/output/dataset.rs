@@ -9,7 +9,7 @@ use std::mem::ManuallyDrop;
 /// Maximum chunk size of an extensible dataset, bytes.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// Upper bound on the index entry of a chunk, bytes.
+/// Upper bound on the size of the index entry of a chunk, bytes.
 const CHUNK_ENTRY_BYTES: u64 = 128;
 
 /// The number of rows of a dataset.
@@ -127,8 +127,8 @@ impl Dataset {
     }
 }
 
-/// Return the rows per chunk. A chunk has 4 kB to 4 MB: one append, an equal part of a long append, or
-/// several short appends.
+/// Return the number of rows per chunk. A chunk has about 4 KiB to 4 MiB: the rows of one append, an equal
+/// part of a long append, or several short appends.
 fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
     let (min, max) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
     let parts = per_append.div_ceil(max).max(1);

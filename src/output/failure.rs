@@ -6,14 +6,14 @@ use std::io;
 /// Prefix of a system error number in HDF5's messages.
 const ERRNO_PREFIX: &str = "errno = ";
 
-/// Return HDF5's description of the innermost error.
+/// Return HDF5's description of the innermost error of a stack of errors.
 pub(super) fn innermost(error: &hdf5::Error) -> String {
     let stack = error.stack();
     let frame = stack.as_ref().and_then(|frames| frames.last());
     frame.map_or_else(|| error.to_string(), |frame| frame.desc().to_owned())
 }
 
-/// Return the system error behind an HDF5 error, if a system call failed.
+/// Return the error of the system call that caused an HDF5 error; `None` if no system call failed.
 pub(super) fn system_error(error: &hdf5::Error) -> Option<io::Error> {
     errno(&innermost(error)).map(io::Error::from_raw_os_error)
 }

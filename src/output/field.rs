@@ -76,7 +76,7 @@ impl FieldData<'_> {
     }
 }
 
-/// Check the number of values of a field against its points and components.
+/// Check the number of components of a field, and the number of its values.
 pub(super) fn check(field: &FieldDescription, data: &FieldData, points: usize) -> Result<()> {
     let (name, components, length) = (field.name, field.components, data.len());
     if !matches!(components, 1 | 2 | 3 | 6 | 9) {

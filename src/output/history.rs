@@ -64,7 +64,7 @@ impl History {
 
     /// Continue the history of a file whose table holds the rows `past`. Collective.
     ///
-    /// The rows are written to a temporary file, which then replaces the CSV file by a rename.
+    /// The rows `past` are written to a temporary file, which then replaces the CSV file by a rename.
     ///
     /// # Errors
     /// If the table is missing or a file cannot be written.
@@ -191,8 +191,8 @@ fn lines(rows: &[Vec<f64>]) -> String {
     text
 }
 
-/// Format a number with the fewest digits that parse to the same number; integers below 10¹⁵ have no decimal
-/// point.
+/// Format a number with the fewest digits that parse to the same number. Whole numbers with an absolute value
+/// below 10¹⁵ have no decimal point.
 fn shortest(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         format!("{value}")

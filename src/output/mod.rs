@@ -1,7 +1,7 @@
 //! Result files and checkpoints in HDF5, written collectively. Of the other folders, only `mesh` calls HDF5,
 //! to read meshes.
 //!
-//! A result has the VTKHDF layout, with a history, and an XDMF side-car for older viewers.
+//! A result file has the VTKHDF layout and contains a history. An XDMF side-car is written for older viewers.
 
 mod access;
 mod attribute;

@@ -116,8 +116,8 @@ impl ResultReader {
                 return problem(text);
             }
         };
-        // After a loss of power, the lengths of these tables can differ. Steps up to the smallest length are
-        // valid.
+        // After a loss of power, NSteps and the lengths of these two tables can differ. Steps up to the
+        // smallest of these numbers are valid.
         let mut complete = steps;
         for name in ["Values", "Step"] {
             let rows = match file.dataset(&format!("{STEPS}/{name}")) {
@@ -175,8 +175,8 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// Return the rows of a range of points at a step. `offsets` is the path of the table with the first row
-    /// of each step.
+    /// Return the rows of a range of points at a step. `offsets` is the path of the table that has the first
+    /// row of each step.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);

@@ -1,8 +1,8 @@
 //! Reservation of disk space before collective writes.
 //!
-//! If the disk fills up inside a collective write, most of Open MPI 4.1's writers (`vulcan`, which is the
-//! default, `dynamic_gen2`, `two_phase` and ROMIO) hang on some ranks. A reservation by one rank fails with
-//! an ordinary error instead.
+//! If the disk fills up inside a collective write, most of Open MPI 4.1's components for collective writes
+//! (the default `vulcan`, `dynamic_gen2`, `two_phase` and ROMIO) hang on some ranks. A reservation by one
+//! rank fails with an ordinary error instead.
 
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};

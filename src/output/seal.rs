@@ -1,7 +1,8 @@
 //! A seal: a checksum appended to a file, to detect truncation and corruption.
 //!
-//! HDF5 ignores bytes after the last object of a file. Each rank reads a share of the bytes. The
-//! checksum is a sum over 8-byte words, each mixed with its index, so it does not depend on the shares.
+//! HDF5 ignores the bytes of the seal, because they follow the last object of the file. To compute the
+//! checksum, each rank reads a share of the file. The checksum is a sum over 8-byte words, each mixed with
+//! its index, so the checksum does not depend on the shares.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -10,7 +11,7 @@ use std::path::Path;
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 
-/// First word of a seal, which distinguishes it from other trailing bytes.
+/// First word of a seal, which distinguishes a seal from other bytes at the end of a file.
 const MAGIC: u64 = u64::from_le_bytes(*b"FISSSEAL");
 
 /// Size of a seal, bytes: magic, number of sealed bytes, checksum, and the caller's number.
@@ -19,7 +20,7 @@ const SEAL_BYTES: u64 = 32;
 /// Size of the read buffer, bytes.
 const BUFFER: usize = 1 << 20;
 
-/// Append a seal with the caller's number to a closed file, and fsync it. Collective.
+/// Append a seal with the caller's number to a closed file, and fsync the file. Collective.
 ///
 /// # Errors
 /// If the file cannot be read or written.
@@ -39,7 +40,8 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// Read the number of a file's seal without a check of the sealed bytes; `None` without a seal.
+/// Read the caller's number from the seal of a file, without a check of the sealed bytes; `None` without a
+/// seal.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -48,7 +50,7 @@ pub fn number(path: &Path) -> Result<Option<u64>> {
     Ok(seal.map(|seal| seal.number))
 }
 
-/// Check the bytes of a file against its seal. Collective.
+/// Check the bytes of a file against its seal; false without a seal. Collective.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -67,12 +69,12 @@ pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
 struct Seal {
     /// Number of sealed bytes.
     length: u64,
-    /// Checksum of the sealed bytes, mixed with the number.
+    /// Checksum of the sealed bytes, mixed with the caller's number.
     sum: u64,
     number: u64,
 }
 
-/// Read the seal at the end of a file, if present.
+/// Read the seal at the end of a file; `None` without a seal.
 fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     let mut file = File::open(path)?;
     let Some(sealed) = length(path)?.checked_sub(SEAL_BYTES) else {
@@ -91,8 +93,8 @@ fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     Ok((magic == MAGIC && length == sealed).then_some(seal))
 }
 
-/// Call `read` on rank 0 and broadcast the words that it returns. The other ranks do not read, because their
-/// file system may be out of date. Collective.
+/// Call `read` on rank 0 and broadcast the returned words. The other ranks do not read, because their view of
+/// the file system may be out of date. Collective.
 fn from_root<const N: usize>(
     comm: &dyn Communicator,
     path: &Path,
@@ -112,7 +114,7 @@ fn length(path: &Path) -> std::io::Result<u64> {
     Ok(std::fs::metadata(path)?.len())
 }
 
-/// Compute the checksum of the first `length` bytes. Collective.
+/// Compute the checksum of the first `length` bytes of a file. Collective.
 fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
     let words = length.div_ceil(8);
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
@@ -122,8 +124,8 @@ fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
     Ok(crate::comm::total(comm, own))
 }
 
-/// Sum the words `first` to `end` − 1 of the first `length` bytes, each mixed with its index. The last word
-/// of these bytes is padded with zeros.
+/// Sum the 8-byte words `first` to `end` − 1 of the first `length` bytes of a file, each word mixed with its
+/// index. The last word of these bytes is padded with zeros.
 fn sum_words(path: &Path, first: u64, end: u64, length: u64) -> std::io::Result<u64> {
     let mut file = File::open(path)?;
     file.seek(SeekFrom::Start(8 * first))?;

@@ -1,4 +1,4 @@
-//! Tests that results read back as written.
+//! Tests: reading a result returns what was written.
 
 use super::access::Creation;
 use super::attribute::Attribute;
@@ -121,8 +121,9 @@ fn what_is_no_result_is_named_so() {
     std::fs::remove_file(&path).unwrap();
 }
 
-/// Write a result of deck `one` with the two steps that it expects. Resume the result after its first step
-/// with `deck`, and write three more steps. Return true if the file was continued in place.
+/// Write a result of a deck `one` with two steps, for which space was allocated. Resume the result after its
+/// first step with the deck `deck`, and write three more steps. Return true if the file was continued in
+/// place.
 fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
 

@@ -1,6 +1,7 @@
 //! Collective transfers of rows. No other file calls HDF5's C interface.
 //!
-//! The safe wrappers use default transfer properties, which are independent on a parallel file.
+//! The safe wrappers of HDF5 use the default transfer properties, with which the transfers of a parallel file
+//! are independent.
 
 use crate::comm;
 use hdf5_metno as hdf5;
@@ -56,7 +57,7 @@ impl Transfer {
     }
 
     /// Write rows from `first_row` on. `values` are whole rows within the dataset and may be empty. Return
-    /// the causes of a non-collective transfer.
+    /// the causes of a non-collective transfer; 0 if the transfer was collective.
     pub(super) fn write<T: hdf5::H5Type>(
         &self,
         dataset: &hdf5::Dataset,
@@ -82,7 +83,7 @@ impl Transfer {
     }
 
     /// Read whole rows from `first_row` on into `values`, which may be empty. Return the causes of a
-    /// non-collective transfer.
+    /// non-collective transfer; 0 if the transfer was collective.
     pub(super) fn read<T: hdf5::H5Type + bytemuck::Pod>(
         &self,
         dataset: &hdf5::Dataset,
@@ -108,7 +109,8 @@ impl Transfer {
         })
     }
 
-    /// Return why the last transfer was not collective, over all ranks; 0 if it was collective.
+    /// Return the causes of a non-collective last transfer, as HDF5's bits over all ranks; 0 if the transfer
+    /// was collective, or if the file is serial.
     fn causes(&self) -> hdf5::Result<u32> {
         let (mut local, mut global) = (0, 0);
         if self.collective {
@@ -130,7 +132,7 @@ struct Selection {
 }
 
 impl Selection {
-    /// Select the rows from `first_row` on with `numbers` values in total.
+    /// Select the rows from `first_row` on that have `numbers` values in total.
     fn new(dataset: &hdf5::Dataset, first_row: u64, numbers: usize) -> hdf5::Result<Self> {
         let mut count: Vec<u64> = dataset.shape().iter().map(|&n| n as u64).collect();
         let mut start = vec![0; count.len()];

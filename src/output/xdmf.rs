@@ -8,7 +8,7 @@ use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Minimum interval between writes, as a multiple of the last write's duration.
+/// Minimum interval between writes of the side-car, as a multiple of the duration of the last write.
 const MIN_INTERVAL: u32 = 100;
 
 /// Component names of a symmetric tensor in storage order.
@@ -184,7 +184,8 @@ fn write_document(
     writeln!(text, "</Grid>\n</Domain>\n</Xdmf>")
 }
 
-/// The rows of a step: first row, number of points, and total number of rows.
+/// The rows of a step in the datasets of moving fields: first row, number of points of the step, and number
+/// of rows of all steps.
 #[derive(Clone, Copy)]
 struct StepRows {
     first: usize,

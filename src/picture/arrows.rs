@@ -19,12 +19,13 @@ pub struct Vectors<'a> {
     pub field: &'a str,
     /// Unit of the vectors without prefix; empty if dimensionless.
     pub unit: &'a str,
-    /// Vector length, measured in the picture, that the longest arrow stands for; the arrows of longer
+    /// Length, in the drawing plane, of the vector that the longest arrow represents. The arrows of longer
     /// vectors are cut. `None` to choose this length from the drawn points.
     pub longest_arrow: Option<f64>,
 }
 
-/// Length of the longest arrow, in text sizes. The middles of arrows are at least this far apart.
+/// Length of the longest arrow, in text sizes (heights of the text). The middles of arrows are at least this
+/// far apart.
 const LONGEST_ARROW: f64 = 2.4;
 
 /// Edge of the square cells into which the picture is divided, in text sizes. Each cell has at most one
@@ -41,8 +42,8 @@ const WHITE: Colour = [255; 3];
 
 /// Draw arrows whose middles are at the points, and the legend.
 ///
-/// The length of an arrow is proportional to the length of the projected vector, up to the vector length
-/// `longest`. Only some points have arrows, so that arrows do not overlap.
+/// The length of an arrow is proportional to the length of the projected vector. The arrows of projected
+/// vectors longer than `longest` are cut. Only some points have arrows, so that arrows do not overlap.
 pub fn draw(
     pen: &mut Pen,
     marks: impl Iterator<Item = (Mark, [f64; 3])>,
@@ -82,17 +83,19 @@ pub fn draw(
 struct Root {
     /// Pixel of the middle of the arrow.
     place: [f64; 2],
-    /// The arrow, in pixels.
+    /// Vector from the tail to the tip of the arrow, to the right and down, in pixels.
     arrow: [f64; 2],
-    /// The arrow is cut: it is shorter than proportional to its vector.
+    /// The vector is longer than the vector that the longest arrow represents, so the arrow is cut.
     is_cut: bool,
-    /// Depth of the point; larger depths are nearer to the camera.
+    /// Depth of the point, m; points with a larger depth are nearer to the camera. 0 in flat views.
     depth: f64,
 }
 
-/// Return at most one root for each square cell of the picture, at distances of at least `reach`. `cell` and
-/// `reach` are in pixels, and `reach` is at most `cell`. Each cell keeps the root nearest to the camera.
-/// Among roots of equal depth, the cell keeps the root nearest to its centre.
+/// Return at most one root for each square cell of the picture, at distances of at least `reach`. The edge
+/// `cell` of a cell and `reach` are in pixels, and `reach` is at most `cell`.
+///
+/// Of each cell, only the root nearest to the camera is considered; among roots of equal depth, the root
+/// nearest to the centre of the cell. This root is left out if it is too close to the root of another cell.
 fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root> {
     let rank = |root: &Root, number: [i64; 2]| {
         let offset = [0, 1].map(|k| root.place[k] / cell - number[k] as f64 - 0.5);
@@ -120,7 +123,7 @@ fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root
     kept.into_values().collect()
 }
 
-/// Draw an arrow with a white border, so that it is visible on all colours. Lengths are in pixels.
+/// Draw an arrow with a white border, so that the arrow is visible on all colours. Lengths are in pixels.
 fn arrow(image: &mut Image, middle: [f64; 2], vector: [f64; 2], text: f64, thickness: f64) {
     let length = vector[0].hypot(vector[1]);
     if length < SHORTEST_ARROW {
@@ -153,7 +156,8 @@ fn arrow(image: &mut Image, middle: [f64; 2], vector: [f64; 2], text: f64, thick
     }
 }
 
-/// Draw the legend below the picture: name, an arrow, its length, and a note if arrows are cut.
+/// Draw the legend below the picture: name of the field, an arrow, length of the vector that this arrow
+/// represents, and a note if arrows are cut.
 fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout: &Layout) {
     let (length, mut label) = legend_entry(longest, vectors.unit);
     if any_cut {
@@ -181,7 +185,7 @@ fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout:
     pen.write(texts[1], [column + lengths[1] / 2.0, row], Running::Across);
 }
 
-/// Return a round vector length of at most `longest`, and its text with the unit.
+/// Return a round vector length of at most `longest`, and the text of this length with its unit.
 fn legend_entry(longest: f64, unit: &str) -> (f64, String) {
     if longest <= 0.0 {
         return (0.0, format!("0 {unit}").trim_end().to_owned());

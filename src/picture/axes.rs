@@ -37,7 +37,7 @@ fn moved(position: [f64; 2], direction: [f64; 2], distance: f64) -> [f64; 2] {
     [0, 1].map(|axis| position[axis] + distance * direction[axis])
 }
 
-/// Return half the extent of a text in a direction, measured from the middle of the text.
+/// Return half the extent of a text in a direction. The size of the text is its width and height.
 fn half_extent([width, height]: [f64; 2], direction: [f64; 2]) -> f64 {
     (direction[0].abs() * width + direction[1].abs() * height) / 2.0
 }
@@ -156,8 +156,8 @@ impl Pen<'_> {
         }
     }
 
-    /// Draw the directions of the three axes of an orthographic view in the upper left or right corner of the
-    /// frame, unless the box covers both corners.
+    /// Draw the directions of the axes x, y and z of an orthographic view in the upper left or upper right
+    /// corner of the frame. Draw nothing if the box `bounds` covers both corners.
     pub fn triad(&mut self, layout: &Layout, bounds: &Bounds, view: Projection) {
         let length = 2.4 * self.text;
         let axes = [Axis::X, Axis::Y, Axis::Z].map(|axis| {

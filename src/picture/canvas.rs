@@ -48,7 +48,7 @@ impl Image {
         Ok(writer.finish()?)
     }
 
-    /// Join pictures side by side; shorter pictures end in white.
+    /// Join pictures side by side. The space below shorter pictures is white.
     pub fn row(images: &[Self]) -> Self {
         let height = images.iter().map(|image| image.height).max().unwrap_or(0);
         let mut joined = Self::new(images.iter().map(|image| image.width).sum(), height);
@@ -147,9 +147,9 @@ impl Image {
     }
 }
 
-/// Return the rows of pixels of a convex polygon in a picture of this height (pixels). Each row has the
-/// polygon's first column and the column after its last. [`Image::fill_polygon`] defines which pixels belong
-/// to a polygon.
+/// Return the rows of pixels of a convex polygon in a picture of this height (pixels). Each row comes with
+/// the first column of the polygon and the first column after the polygon. [`Image::fill_polygon`] defines
+/// which pixels belong to a polygon.
 pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i64; 2])> + '_ {
     let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
     let rows = first_centre(top).max(0)..first_centre(bottom).min(height);
@@ -165,7 +165,7 @@ pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i
     })
 }
 
-/// Return the first row or column whose pixel centre is not before `edge`.
+/// Return the first row or column whose pixel centres are at `edge` or after it.
 fn first_centre(edge: f64) -> i64 {
     (edge - 0.5).ceil() as i64
 }

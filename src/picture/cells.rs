@@ -1,8 +1,9 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
-//! These cells are the Voronoi cells of the points. A cell ends at a distance that follows from the volume of
-//! its point, so borders, holes and open cracks of a body stay visible. At pixels with points on all sides,
-//! cells extend farther to close gaps. In a slice, the cells are sections of the cells in space.
+//! These cells are the Voronoi cells of the points. A cell ends at a distance from its point that follows
+//! from the volume of the point, so borders, holes and open cracks of a body stay visible. At pixels with
+//! points on all sides, cells extend farther to close gaps. In a slice, the plane of the slice cuts the
+//! Voronoi cells of the points in space.
 
 use super::canvas::{Colour, Image};
 use super::layout::Layout;
@@ -11,10 +12,10 @@ use super::projection::Projection;
 use super::scene::Mark;
 
 /// Largest distance between a point and a pixel of its cell, in edges of a cube or square with the volume of
-/// the point. Cells of a lattice end 0.5 to 0.71 edges away from their points.
+/// the point. In comparison, the square cells of a lattice end 0.5 to 0.71 edges away from their points.
 const REACH: f64 = 0.6;
 
-/// Same as [`REACH`], for pixels that have points within this distance on all sides.
+/// Largest distance as in [`REACH`], for pixels that have points within this distance on all sides.
 const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
@@ -61,14 +62,14 @@ struct Point {
 /// A pixel of the frame.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    /// Square of the distance from the nearest point so far.
+    /// Square of the distance from the nearest point so far, pixels².
     square: f32,
     /// Colour of the nearest point so far.
     colour: Colour,
     /// Whether a point is within [`REACH`] of the pixel.
     is_near: bool,
     /// Directions from the pixel in which there are points within [`REACH_INSIDE`]: one bit per eighth of a
-    /// turn.
+    /// full turn.
     directions: u8,
 }
 
@@ -99,7 +100,7 @@ impl Pixels {
 
     /// Add a point to the pixels around it.
     fn add(&mut self, point: &Point) {
-        // At least one pixel: the pixel of the point itself.
+        // Every cell has at least the pixel that contains its point.
         let least = std::f64::consts::FRAC_1_SQRT_2.max(point.depth.abs());
         let [reach, inside] = [REACH, REACH_INSIDE].map(|reach| (reach * point.size).max(least));
         let range = |k: usize| {
@@ -129,7 +130,7 @@ impl Pixels {
         }
     }
 
-    /// Return column, row and colour of the pixels in cells.
+    /// Return column, row and colour of the pixels that belong to cells.
     fn painted(&self) -> impl Iterator<Item = ([i64; 2], Colour)> {
         let all = self.pixels.iter().zip(0..);
         let painted = all.filter(|(pixel, _)| pixel.is_near || is_surrounded(pixel.directions));
@@ -140,7 +141,7 @@ impl Pixels {
     }
 }
 
-/// Return the number of the eighth of a turn that contains a direction.
+/// Return the number (0 to 7) of the eighth of a full turn that contains a direction in the picture.
 fn eighth(along: f64, down: f64) -> u32 {
     match (along >= 0.0, down >= 0.0, along.abs() >= down.abs()) {
         (true, true, true) => 0,
@@ -154,7 +155,7 @@ fn eighth(along: f64, down: f64) -> u32 {
     }
 }
 
-/// Test whether there are points on all sides: no three adjacent eighths of a turn are empty. Every half of a
+/// Test whether there are points on all sides: no three adjacent eighths of a full turn are empty. Every half
 /// turn contains three whole eighths, and therefore has a point.
 fn is_surrounded(directions: u8) -> bool {
     let empty = !directions;

@@ -30,8 +30,8 @@ const COLOURS: [Colour; 7] = [
     [60, 60, 64],
 ];
 
-/// Lengths of dash and gap, in line thicknesses, for each further round of the colours. The first round is
-/// solid.
+/// Lengths of dash and gap, in line thicknesses; `None` for a solid line. The first seven curves have the
+/// first entry, the next seven curves have the second entry, and so on.
 const DASHES: [Option<[f64; 2]>; 3] = [None, Some([5.0, 2.5]), Some([1.5, 1.8])];
 
 /// Colour of the lines at the ticks.
@@ -43,11 +43,11 @@ const MARGIN: f64 = 0.04;
 /// Height of the picture, as a fraction of its width.
 const HEIGHT: f64 = 0.62;
 
-/// Edge of the marker of an isolated point, in line thicknesses.
+/// Edge of the square that marks an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points, to test whether a curve crosses the place of the
-/// legend.
+/// Number of samples on each line between two points of a curve. The samples tell which places of the legend
+/// the curve crosses.
 const LINE_SAMPLES: usize = 32;
 
 /// Distance in pixels below which consecutive points of a curve are drawn as one point.
@@ -95,7 +95,7 @@ enum Anchor {
     End,
 }
 
-/// An element of the drawing; lengths in pixels, measured downwards from the top.
+/// An element of the drawing. Positions are pixels, to the right and down from the upper left corner.
 enum Shape {
     Polyline {
         points: Vec<[f64; 2]>,
@@ -355,7 +355,7 @@ impl Chart<'_> {
             }
         }
         if self.series.len() > 1 {
-            // A line between two distant points can cross the place of the legend, so each line is sampled.
+            // A line between two distant points can cross a place of the legend, so each line is sampled.
             let step = |ends: &[[f64; 2]], k: usize| {
                 let share = k as f64 / LINE_SAMPLES as f64;
                 [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))
@@ -372,7 +372,7 @@ impl Chart<'_> {
         shapes
     }
 
-    /// Draw the legend in the corner of the frame with the fewest points.
+    /// Draw the legend in the corner of the frame where it covers the fewest of the points `drawn`.
     fn legend(
         &self,
         shapes: &mut Vec<Shape>,
@@ -422,7 +422,7 @@ impl Chart<'_> {
         }
     }
 
-    /// Return the range of an axis, with a margin.
+    /// Return the range of the finite points along an axis (0 for x, 1 for y), with a margin.
     fn range(&self, axis: usize) -> [f64; 2] {
         let all = self.series.iter().flat_map(|series| &series.points);
         let usable = all.filter(|point| point.iter().all(|number| number.is_finite()));
@@ -441,13 +441,14 @@ impl Chart<'_> {
     }
 }
 
-/// Create a scale with about `most` ticks.
+/// Create a scale with at most `most` + 1 ticks, and not more than 10 ticks.
 fn scale(low: f64, high: f64, unit: &str, most: f64) -> Scale {
     let magnitude = low.abs().max(high.abs()) / (1.0 + MARGIN);
     Scale::new(low, high, unit, magnitude, (most as usize).clamp(2, 9))
 }
 
-/// Return the curves through finite pixels, without points that coincide with the previous point.
+/// Split a curve at points that are not finite, and leave out points that coincide with the previous point.
+/// Positions are in pixels.
 fn reduced(pixels: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     let mut curves = vec![Vec::new()];
     for pixel in pixels {
@@ -465,7 +466,7 @@ fn reduced(pixels: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     curves
 }
 
-/// Draw a curve in the colour and dashes of its number.
+/// Draw a curve. Its number selects its colour and its dashes.
 fn stroke(shapes: &mut Vec<Shape>, points: &[[f64; 2]], number: usize, thickness: f64) {
     let colour = COLOURS[number % COLOURS.len()];
     let lines = match DASHES[number / COLOURS.len() % DASHES.len()] {
@@ -479,7 +480,7 @@ fn stroke(shapes: &mut Vec<Shape>, points: &[[f64; 2]], number: usize, thickness
     }));
 }
 
-/// Draw a square at an isolated point, in the colour of its curve.
+/// Draw a square at an isolated point, in the colour of the curve with this number.
 fn mark(shapes: &mut Vec<Shape>, point: [f64; 2], number: usize, size: f64) {
     let [columns, rows] = point.map(|centre| [centre - size / 2.0, centre + size / 2.0]);
     shapes.push(Shape::Rectangle {
@@ -489,7 +490,7 @@ fn mark(shapes: &mut Vec<Shape>, point: [f64; 2], number: usize, size: f64) {
     });
 }
 
-/// Split a curve into dashes. `lengths` are the lengths of dash and gap.
+/// Split a curve into dashes. `lengths` are the lengths of dash and gap, pixels.
 fn dashed(points: &[[f64; 2]], lengths: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     let (mut dashes, mut phase, mut left) = (Vec::new(), 0, lengths[0]);
     let mut dash: Vec<[f64; 2]> = points.first().copied().into_iter().collect();

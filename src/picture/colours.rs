@@ -13,7 +13,7 @@ pub enum ColourMap {
     Coolwarm,
     /// Almost black to light grey.
     Grey,
-    /// Light grey over orange and red to almost black: even a crack of one point's width stands out.
+    /// Light grey over orange and red to almost black: even a crack with the width of one point is visible.
     Damage,
 }
 
@@ -48,8 +48,8 @@ impl ColourMap {
         }
     }
 
-    /// Return the colour at `fraction` of the way from the low to the high end. Fractions beyond an end are
-    /// clamped; NaN has the colour of points without a value.
+    /// Return the colour at a fraction of the way from the low to the high end. Fractions outside of 0 to 1
+    /// are clamped; NaN has the colour of points without a value.
     pub fn colour(self, fraction: f64) -> Colour {
         if fraction.is_nan() {
             return self.no_value();
@@ -73,7 +73,8 @@ impl ColourMap {
     }
 }
 
-/// Test whether the name of a field contains "damage". A damage is at least 0.
+/// Test whether the name of a field contains "damage", in small or capital letters. The values of such a
+/// field are at least 0.
 pub fn is_damage(field: &str) -> bool {
     field.to_lowercase().contains("damage")
 }
@@ -83,7 +84,7 @@ pub fn shaded(colour: Colour, brightness: f64) -> Colour {
     colour.map(|channel| (f64::from(channel) * brightness).round() as u8)
 }
 
-/// Coefficients, lowest power first, of a polynomial fit to "viridis".
+/// Coefficients of a polynomial fit to the colours of "viridis", lowest power first.
 const VIRIDIS: [[f64; 3]; 7] = [
     [0.277_727_3, 0.005_407_3, 0.334_099_8],
     [0.105_093_0, 1.404_613_5, 1.384_590_2],
@@ -94,7 +95,7 @@ const VIRIDIS: [[f64; 3]; 7] = [
     [-5.435_455_9, 4.645_852_6, 26.312_435_2],
 ];
 
-/// Return the colour of the "viridis" map.
+/// Return the colour of the "viridis" map at a fraction from 0 to 1.
 fn viridis(fraction: f64) -> Colour {
     let mut colour = [0.0; 3];
     for coefficients in VIRIDIS.iter().rev() {
@@ -105,7 +106,7 @@ fn viridis(fraction: f64) -> Colour {
     colour.map(|channel| (channel * 255.0).round() as u8)
 }
 
-/// Ends of the grey map. The high end is darker than the white background.
+/// Colours at the low and the high end of the grey map. The high end is darker than the white background.
 const GREY: [f64; 2] = [24.0, 226.0];
 
 /// Equally spaced colours of the diverging map of K. Moreland, "Diverging color maps for scientific
@@ -184,7 +185,7 @@ const TURBO: [Colour; 33] = [
     [122, 4, 3],
 ];
 
-/// Return the colour at a fraction of the way through equally spaced colours.
+/// Return the colour at a fraction from 0 to 1 of equally spaced colours, by linear interpolation.
 fn between(colours: &[Colour; 33], fraction: f64) -> Colour {
     let at = fraction * (colours.len() - 1) as f64;
     let lower = (at as usize).min(colours.len() - 2);
@@ -205,7 +206,7 @@ const DAMAGE: [(f64, [f64; 3]); 6] = [
     (1.00, [44.0, 6.0, 44.0]),
 ];
 
-/// Return the colour of the damage map.
+/// Return the colour of the damage map at a fraction from 0 to 1.
 fn damage(fraction: f64) -> Colour {
     let upper = DAMAGE[1..DAMAGE.len() - 1]
         .iter()

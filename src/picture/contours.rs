@@ -3,8 +3,8 @@
 use delaunator::{Point, triangulate};
 use rustc_hash::FxHashMap;
 
-/// Longest edge of a triangle in which values are interpolated, in cell edges. The diagonal of a square
-/// lattice has 1.41 cell edges. Longer edges lie across holes, notches and open cracks.
+/// Longest edge of a triangle in which values are interpolated, in cell edges. In a square lattice, the
+/// longest edge has 1.41 cell edges. Edges longer than the limit lie across holes, notches and open cracks.
 const LONGEST_EDGE: f64 = 2.2;
 
 /// A point in the plane with a value.
@@ -18,9 +18,9 @@ pub struct Sample {
     pub value: f64,
 }
 
-/// Return the samples that no later sample covers. A sample is covered if its position is within half a cell
-/// edge of a later sample. A slice between two layers of points shows both layers, and the later samples are
-/// nearer to the plane of the slice.
+/// Return the samples that no later returned sample covers. A sample covers the positions within half its
+/// cell edge. A slice between two layers of points shows both layers, and the later samples are nearer to the
+/// plane of the slice.
 pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
     let largest = samples
         .iter()
@@ -66,8 +66,8 @@ pub fn segments(samples: &[Sample], levels: &[f64]) -> Vec<[[f64; 2]; 2]> {
         }
         for level in levels {
             let mut crossings = sides.iter().filter_map(|side| crossing(side, *level));
-            // A side is crossed if exactly one of its ends is below the level, so none or two sides are
-            // crossed.
+            // A line crosses a side if exactly one end of the side is below the level, so a line crosses
+            // either no side or two sides.
             if let (Some(from), Some(to)) = (crossings.next(), crossings.next()) {
                 found.push([from, to]);
             }
@@ -76,7 +76,8 @@ pub fn segments(samples: &[Sample], levels: &[f64]) -> Vec<[[f64; 2]; 2]> {
     found
 }
 
-/// Return the position at which the value along a side equals the level; `None` if there is no such position.
+/// Return the position at which the interpolated value along a side of a triangle equals the level; `None` if
+/// there is no such position.
 fn crossing([one, other]: &[Sample; 2], level: f64) -> Option<[f64; 2]> {
     if (one.value < level) == (other.value < level) {
         return None;

@@ -12,22 +12,22 @@ const BACKING: f64 = 1.3;
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
 const LEAST_CUBE: f64 = 2.0;
 
-/// Brightness of a face of a cube whose normal is along x, y or z.
+/// Brightness of the faces of a cube with a normal along x, y and z.
 const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 
-/// Largest edge of a cube whose pixels have an averaged brightness, pixels. Each face of a larger cube has
-/// one brightness.
+/// Edge of a cube below which the brightness of its pixels is averaged, pixels. Each face of a larger cube
+/// has one brightness.
 const SMALL_CUBE: f64 = 10.0;
 
 /// Largest difference in depth between pixels whose brightness is averaged, in edges of a cube.
 const SAME_SURFACE: f32 = 2.0;
 
 /// Limit of the cosine of the angle between the view and the normal of a face. Below this limit, the larger
-/// cube grows less along the normal. The limit is half the cosine in the isometric view.
+/// cube behind a cube extends less along this normal. The limit is half the cosine in the isometric view.
 const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
 
-/// Smallest cosine of the angle between the normal of a painted face and the view. Other faces are seen from
-/// their edges.
+/// Smallest cosine of the angle between the view and the normal of a painted face. Faces with a smaller
+/// cosine are almost parallel to the view.
 const LEAST_COSINE: f64 = 1e-3;
 
 /// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
@@ -38,7 +38,7 @@ pub struct Cubes<'a> {
     edges: [[f64; 2]; 3],
     /// Decrease of depth along each of these edges: the cosine of the angle between the view and the axis.
     cosines: [f64; 3],
-    /// Enlargement along x, y and z of the cube behind a cube with an edge of 1.
+    /// Enlargement along x, y and z of the larger cube behind a cube with an edge of 1.
     growth: [f64; 3],
     /// Surface that each pixel shows.
     surfaces: Vec<Surface>,
@@ -47,7 +47,7 @@ pub struct Cubes<'a> {
 /// The part of a cube that a pixel shows.
 #[derive(Debug, Clone, Copy)]
 struct Surface {
-    /// Depth, times the scale (pixels per metre). The larger of two depths is nearer to the viewer.
+    /// Depth times the scale of the picture, pixels. The larger of two depths is nearer to the viewer.
     depth: f32,
     /// Brightness of the face.
     brightness: f32,
@@ -102,8 +102,9 @@ impl<'a> Cubes<'a> {
         }
     }
 
-    /// Paint the three visible faces of a cube. `centre` is the pixel position of its centre, `depth` the
-    /// depth of its centre, and `edge` its edge in pixels.
+    /// Paint the (up to three) visible faces of a cube, and of a larger cube behind it. `centre` is the
+    /// position of the centre of the cube, `depth` the depth of this centre, and `edge` the edge of the cube,
+    /// all in pixels.
     pub fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
         if edge < LEAST_CUBE {
             let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
@@ -121,10 +122,10 @@ impl<'a> Cubes<'a> {
         }
         let overlap = 2.0 * OVERLAP;
         self.paint_box((centre, depth), edge, [edge + overlap; 3], colour);
-        // A face that moves outwards by a distance d comes nearer by d over its cosine. Each face of the
-        // larger cube is half of the growth farther out. The shift is 4/3 of the largest approach that
-        // results, so the larger cube lies behind the faces of the cube itself. In a gap, the larger cube
-        // hides the sides of other cubes.
+        // If a face moves outwards by a distance d, its surface at a given pixel comes nearer by d divided by
+        // the cosine of the face. Each face of the larger cube is half of the growth farther out. The larger
+        // cube is shifted back by 4/3 of the largest approach that results, so it lies behind the faces of
+        // the cube itself. In a gap, the larger cube hides the sides of other cubes.
         let visible = self
             .visible()
             .map(|axis| self.growth[axis] / self.cosines[axis]);
@@ -139,8 +140,9 @@ impl<'a> Cubes<'a> {
         (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
     }
 
-    /// Paint the visible faces of a box that represents a cube, without shading. `edge` is the edge of the
-    /// cube, and `sizes` are the edges of the box along x, y and z, all in pixels.
+    /// Paint the visible faces of a box that represents a cube, without shading. `centre` and `depth` belong
+    /// to the centre of the box, `edge` is the edge of the cube, and `sizes` are the edges of the box along
+    /// x, y and z, all in pixels.
     fn paint_box(
         &mut self,
         (centre, depth): ([f64; 2], f64),
@@ -329,7 +331,7 @@ mod tests {
             (colours, pixels)
         };
         let [x, y, z] = BRIGHTNESS.map(|brightness| shaded(RED, brightness));
-        // The edge of the larger cube is 1.3 · 30 pixels, plus the overlap.
+        // The edge of the larger cube is 1.3 · 30 pixels plus the overlap.
         assert_eq!(faces(0.0, 0.0), (vec![x], 40 * 40));
         assert_eq!(faces(90.0, 0.0), (vec![y], 40 * 40));
         assert_eq!(faces(-90.0, -90.0), (vec![z], 40 * 40));

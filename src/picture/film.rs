@@ -12,7 +12,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// Begin a film of `frames` frames like `first`, each shown for 1/`rate` s.
+    /// Create the file of a film with `frames` frames of the size of `first`, each shown for 1/`rate` s. No
+    /// frame is written yet.
     ///
     /// # Errors
     /// If the file cannot be written, or `frames` is 0.
@@ -35,10 +36,10 @@ impl Film {
         Ok(self.writer.write_image_data(&frame.rgb)?)
     }
 
-    /// End the film after its last frame.
+    /// End the film after its last frame. It is not checked whether all frames have been appended.
     ///
     /// # Errors
-    /// If the file cannot be written or frames are missing.
+    /// If the file cannot be written.
     pub fn finish(self) -> std::io::Result<()> {
         Ok(self.writer.finish()?)
     }

@@ -3,7 +3,7 @@
 use super::projection::{Camera, Projection};
 use super::scene::Axis;
 
-/// The arrangement of a picture; lengths in pixels, downwards from the top.
+/// The arrangement of a picture. Positions are pixels, to the right and down from the upper left corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Width of the whole picture.
@@ -51,7 +51,7 @@ const RIGHT: f64 = 3.0;
 const LEGEND: f64 = 1.5;
 /// Margin at a side without labels, in text sizes.
 const EMPTY: f64 = 2.2;
-/// Least height of the frame in text sizes. The least width is twice this.
+/// Least height of the frame in text sizes. The least width is twice the least height.
 const LEAST_HEIGHT: f64 = 3.4;
 /// Least height of a frame with a vertical bar beside it, in text sizes.
 const UPRIGHT_HEIGHT: f64 = 11.0;
@@ -129,7 +129,7 @@ impl Layout {
         }
     }
 
-    /// Return the pixel coordinates of a position in the drawing plane.
+    /// Return the pixel coordinates of a position in the drawing plane (m).
     pub fn pixel(&self, [across, up]: [f64; 2]) -> [f64; 2] {
         [
             self.columns[0] + (across - self.origin[0]) * self.scale,
@@ -137,7 +137,7 @@ impl Layout {
         ]
     }
 
-    /// Return the position in the drawing plane, m, of pixel coordinates.
+    /// Return the position in the drawing plane (m) of pixel coordinates.
     pub fn position(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         [
             self.origin[0] + (column - self.columns[0]) / self.scale,
@@ -145,7 +145,7 @@ impl Layout {
         ]
     }
 
-    /// Return the lower left and upper right corner of the frame in the drawing plane.
+    /// Return the lower left and upper right corner of the frame in the drawing plane, m.
     pub fn visible(&self) -> [[f64; 2]; 2] {
         let size = [
             self.columns[1] - self.columns[0],
@@ -156,7 +156,8 @@ impl Layout {
     }
 }
 
-/// Return whether the labels of a ruler extend beyond the right edge of the frame.
+/// Return whether the labels of a ruler are to the right of the box of the points, and need room beyond the
+/// right edge of the frame.
 fn has_ruler_on_the_right(camera: Camera) -> bool {
     let mut outward = [Axis::X, Axis::Y, Axis::Z]
         .into_iter()

@@ -43,8 +43,8 @@ impl Lettering {
         }
     }
 
-    /// Place the characters of `text` on a baseline that starts at the origin. Return the characters with
-    /// their fonts, and the length of the line in pixels.
+    /// Place the characters of `text` on a baseline that starts at the origin; `size` is in pixels. Return
+    /// the characters with their fonts, and the length of the line in pixels.
     fn place(&self, text: &str, size: f64) -> (Vec<(Glyph, &FontRef<'static>)>, f64) {
         let mut glyphs = Vec::new();
         let mut cursor = 0.0;
@@ -67,12 +67,12 @@ impl Lettering {
         (glyphs, f64::from(cursor))
     }
 
-    /// Return the length of a line of text in pixels.
+    /// Return the length of a line of text with this text size, both in pixels.
     pub fn length(&self, text: &str, size: f64) -> f64 {
         self.place(text, size).1
     }
 
-    /// Draw a line of text whose capital letters are centred on `centre`.
+    /// Draw a line of text. The middle of the line, at half the height of capital letters, is at `centre`.
     pub fn draw(
         &self,
         image: &mut Image,

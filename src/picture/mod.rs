@@ -1,5 +1,5 @@
-//! Pictures of point clouds as PNG files: coloured cells in a frame with ticks, a title and a colour bar. No
-//! other program is needed.
+//! Pictures of point clouds as PNG files, drawn without another program: coloured cells in a frame with
+//! ticks, a title and a colour bar.
 //!
 //! ```
 //! # use fissure::picture::{Scene, View, render};
@@ -133,7 +133,7 @@ pub fn render(scene: &Scene) -> Result<Image> {
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
-/// Draw the lines of a scene over its points. The number of a line selects its colour.
+/// Draw the lines of a scene over its points. The number that each line comes with selects its colour.
 fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
     let thickness = 2.0 * pen.thickness();
     for (number, line) in scene.lines {
@@ -146,8 +146,8 @@ fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) 
     }
 }
 
-/// Draw the lines on which the values of a scene are equal. On a logarithmic scale, the logarithms of the
-/// values are interpolated.
+/// Draw the contour lines of a scene, on which the interpolated value equals one of the values of the
+/// contours. On a logarithmic scale, the logarithms of the values are interpolated.
 fn contour_lines(
     pen: &mut Pen,
     layout: &Layout,
@@ -182,8 +182,8 @@ fn contour_lines(
     }
 }
 
-/// Write a line above the frame, smaller if the line is too long. `size` of the text and `rise` above the
-/// frame are in text sizes.
+/// Write a line of text above the frame, smaller if the line is too long. The size `size` of the text and the
+/// height `rise` of its middle above the frame are in text sizes of the layout.
 fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)) {
     let size = size * layout.text;
     let available = layout.width - 2.0 * layout.text;
@@ -198,7 +198,8 @@ fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)
     pen.text = previous;
 }
 
-/// Return the number of ticks that fit on a ruler whose labels need `spacing` text sizes each.
+/// Return the number of ticks (2 to 10) that fit on a ruler whose labels need `spacing` text sizes each.
+/// `text` is the text size, pixels.
 fn ticks_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     ((length / (spacing * text)) as usize).clamp(2, 10)
@@ -229,7 +230,7 @@ fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
     }
 }
 
-/// Draw the edges of the box that meet in the corner behind the points.
+/// Draw the three edges of the box that meet in the corner farthest from the camera.
 fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
     let view = Projection::Orthographic(camera);
     let place = |corner| layout.pixel(view.project(bounds.corner(corner)));
@@ -243,11 +244,11 @@ fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera)
     }
 }
 
-/// Smallest length of an edge of the box with a ruler, in text sizes.
+/// Smallest length of an edge of the box along which a ruler is drawn, in text sizes.
 const LEAST_RULER: f64 = 3.0;
 
-/// Draw rulers along outer edges of the box, one for each axis, and the axis triad. An axis almost along the
-/// view has no ruler.
+/// Draw rulers along outer edges of the box, one for each axis, and the axis triad. An axis that is almost
+/// parallel to the view has no ruler.
 fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
     let view = Projection::Orthographic(camera);
     let place = |corner| layout.pixel(view.project(bounds.corner(corner)));

@@ -37,7 +37,7 @@ impl Colouring {
         }
     }
 
-    /// Return the value at a position on the scale, from 0 to 1.
+    /// Return the value at a position on the scale; the position is from 0 to 1.
     pub fn value(&self, fraction: f64) -> f64 {
         let (low, high) = self.range;
         if self.is_logarithmic {
@@ -48,14 +48,15 @@ impl Colouring {
     }
 }
 
-/// Enlargement of cells on each side in a first pass, pixels. Without this enlargement, a small strain would
-/// open gaps between rounded edges.
+/// Enlargement of cells on each side in the first of two passes, pixels. Without this enlargement, a small
+/// strain would open gaps between cells, because their edges are rounded to pixels.
 pub const OVERLAP: f64 = 0.5;
 
-/// Enlargement of cells on each side against round-off of positions and sizes, pixels.
+/// Enlargement of cells on each side in the last pass, pixels. This enlargement prevents gaps that result
+/// from the round-off of positions and sizes.
 const TOLERANCE: f64 = 0.01;
 
-/// Height of the strip that represents a bar, in text sizes.
+/// Height of the strip that represents a 1-D body, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
 /// Paint the cells of all points. In flat views, a later point covers an earlier point. In
@@ -97,9 +98,10 @@ pub fn paint(
     }
 }
 
-/// Return the first pixel of a cell, and the first pixel after the cell.
+/// Return the first pixel of a cell, and the first pixel after the cell, along one direction. All arguments
+/// are in pixels.
 ///
-/// Both edges are rounded in the same way: where one cell ends, the next cell begins.
+/// Both edges are rounded in the same way, so the next cell begins where this cell ends.
 pub fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     if width + 2.0 * enlargement < 1.0 {
         let pixel = centre.floor() as i64;

@@ -24,7 +24,7 @@ pub struct Camera {
     towards: [f64; 3],
 }
 
-/// Largest length in the picture of a unit vector that counts as parallel to the view.
+/// A unit vector counts as parallel to the view if its projected length is below this limit.
 const ALONG_VIEW: f64 = 1e-6;
 
 impl Camera {
@@ -57,13 +57,14 @@ impl Camera {
         dot(self.towards, position)
     }
 
-    /// Return the outer edge of a box for the ruler of an axis: the corner at the low end of the edge (true
-    /// for the high end of an axis), and the unit vector in the picture (to the right and down) that points
-    /// away from the box. `None` if the axis is along the view.
+    /// Return the outer edge of a box for the ruler of an axis: the corner at the low end of the edge, and
+    /// the unit vector in the picture (to the right and down) that points away from the box. The corner has
+    /// one entry per axis, which is true at the high end of this axis. `None` if the axis is parallel to the
+    /// view.
     ///
-    /// An outer edge belongs to one face that the camera sees and to one face that it does not see. Of the
-    /// two outer edges along an axis, the ruler is at the lower edge, or at the left edge if both edges are
-    /// upright.
+    /// An outer edge belongs to one face that the camera sees and to one face that the camera does not see.
+    /// Of the two outer edges along an axis, the ruler is at the edge that is lower in the picture, or at the
+    /// left edge if both edges are upright.
     pub fn outer_edge(self, axis: Axis) -> Option<([bool; 3], [f64; 2])> {
         let step = |axis: Axis| {
             let index = axis.index();
@@ -84,7 +85,8 @@ impl Camera {
         for other in axis.others() {
             let [across, down] = step(other);
             let ahead = across * outward[0] + down * outward[1];
-            // An axis along the view has no end that is farther out, so take the end at the back.
+            // An axis parallel to the view has no end that is farther out, so take the end farthest from the
+            // camera.
             start[other.index()] = if ahead.abs() < ALONG_VIEW {
                 self.towards[other.index()] < 0.0
             } else {
@@ -135,7 +137,8 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Return the box of all cells, with a margin on each side. Without cells, return a box at the origin.
+    /// Return the box of the cells of all points, with a margin on each side. Without points, return a box at
+    /// the origin.
     pub fn of(marks: impl Iterator<Item = Mark>) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -193,7 +196,7 @@ impl Bounds {
         })
     }
 
-    /// Return a corner. For each axis, `high` selects the high end.
+    /// Return a corner. For each axis, `high` selects the high end (true) or the low end.
     pub fn corner(&self, high: [bool; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| {
             if high[axis] {
@@ -209,8 +212,8 @@ impl Bounds {
         let corner = |high| projection.project(self.corner(high));
         let (low, high) = (corner([false; 3]), corner([true; 3]));
         let offset = [0, 1].map(|k| position[k] - (low[k] + high[k]) / 2.0);
-        // The outline is a hexagon with a centre of symmetry. The sides of the hexagon are parallel to the
-        // edges of the box.
+        // The outline of the projected box is a hexagon with a centre of symmetry. The sides of the hexagon
+        // are parallel to the projected edges of the box.
         let edges = [0, 1, 2].map(|axis| {
             let mut high = [false; 3];
             high[axis] = true;
@@ -328,7 +331,7 @@ mod tests {
             assert!((direction[0] - outward[0]).abs() < 1e-12, "{direction:?}");
             assert!((direction[1] - outward[1]).abs() < 1e-12, "{direction:?}");
         }
-        // A map, seen from above: x below, y on the left.
+        // A map, seen from above: the ruler of x is below, the ruler of y on the left.
         let camera = Camera::new(-90.0, 90.0);
         assert_eq!(camera.outer_edge(Axis::X), Some(([false; 3], [0.0, 1.0])));
         assert_eq!(camera.outer_edge(Axis::Y), Some(([false; 3], [-1.0, 0.0])));

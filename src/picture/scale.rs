@@ -19,9 +19,9 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Create a scale from `low` to `high` with at most `most + 1` ticks.
+    /// Create a scale from `low` to `high` with at most `most + 1` ticks. `unit` is the unit of both numbers.
     ///
-    /// `magnitude` is the largest number that the prefix must suit. Scales that belong together get the same
+    /// The prefix of the unit suits numbers up to `magnitude`. Scales that belong together get the same
     /// magnitude, so that their units have the same prefix.
     pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, magnitude);
@@ -38,9 +38,11 @@ impl Scale {
         Self { ticks, unit }
     }
 
-    /// Create a logarithmic scale from `low` to `high`, both above 0, with about `most` ticks or fewer. The
-    /// ticks are at powers of ten; with fewer than three powers of ten, also at 2 and 5 times the powers.
-    /// With fewer than two such ticks, the ticks are at round numbers.
+    /// Create a logarithmic scale from `low` to `high`, both above 0.
+    ///
+    /// If the range contains three or more powers of ten, the ticks are at powers of ten, and there are at
+    /// most `most` (at least 2) ticks. Otherwise, the ticks are at 1, 2 and 5 times powers of ten. If there
+    /// are fewer than two such ticks, the ticks are at round numbers, at most `most + 1`.
     pub fn logarithmic(low: f64, high: f64, unit: &str, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, high);
         let factor = 10_f64.powi(-exponent);
@@ -101,7 +103,7 @@ fn decimals_of(step: f64) -> usize {
 }
 
 /// Return a step of 1, 2 or 5 times a power of ten, and the multiples of the step within `low..=high`. There
-/// are at most `most + 1` multiples.
+/// are at most `most + 1` multiples; none if `low` is not below `high`.
 pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
     let coarse = (high - low) / most.max(1) as f64;
     if !(coarse.is_finite() && coarse > 0.0) {
@@ -138,8 +140,8 @@ const PREFIXES: [(i32, &str); 10] = [
 /// Unit symbols that take a prefix. Other symbols have a prefix already (kg, MPa) or take none (°C, %).
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
-/// Return a power of ten that suits numbers up to `magnitude`, and the unit with this power: "MPa", or
-/// "×10⁻³" if no prefix is possible.
+/// Return the exponent of a power of ten that suits numbers up to `magnitude`, and the unit with this power:
+/// with a prefix, such as "MPa", or with a factor, such as "×10⁻³ m²", if no prefix is possible.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     let size = magnitude.abs();
     if !(size.is_finite() && size > 0.0) {
@@ -170,7 +172,7 @@ fn takes_prefix(unit: &str) -> bool {
     PREFIXABLE.contains(&symbol) && (rest.is_empty() || rest.starts_with(['/', '·', ' ', '*']))
 }
 
-/// Format an integer in superscript characters.
+/// Format an integer in superscript digits.
 fn superscript(number: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     number

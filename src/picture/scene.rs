@@ -41,16 +41,16 @@ impl Axis {
 /// View of a 3-D scene. 1-D scenes are drawn as a strip, 2-D scenes in their plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
-    /// Along z onto the x-y plane.
+    /// View along z onto the x-y plane.
     Plane,
-    /// The layer of points at a coordinate, viewed along that axis.
+    /// The layer of points at a coordinate of an axis, viewed along this axis.
     Slice {
         /// The normal of the layer.
         axis: Axis,
         /// Coordinate of the layer (m).
         position: f64,
     },
-    /// From a camera at infinity, without perspective.
+    /// View from a camera at infinity, without perspective.
     Orthographic(Camera),
 }
 
@@ -69,10 +69,11 @@ pub struct Scene<'a> {
     /// True for each scattered point, which is drawn as a Voronoi cell in flat views. Other points are drawn
     /// as squares. Empty if no point is scattered.
     pub scattered: &'a [bool],
-    /// Value of each point, which gives the colour; NaN is grey, or pale blue in the grey map.
+    /// Value of each point, which determines the colour; a point whose value is NaN is grey, or pale blue in
+    /// the grey map.
     pub values: &'a [f64],
-    /// Name of the values, for the colour bar. A name that contains "damage" is a damage: by default, it has
-    /// the colour map of damage and a range from 0.
+    /// Name of the values, for the colour bar. If the name contains "damage", the values have by default the
+    /// colour map of damage and a range from 0.
     pub field: &'a str,
     /// Unit of the values without prefix; empty if dimensionless.
     pub unit: &'a str,
@@ -94,7 +95,7 @@ pub struct Scene<'a> {
     pub contours: &'a [f64],
     /// Vector field that is drawn as arrows.
     pub vectors: Option<Vectors<'a>>,
-    /// Small line below the title; may be empty.
+    /// Line of small text below the title; may be empty.
     pub note: &'a str,
     /// Drawn box, for example a common box of a series of pictures. Points outside the box are omitted.
     /// `None` for the box of the points.
@@ -106,7 +107,7 @@ pub struct Scene<'a> {
 pub struct Mark {
     /// Position (m).
     pub position: [f64; 3],
-    /// Edge length of the cell (m); zero if the given length is unusable.
+    /// Edge length of the cell (m); 0 if the given length is negative, too large or NaN.
     pub size: f64,
     /// Value of the point.
     pub value: f64,
@@ -114,11 +115,12 @@ pub struct Mark {
     pub scattered: bool,
 }
 
-/// Largest coordinate. Points beyond it are omitted, because they result from a failed run.
+/// Largest absolute coordinate. Points with a larger coordinate are omitted, because they result from a
+/// failed run.
 const LARGEST_COORDINATE: f64 = 1e100;
 
 impl Scene<'_> {
-    /// Return the view; always the plane view below 3-D.
+    /// Return the view; in 1-D and 2-D, this is always the plane view.
     pub fn effective_view(&self) -> View {
         if self.dimension < 3 {
             View::Plane
@@ -212,7 +214,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Return `count` values at equal distances on the colour bar, without its ends.
+    /// Return `count` values at equal distances on the colour bar, between its ends.
     ///
     /// # Errors
     /// If there are 2³² points or more.
@@ -258,7 +260,8 @@ impl Scene<'_> {
     }
 }
 
-/// Return the number of points as a `u32`, the type of the indices of points. A larger number is an error.
+/// Return the number of points as a `u32`, the type of the indices of points. If the number does not fit into
+/// a `u32`, return an error.
 fn index_limit(points: usize) -> Result<u32> {
     u32::try_from(points).map_err(|_| {
         Error::input(format!(
@@ -269,17 +272,17 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// Fraction of the vectors whose arrows are never cut.
+/// Fraction of the vectors, from the shortest vector on, whose arrows are never cut.
 const WHOLE_ARROWS: f64 = 0.995;
 
-/// Long arrows are cut if the longest vector is longer than the longest vector of this fraction by more than
-/// this factor.
+/// Arrows are cut if the longest vector has more than this many times the length of the longest vector of the
+/// fraction [`WHOLE_ARROWS`].
 const LONG_ARROWS: f64 = 4.0;
 
 /// The points of a scene to draw, in painting order.
 pub struct Marks<'a> {
     scene: &'a Scene<'a>,
-    /// Indices of the points. Copies of the points would need ten times the memory.
+    /// Indices of the points. Copies of the points would need more than ten times the memory.
     order: Vec<u32>,
 }
 
@@ -294,7 +297,7 @@ impl Marks<'_> {
         self.order.iter().map(|point| self.scene.mark(*point))
     }
 
-    /// Iterate over the points with vectors, in painting order.
+    /// Iterate over the points with finite vectors, and these vectors, in painting order.
     pub fn with_vectors<'b>(
         &'b self,
         vectors: &'b Vectors,
@@ -306,10 +309,12 @@ impl Marks<'_> {
         all.filter(|(_, vector)| vector.iter().all(|component| component.is_finite()))
     }
 
-    /// Return the vector length that the longest arrow stands for; 0 without vectors.
+    /// Return the length, in the drawing plane, of the vector that the longest arrow represents; 0 without
+    /// vectors.
     ///
-    /// This length is the largest length in the picture. If few vectors are much longer than all others, such
-    /// as the velocities of splinters, this length is a percentile of the lengths, and longer arrows are cut.
+    /// Usually, this vector is the longest of the projected vectors. If few vectors are much longer than all
+    /// others, such as the velocities of splinters, the returned length is a percentile of the lengths, and
+    /// longer arrows are cut.
     pub fn longest_arrow(&self) -> f64 {
         let Some(vectors) = &self.scene.vectors else {
             return 0.0;
@@ -333,7 +338,7 @@ impl Marks<'_> {
         }
     }
 
-    /// Return the box of the points, with a margin.
+    /// Return the box of the cells of the points, with a margin.
     pub fn extent(&self) -> Bounds {
         Bounds::of(self.iter())
     }
@@ -345,14 +350,15 @@ impl Marks<'_> {
     }
 }
 
-/// Test whether a slice shows a point. The slice is at `position` (m) along `axis`. The point is at `place`
-/// (m), and its cell has this edge (m). Deformed layers can have gaps, so the largest distance is more than
-/// half an edge.
+/// Test whether a slice shows a point. The slice is at the coordinate `position` (m) of `axis`. The point is
+/// at `place` (m), and its cell has the edge `edge` (m). Deformed layers can have gaps, so the largest
+/// distance from the slice is more than half an edge.
 pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> bool {
     (place[axis.index()] - position).abs() <= 0.75 * edge
 }
 
-/// Return the range, or a wider range if the ends are equal up to round-off.
+/// Return the range from `low` to `high`. If both ends are equal up to round-off, return a wider range, which
+/// is 0 to 1 for damage. If an end is not finite, return the range from 0 to 1.
 fn widened(low: f64, high: f64, is_damage: bool) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     let spread = high - low;

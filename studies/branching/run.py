@@ -56,7 +56,7 @@ def uniform(spacing, ratio):
 def same_places(coarse, ratio):
     """Return the deck with a uniform fine grid that contains the points of the refined grid.
 
-    Its points are the points of the coarse grid and points half-way between them, except on the notch.
+    The points of this grid are the points of the coarse grid and points half-way between these, except on the notch.
     """
     text = uniform(coarse / 2, ratio)
     shift = coarse / 4
@@ -122,12 +122,12 @@ def run(arguments, name, text):
 
 
 def lines(out):
-    """Return the branches of the final crack, each an array of positions, m."""
+    """Return the branches of the crack at the end of a run, each as an array of positions, m."""
     return common.branches(out / "crack_notch.csv")
 
 
 def distance(places, branches):
-    """Return the largest distance, m, from a position beyond the notch to its nearest branch."""
+    """Return the largest distance, m, of the positions beyond the notch from the nearest of the branches."""
     places = places[places[:, 0] > BEYOND_THE_NOTCH]
     nearest = numpy.full(len(places), numpy.inf)
     for branch in branches:
@@ -144,7 +144,7 @@ def has_grown(branches):
 
 
 def apart(one, other):
-    """Return the Hausdorff distance of two cracks, m; NaN if one of them has not grown."""
+    """Return the Hausdorff distance of two cracks beyond the notch, m; NaN if a crack has not grown."""
     if not has_grown(one) or not has_grown(other):
         return numpy.nan
     return max(distance(numpy.concatenate(one), other), distance(numpy.concatenate(other), one))
@@ -165,9 +165,10 @@ def shifted(text, coarse, number):
 
 
 def figures(branches):
-    """Return the x of the branching point and the heights of the outermost branches at the right side, m.
+    """Return the x of the branching point, and the distances of the outermost branches from the axis at the right side, m.
 
-    A value is NaN if the crack has no branch there.
+    The branching point is where the crack is first more than 2 mm off the axis. The distances are those of the upper and of
+    the lower branch. A value is NaN if the crack does not reach this place.
     """
     places = numpy.concatenate(branches)
     apart = places[numpy.abs(places[:, 1]) > 2e-3]
@@ -180,7 +181,7 @@ def figures(branches):
 
 
 def statistics(arguments):
-    """Print the statistics of both grids over shifted lattices."""
+    """Print the statistics of the refined and the uniform fine grid over shifted lattices."""
     print("                        more than 2 mm off axis from x, mm   upper branch at the side, mm   lower, mm   time, s")
     for ratio in arguments.m:
         both = {

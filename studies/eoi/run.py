@@ -86,7 +86,7 @@ def grids(limit, small):
 
 
 def deck(law, dx):
-    """Return the text of the deck with another law."""
+    """Return the text of the deck with this law; `dx` is the spacing, m."""
     text = DECK.read_text()
 
     def replace(old, new):
@@ -112,7 +112,7 @@ def deck(law, dx):
 
 
 def offsets(ratio):
-    """Return the offsets of the neighbours on a lattice of unit spacing."""
+    """Return the offsets of the neighbours and their lengths, on a lattice of unit spacing with this ratio of horizon to spacing."""
     reach = range(-int(ratio) - 1, int(ratio) + 2)
     every = numpy.array([(x, y, z) for x in reach for y in reach for z in reach], dtype=float)
     length = numpy.linalg.norm(every, axis=1)
@@ -134,7 +134,8 @@ def long_waves(law, dx, ratio):
     layers = round(THICKNESS / dx)
     level = numpy.round(steps[:, 2] / dx).astype(int)
 
-    # The energy of a bond is w = (g/2) s²|ξ|. The constant g of point i depends on the family in its layer.
+    # The energy density of a bond is (g/2) s²|ξ|. The constant g of point i follows from the family of i, which
+    # depends on the layer of i.
     def modulus(inside):
         if law == "pmb":
             return numpy.full(len(lengths), 18 * BULK_MODULUS / (numpy.pi * horizon**4))
@@ -155,7 +156,8 @@ def long_waves(law, dx, ratio):
             if not 0 <= other < layers:
                 continue
             weight = (own[layer][k] + own[other][k]) / 2 * volume / (2 * length**3)
-            # s = (ξx² + ξz (w' − w))/|ξ|² at unit strain along x.
+            # At unit strain along x, s = (ξx² + ξz (w_j − w_i))/|ξ|², where w_i and w_j are the displacements of the
+            # layers of i and j along z.
             axial, across = step[0] ** 2, step[2]
             energy += weight * axial**2
             for index, sign in ((other, 1), (layer, -1)):
@@ -170,14 +172,19 @@ def long_waves(law, dx, ratio):
 def long_waves_of_ordinary(steps, lengths, dx):
     """Return the speeds of `long_waves` for the ordinary law with ω = 1 and ν = 1/4.
 
-    Its energy density is W = K θ²/2 + 15 G/(2 m) Σ ε_d² V, with the weighted volume m and deviatoric extensions ε_d.
+    The energy density of this law is W = K θ²/2 + 15 G/(2 m) Σ e_d² V, with the weighted volume m and the deviatoric
+    extensions e_d.
     """
     volume, shear = dx**3, 0.6 * BULK_MODULUS
     layers = round(THICKNESS / dx)
     level = numpy.round(steps[:, 2] / dx).astype(int)
 
     def energy(layer_of, count):
-        """Return the energy density of a point as a quadratic form of (1, lateral displacements of the layers)."""
+        """Return the mean energy density of points of the layers `layer_of` at unit strain along x.
+
+        The result is the matrix of a quadratic form of (1, displacements of the `count` layers along z). With `count`
+        0, the point is in the bulk.
+        """
         total = numpy.zeros((count + 1, count + 1))
         for layer in layer_of:
             inside = (0 <= level + layer) & (level + layer < count) if count else numpy.full(len(level), True)
@@ -203,7 +210,7 @@ def long_waves_of_ordinary(steps, lengths, dx):
 
 
 def slope(times, places, start, end):
-    """Return the speed (m/s) of a front between two positions (m); None if it covers too little distance or jumps."""
+    """Return the speed (m/s) of a front between two positions (m); None if the front covers too little distance or jumps."""
     chosen = (places >= start) & (places <= end)
     if chosen.sum() < 3 or numpy.ptp(places[chosen]) < 0.015:
         return None
@@ -221,7 +228,7 @@ def run(options, limit, law, dx, ratio):
         if len(earlier["time"]) and earlier["time"][-1] > 0.999 * DURATION:
             return earlier
     common.run(options, folder, deck(law, dx), [f"dx={dx!r}", f"m={ratio!r}", "outputs=1"])
-    # Fields are not needed.
+    # Remove the fields and the checkpoints, which are not needed.
     for name in ("result.vtkhdf", "result.xdmf", "checkpoint_0.h5", "checkpoint_1.h5"):
         (folder / name).unlink(missing_ok=True)
     return common.history(folder)

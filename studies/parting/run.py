@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Draws the energy that separates a body, by direction from opening to sliding, for each law and damage criterion.
+"""Draws the energy that separates a body over the direction of separation, for several laws and damage criteria.
 
 Builds and runs examples/parting.rs, which separates the two halves of a small block. Prints the separation energies as
-fractions of the fracture energy, at increasing angles between the direction of separation and the normal of the crack.
-Draws them into the output folder.
+fractions of the fracture energy, at increasing angles between the direction of separation and the normal of the crack:
+0° is opening, 90° is sliding. Writes a picture of these energies into the output folder.
 """
 
 import csv
@@ -25,7 +25,7 @@ LABELS = {
 
 
 def table(program):
-    """Yield the rows of the table: law, Poisson's ratio, criterion, and pairs of angle (degrees) and separation energy."""
+    """Yield the rows of the table: law, Poisson's ratio, criterion, and pairs of angle (degrees) and separation energy ratio."""
     printed = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     head, *rows = csv.reader(printed.splitlines())
     angles = [float(angle) for angle in head[3:]]

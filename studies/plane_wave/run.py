@@ -55,7 +55,8 @@ def horizons(rule, level):
 def deck(rule, levels, margin, factor, bonds, seen, end):
     """Return the text of the deck with an output at the time `seen`; 0 levels mean no refinement.
 
-    The patch of each level has a radius of `margin` horizons of the next coarser level.
+    The patch of each level has a radius of `margin` horizons of the next coarser level. `factor` is the value of the key
+    `interface_factor` (None for its default), and `bonds` the value of the key `bonds`.
     """
     text = DECK.read_text()
     text = re.sub(r"(?m)^end = 0\.17 .*$", f"end = {end}", text)
@@ -130,7 +131,7 @@ def main():
         name = f"{rule}_{level}_{margin}_{factor}_{bonds}"
         result = run(arguments, name, deck(rule, level, margin, factor, bonds, seen, after))
         energy = Energy(result)
-        # The output times of the two runs differ slightly, because their time steps differ.
+        # The output times of this run and of the uniform run differ slightly, because the time steps differ.
         shift = SPEED * (energy.time - uniform.time)
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
         near = np.abs(energy.places - np.array(CENTRE)).max(axis=1) < 5 * DX

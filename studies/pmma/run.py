@@ -135,7 +135,7 @@ def arguments():
 
 
 def deck(law, load_steps):
-    """Return the text of the deck with another law, and with relaxation if load steps are given."""
+    """Return the text of the deck with this law; with relaxation if a number of load steps is given, else with explicit steps."""
     text = DECK.read_text()
 
     def replace(pattern, new):
@@ -177,7 +177,7 @@ def branches(folder):
 
 
 def deviation(path):
-    """Return the largest vertical distance (m) between a path and the measured path, and the smallest x (m) compared."""
+    """Return the largest vertical distance (m) between a path and the measured path, and the smallest compared x (m)."""
     along, up = metres(MEASURED).T
     left = max(path[:, 0].min(), along[-1])
     places = numpy.linspace(left, min(path[:, 0].max(), along[0]), 400)
@@ -188,7 +188,7 @@ def deviation(path):
 
 
 def damage(folder):
-    """Return positions (m) of the points, damage by output and point, and times (s) of the outputs."""
+    """Return the positions (m) of the points, the damage by output and point, and the times (s) of the outputs."""
     with fissure.open(folder) as result:
         return result.points, result["damage"], result.times
 

@@ -127,7 +127,7 @@ class Study:
         self.names, self.rows = self.design()
 
     def wrong(self, key, message):
-        """Return an error about a key such as `output.NAME.pick`, with the line on which its last part is set."""
+        """Return an error about a key such as `output.NAME.pick`, with the number of the line that sets the last part of the key."""
         word = re.escape(key.rsplit(".", 1)[-1])
         pattern = re.compile(rf"^\s*(\[[^\]]*\b{word}\]|[^#]*\b{word}\s*=)")
         lines = (number for number, line in enumerate(self.text.splitlines(), 1) if pattern.search(line))
@@ -215,7 +215,7 @@ class Study:
             raise self.wrong("paths.cell", "must be above 0")
 
     def design(self):
-        """Return the names of the varied parameters, and for each row their values, as text."""
+        """Return the names of the varied parameters, and for each row the values of these parameters as texts."""
         design = self.values.get("design", {})
         self.check_keys("design", design)
         ranges = self.tables("parameter")
@@ -339,9 +339,12 @@ def chosen_rows(text, count):
 
 
 def prepare(study, options):
-    """Create the output folder; fail if it contains another study."""
+    """Create the output folder with the table of values.
+
+    If the folder contains another study, delete the runs of that study with --overwrite, and fail without this option.
+    """
     table = options.output / "table.txt"
-    # The values of `fixed` are part of the table, so a change of them makes another study.
+    # The values of `fixed` are part of the table, so a study with other fixed values is another study.
     shared = "".join(f"# {name} = {value}\n" for name, value in study.fixed.items())
     wanted = f"# {study.deck.name}\n{shared}{study.table()}"
     if table.exists() and table.read_text() != wanted:
@@ -357,7 +360,7 @@ def prepare(study, options):
 
 
 class Runner:
-    """Runs rows in parallel, with an orderly stop."""
+    """Runs rows of the table in parallel. At a signal, the runs write checkpoints and stop."""
 
     def __init__(self, study, options):
         self.study, self.options = study, options
@@ -366,7 +369,7 @@ class Runner:
         self.stopped = False
 
     def stop(self, *_):
-        # A signal handler must not wait for a lock that its thread may hold.
+        # This signal handler must not wait for `lock`, which the interrupted thread may hold.
         self.stopped = True
         for child in list(self.children):
             child.send_signal(signal.SIGTERM)
@@ -388,7 +391,7 @@ class Runner:
             with self.lock:
                 if self.stopped:
                     return STOPPED
-                # In its own process group, so that only this script forwards Ctrl-C to the run.
+                # In a separate session, the run does not receive the signal of Ctrl-C. This script signals the run instead.
                 child = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
                 self.children.add(child)
             if self.stopped:
@@ -404,7 +407,7 @@ class Runner:
         return code
 
     def all(self, rows):
-        """Run the incomplete rows; return the rows that failed."""
+        """Run these rows; return the rows that failed."""
         started = time.monotonic()
         failed, done = [], 0
         for kind in (signal.SIGINT, signal.SIGTERM):
@@ -427,7 +430,7 @@ class Runner:
 
 
 def submit(study, options, rows):
-    """Submit the rows as a Slurm array."""
+    """Submit the rows as a Slurm array; return the exit code of sbatch. Rows without a checkpoint start again from an empty folder."""
     for row in rows:
         folder = options.output / f"row_{row}"
         if folder.exists() and not any(folder.glob("checkpoint_[01].h5")):
@@ -475,7 +478,7 @@ def value_of(study, name, output, columns):
 
 
 def collect(study, options):
-    """Write results.csv; return the outputs by row."""
+    """Write results.csv; return the outputs as an array [row, output], NaN for missing values."""
     names = list(study.outputs)
     results = numpy.full((len(study.rows), len(names)), math.nan)
     complete = 0
@@ -500,7 +503,10 @@ def collect(study, options):
 
 
 def sensitivities(study, results):
-    """Return by output the mean, μ*, the 95 % confidence of μ*, and σ of each parameter, from complete trajectories."""
+    """Return for each output, by name, the mean μ, μ*, the 95 % confidence of μ*, and σ of each parameter.
+
+    Only complete trajectories are used. Outputs with fewer than two complete trajectories are left out.
+    """
     from SALib.analyze import morris as analysis
 
     problem, levels = study.morris
@@ -552,7 +558,7 @@ def write_sensitivities(study, options, found):
 
 
 def covered(lines, centres, reach):
-    """Return the cells whose centre is within `reach` (m) of a line."""
+    """Return for each cell whether its centre (m) is within `reach` (m) of one of the lines."""
     near = numpy.zeros(centres.shape[:2], dtype=bool)
     for line in lines:
         for start, end in zip(line[:-1], line[1:]):
@@ -565,7 +571,7 @@ def covered(lines, centres, reach):
 
 
 def heat_map(study, options):
-    """Draw for each cell of the map the number of runs whose crack is within one cell size of its centre."""
+    """Draw for each cell of the map the number of runs whose crack is within one cell size of the centre of the cell."""
     rule = study.paths
     cell = rule["cell"]
     xs, ys = (numpy.arange(low + cell / 2, high, cell) for low, high in zip(rule["lower"], rule["upper"]))

@@ -13,13 +13,13 @@ except ImportError:
 
 
 class History(dict):
-    """Columns of a history by name, as arrays; the table type if pandas is not installed."""
+    """Columns of a history as arrays, by name. This class replaces pandas.DataFrame if pandas is not installed."""
 
 
 def read_history(path):
     """Read history.csv from its path or its folder. Return a pandas.DataFrame, or a History if pandas is not installed.
 
-    An incomplete last row of a killed run is skipped. Units are in `table.attrs["units"]`.
+    An incomplete last row of a killed run is skipped. The units of the returned table are in `table.attrs["units"]`.
     """
     path = pathlib.Path(path)
     if path.is_dir():
@@ -37,7 +37,7 @@ def read_history(path):
 
 
 def table_of(names, units, values):
-    """Return a table with the columns of a matrix."""
+    """Return a table of the columns of a matrix, with their names and units."""
     by_name = dict(zip(names, units))
     if pandas is not None:
         table = pandas.DataFrame(values, columns=names)

@@ -74,7 +74,7 @@ def run(
 
 
 def _toml(value):
-    """Format a value as in a deck."""
+    """Format a value as the text of a deck or of --set."""
     if hasattr(value, "tolist"):
         value = value.tolist()  # numpy values
     if isinstance(value, bool):

@@ -34,7 +34,8 @@ class Result:
     """A result of a run, open for reading.
 
     `times` (s) and `steps` have one entry per output. An output is selected by its index `output`, which may be negative, or
-    by the nearest `time` (s), which must be within the run; the default is the last output. Rows of fields and points are in the order of `ids`.
+    by a `time` (s), which selects the nearest output; the default is the last output. A time must not be more than half an
+    output interval before the first or after the last output. Rows of fields and points are in the order of `ids`.
     """
 
     def __init__(self, path):
@@ -99,7 +100,7 @@ class Result:
         return self.points_at()
 
     def points_at(self, output=None, *, time=None):
-        """Reference positions at an output, m. They change only with [refinement.trigger]."""
+        """Reference positions of the points at an output, m. The points change only with [refinement.trigger]."""
         output = self._output(output, time)
         return self._file["VTKHDF/Points"][self._rows("PointOffsets", output)]
 
@@ -123,7 +124,10 @@ class Result:
         return self._dataset(name)[self._rows(f"PointDataOffsets/{name}", output)]
 
     def __getitem__(self, name):
-        """Values of a field at all outputs: [output, point, component]. The points must be the same at all outputs."""
+        """Values of a field at all outputs: [output, point, component]; [output, point] for a scalar.
+
+        The points must be the same at all outputs.
+        """
         dataset = self._dataset(name)
         if len(self._counts) > 1:
             raise ValueError(f"{self.path}: each output has its own points; read them one by one with field()")

@@ -1,4 +1,4 @@
-//! Check that a picture shows points. Otherwise, the error gives the reason.
+//! Check that a picture shows points. If it shows none, the error gives the reason.
 
 use fissure::error::{Error, Result};
 use fissure::picture::{Axis, View};
@@ -7,12 +7,12 @@ use super::blocks::blocks;
 use super::painter::Painter;
 
 impl Painter<'_> {
-    /// Check that some of these outputs have points to draw. If the scale is logarithmic, some drawn values
-    /// must be above 0.
+    /// Check that at least one of these outputs has points to draw. If the scale is logarithmic, at least one
+    /// drawn value must be above 0.
     ///
     /// # Errors
-    /// If no points are drawn although the outputs have points, if all drawn values are 0 or less, or if the
-    /// result to subtract lacks an output.
+    /// If no points are drawn although the outputs have points, if the scale is logarithmic and no drawn
+    /// value is above 0, or if the result to subtract lacks an output or has another number of points there.
     pub fn check(&self, indices: &[usize]) -> Result<()> {
         if let Some(minus) = &self.minus {
             for index in indices {
@@ -47,8 +47,9 @@ impl Painter<'_> {
         }
     }
 
-    /// Return the error for an output of which no point is drawn. The message names the option that leaves
-    /// out the last points, and the positions or values of the points.
+    /// Return the error for an output of which no point is drawn. The options `--clip`, `--slice` and
+    /// `--threshold` are applied in this order. The message names the option that leaves no points, and gives
+    /// the range of positions or values of the points before this option.
     fn nothing_drawn(&self, index: usize) -> Result<Error> {
         let none = [f64::INFINITY, f64::NEG_INFINITY];
         let include = |ends: &mut [f64; 2], value: f64| {
@@ -56,8 +57,9 @@ impl Painter<'_> {
                 *ends = [ends[0].min(value), ends[1].max(value)];
             }
         };
-        // Smallest and largest coordinates of all points (`all`) and of the points in the half spaces
-        // (`kept`), and smallest and largest value of the points that are also in the slice (`values`).
+        // Smallest and largest coordinates of all points (`all`) and of the points in the half spaces of
+        // `--clip` (`kept`), and smallest and largest value of the points that are also in the slice
+        // (`values`).
         let (mut all, mut kept, mut values) = ([none; 3], [none; 3], none);
         let mut nearest: Option<f64> = None;
         let power = 1.0 / self.dimension as f64;

@@ -5,15 +5,15 @@ use std::ops;
 use fissure::error::Result;
 use fissure::output::ResultReader;
 
-/// Number of points that are read at once; limits the memory of a picture.
+/// Number of points that are read at once, to limit the memory of a picture.
 const BLOCK: usize = 1 << 18;
 
-/// Largest difference of coordinates that count as equal, as a fraction of the extent. Points in one row of a
-/// lattice differ by round-off.
+/// Largest difference of coordinates that count as equal, as a fraction of the extent of the body.
+/// Coordinates of points in one row of a lattice differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
-/// A body of n points counts as scattered if the numbers of different x, y and z, multiplied together, exceed
-/// this number times n^1.5; see [`scattered_bodies`].
+/// A body of n points counts as scattered if the numbers of different x, y and z, multiplied with each other,
+/// exceed this constant times n^1.5; see [`scattered_bodies`].
 const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Divide `points` points into ranges of at most [`BLOCK`] points.
@@ -22,7 +22,7 @@ pub fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
     (0..points).step_by(BLOCK).map(block)
 }
 
-/// Test whether all values of a field are 0 at an output.
+/// Test whether all values of a field are 0 at output `index`.
 ///
 /// # Errors
 /// If the result is damaged.
@@ -36,13 +36,13 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
     Ok(true)
 }
 
-/// Return for each body whether its points are scattered (not on a lattice) at an output. The result is empty
-/// in 1-D and without outputs.
+/// Return for each body whether its points are scattered (not on a lattice) at output `index`. The list is
+/// empty in 1-D and without outputs.
 ///
-/// The number of combinations of a body is the product of the numbers of different x, y and z. A body of n
-/// points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. The number of combinations is
-/// about n for a lattice, and n² for scattered points in the plane. In the plane, 16 points or fewer never
-/// count as scattered.
+/// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z. A
+/// body of n points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. The number of
+/// combinations is about n for a lattice; for scattered points, it is n² in 2-D and n³ in 3-D. In 2-D, 16
+/// points or fewer never count as scattered.
 ///
 /// # Errors
 /// If the result is damaged.

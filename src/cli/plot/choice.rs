@@ -7,7 +7,8 @@ use fissure::message::suggestion;
 use fissure::output::StoredField;
 use fissure::picture::{Axis, Camera, ColourMap, View};
 
-/// Largest distance of a requested time from the first or last output, as a fraction of the output interval.
+/// Largest distance of a requested time before the first output or after the last output, as a fraction of
+/// the interval between outputs.
 const TIME_REACH: f64 = 0.5;
 
 /// Fields that are drawn by default, in order of preference.
@@ -20,7 +21,7 @@ const PREFERRED: [&str; 6] = [
     "displacement",
 ];
 
-/// Read a finite number. `wanted` starts the error message.
+/// Read a finite number. The error message starts with `wanted`.
 ///
 /// # Errors
 /// If the text is not a finite number.
@@ -37,7 +38,8 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
 /// by commas.
 ///
 /// # Errors
-/// If there is no output, the text is wrong, or a time is outside of the result.
+/// If there is no output, if the text is wrong, or if a time is more than half an output interval before the
+/// first output or after the last output.
 pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
         return Err(Error::input("the result holds no output yet"));
@@ -73,11 +75,12 @@ pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     chosen.collect()
 }
 
-/// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else the
-/// first field that changes with time, else the first field.
+/// Return the field to draw: the named field. Without a name, return the first existing field of
+/// [`PREFERRED`], else the first field other than `id` that is stored for each output, else the first field.
+/// `path` is the path of the result, for the error message.
 ///
 /// # Errors
-/// If the result has no such field.
+/// If the result has no field with this name, or no fields.
 pub fn choose_field<'a>(
     name: Option<&str>,
     path: &Path,
@@ -135,11 +138,12 @@ fn camera_of(text: &str) -> Result<Camera> {
     Ok(Camera::new(azimuth, elevation))
 }
 
-/// Return the view of a body of this dimension; `slice` and `camera` are the arguments of these options.
+/// Return the view of a body of this dimension; `slice` and `camera` are the arguments of the options
+/// `--slice` and `--camera`.
 ///
 /// # Errors
-/// If the text of the slice is not AXIS=POSITION, if the text of the camera is not AZIMUTH,ELEVATION, or if
-/// the body is not 3-D.
+/// If the text of the slice is not AXIS=POSITION, if the text of the camera is not AZIMUTH,ELEVATION with an
+/// elevation from -90 to 90 degrees, or if one of these options is given and the body is not 3-D.
 pub fn view(slice: Option<&str>, camera: Option<&str>, dimension: usize) -> Result<View> {
     let wanted = "--slice must be AXIS=POSITION, such as z=0.005";
     let given = camera.is_some();

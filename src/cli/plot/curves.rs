@@ -13,7 +13,7 @@ use crate::cli::{Verbosity, file_error, outln};
 /// The default of `--x`.
 const TIME: &str = "time";
 
-/// Largest number of columns in the default name of a picture.
+/// Largest number of columns that the default file name of a picture contains.
 const MOST_NAMED: usize = 3;
 
 /// The columns of a history.
@@ -176,7 +176,7 @@ impl Table {
     }
 }
 
-/// Read a CSV file whose first row has names such as `time [s]`.
+/// Read a CSV file whose first row has names with units, such as `time [s]`.
 ///
 /// # Errors
 /// If the file cannot be read, or a row does not have one number per column.
@@ -214,7 +214,8 @@ pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
     Ok(columns)
 }
 
-/// Return short, distinct names of runs: the folder of each history, with as many parent folders as needed.
+/// Return short, distinct names of runs: the folder of each history, with as many parent folders as needed to
+/// make the names distinct.
 fn run_names(tables: &[Table]) -> Vec<String> {
     let parts = |table: &Table| -> Vec<String> {
         let absolute = std::path::absolute(&table.path).unwrap_or_else(|_| table.path.clone());
@@ -241,7 +242,7 @@ fn run_names(tables: &[Table]) -> Vec<String> {
         sorted.len() == names.len()
     };
     let found = (1..=deepest).map(names).find(distinct);
-    // Files in one folder are named by their file names instead.
+    // Files in the same folder have no distinct folder names, so use the file names.
     found.unwrap_or_else(|| {
         let name = |table: &Table| {
             let stem = table.path.file_stem().unwrap_or_default();

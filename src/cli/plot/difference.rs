@@ -1,4 +1,4 @@
-//! Difference of the drawn quantity to another result.
+//! Difference between the drawn quantity and the same quantity of another result.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use fissure::output::ResultReader;
 use super::quantity::Quantity;
 use crate::cli::result_file;
 
-/// Largest difference of two times that count as equal, as a fraction of the later time.
+/// Largest difference of two times that count as equal, as a fraction of the larger absolute time.
 const SAME_TIME: f64 = 1e-9;
 
-/// The result that `--minus` names.
+/// The result that `--minus` names. Its values are subtracted from those of the minuend, the drawn result.
 pub struct Subtrahend {
     path: PathBuf,
     result: ResultReader,
@@ -53,7 +53,7 @@ impl Subtrahend {
         })
     }
 
-    /// Return the index of the output that belongs to output `index` of `minuend`.
+    /// Return the index of the output of this result at the time of output `index` of `minuend`.
     ///
     /// # Errors
     /// If this result has no output at the same time, or another number of points.
@@ -66,7 +66,8 @@ impl Subtrahend {
         Ok(own)
     }
 
-    /// Subtract the values of this result from those of consecutive points of output `index` of `minuend`.
+    /// Subtract the values of this result from `values`. Before the call, `values` has the quantity of the
+    /// points `points` of output `index` of `minuend`.
     ///
     /// # Errors
     /// If this result has no output at the same time, or other points, or is damaged.

@@ -13,7 +13,7 @@ use super::quantity::Quantity;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
     axis: Axis,
-    /// The half space is below the position, not above it.
+    /// The half space has the coordinates below `position`, not those above.
     is_below: bool,
     /// Coordinate of the plane that bounds the half space, m.
     position: f64,
@@ -58,7 +58,7 @@ impl Clip {
 pub struct Threshold {
     low: f64,
     high: f64,
-    /// The quantity that is compared with the range; `None` for the drawn quantity.
+    /// The quantity whose values are compared with the range; `None` for the drawn quantity.
     pub quantity: Option<Quantity>,
 }
 

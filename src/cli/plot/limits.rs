@@ -9,11 +9,12 @@ use crate::cli::format::si;
 /// Percentiles at the ends of the automatic range of colours if there are outliers.
 const PERCENTILES: [f64; 2] = [0.5, 99.5];
 
-/// Ratio of the full range to the percentile range above which there are outliers.
+/// Values have outliers if the range of all values is more than this many times as long as the range between
+/// the [`PERCENTILES`].
 const OUTLIERS: f64 = 4.0;
 
-/// Number of decades that the automatic range of a logarithmic scale covers at most. Round-off of values that
-/// should be 0 would otherwise set the range.
+/// Largest number of decades that the automatic range of a logarithmic scale covers. Without this limit, the
+/// round-off of values that should be 0 would set the low end.
 const DECADES: i32 = 6;
 
 /// Requested range of the colours.
@@ -32,7 +33,8 @@ pub enum Range {
 /// Read the argument of `--range`.
 ///
 /// # Errors
-/// If the text is neither two values, nor two percentiles, nor `all`.
+/// If the text is neither two values, nor two percentiles from 0 to 100, nor `all`, or if the first number is
+/// not below the second number.
 pub fn range_of(text: &str) -> Result<Range> {
     let wanted = "--range must be LOW,HIGH, percentiles such as 5%,95%, or `all`";
     if text == "all" {
@@ -71,18 +73,19 @@ pub struct Limits {
     cut: Cut,
 }
 
-/// Values beyond the ends of the colour bar.
+/// Rule that excludes values from the colour bar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Cut {
     Nothing,
-    /// Values beyond two percentiles.
+    /// Exclude values beyond two percentiles.
     Percentiles([f64; 2]),
-    /// Values more than [`DECADES`] below the largest value.
+    /// Exclude values that are more than [`DECADES`] decades below the largest value.
     Decades,
 }
 
 impl Limits {
-    /// Return the limits of some values for a requested range; `None` without values.
+    /// Return the limits of some values for a requested range; `None` without values. For [`Range::Values`],
+    /// the limits are those of all values, because the painter applies the two numbers itself.
     pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);
@@ -114,7 +117,7 @@ impl Limits {
         })
     }
 
-    /// Return the limits of the values above 0 on a logarithmic scale; `None` without such values.
+    /// Return the limits of the values above 0 on a logarithmic scale; `None` if no value is above 0.
     pub fn logarithmic(mut values: Vec<f64>, asked: Range) -> Option<Self> {
         values.retain(|value| *value > 0.0);
         let range = match asked {
@@ -136,7 +139,8 @@ impl Limits {
         self.cut != Cut::Nothing
     }
 
-    /// Return limits whose shown range has 0 in its middle.
+    /// Return limits whose colour bar has 0 in its middle and includes all values of the colour bar of
+    /// `self`.
     pub fn symmetric(self) -> Self {
         let [low, high] = self.shown;
         let reach = low.abs().max(high.abs());
@@ -156,7 +160,8 @@ impl Limits {
         }
     }
 
-    /// Format a note about values beyond the colour bar; empty if the colour bar covers all values.
+    /// Format a note about values beyond the ends of the colour bar; empty if the colour bar covers all
+    /// values.
     pub fn note(&self, unit: &str) -> String {
         let colours = match self.cut {
             Cut::Nothing => return String::new(),
@@ -180,12 +185,12 @@ pub struct Frame {
     pub bounds: Bounds,
     /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
-    /// Vector length that the longest arrow stands for; 0 without vectors.
+    /// Vector length that the longest arrow represents, in the unit of the vectors; 0 without vectors.
     pub longest_arrow: f64,
 }
 
 impl Frame {
-    /// Return a frame that encloses the frames of several outputs; `None` if no output has points.
+    /// Return a frame that encloses the frames of several outputs; `None` if no output has a frame.
     ///
     /// # Errors
     /// If an output is damaged.

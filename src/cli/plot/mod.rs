@@ -100,7 +100,7 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     }
 }
 
-/// Check the ending of the name of an output file.
+/// Check the ending of the name of an output file. `hint` is appended to the error message.
 ///
 /// # Errors
 /// If the ending is not in `known`.

@@ -7,24 +7,24 @@ use fissure::output::StoredField;
 
 use super::choice::{choose_field, number};
 
-/// The lines of equal value that `--contours` requests.
+/// The values for which `--contours` requests lines of equal value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contours {
-    /// Number of values at equal distances on the colour bar.
+    /// A number of values at equal distances on the colour bar.
     Count(usize),
-    /// The values.
+    /// Given values.
     Values(Vec<f64>),
 }
 
-/// Largest number of lines for `--contours`.
+/// Largest number of lines that `--contours` accepts as a count.
 const MOST_CONTOURS: usize = 100;
 
 impl Contours {
     /// Read the argument of `--contours`: a whole number is a count, and any other text is a list of values.
     ///
     /// # Errors
-    /// If the text is neither, the count is not from 1 to 100, or a value is not above 0 on a logarithmic
-    /// scale.
+    /// If the text is neither a count nor a list of values, if the count is not from 1 to 100, or if a value
+    /// is not above 0 on a logarithmic scale.
     pub fn new(text: &str, is_logarithmic: bool) -> Result<Self> {
         if let Ok(count) = text.trim().parse::<usize>() {
             if (1..=MOST_CONTOURS).contains(&count) {
@@ -50,7 +50,7 @@ impl Contours {
 /// Return the vector field with a name, for `--vectors`.
 ///
 /// # Errors
-/// If the result has no such field, or it is not a vector field.
+/// If the result has no field with this name, or the field is not a vector field.
 pub fn vector_field<'a>(
     name: &str,
     path: &Path,

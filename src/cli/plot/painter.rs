@@ -1,4 +1,4 @@
-//! Pictures of the outputs of a result: reading of the points that are drawn, and the settings.
+//! Pictures of the outputs of a result: the settings of the pictures, and the points that are drawn.
 
 use std::ops;
 use std::path::Path;
@@ -17,7 +17,8 @@ use super::paths::{self, Line, NearestPoints};
 use super::picture::PictureArguments;
 use super::quantity::Quantity;
 
-/// Largest drawn displacement for `--deform auto`, relative to the body's size.
+/// Largest drawn displacement for `--deform auto`, as a fraction of the longest edge of the box of all
+/// points. Displacements are never drawn smaller than they are.
 const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 
 /// Settings of all pictures of a result.
@@ -25,11 +26,11 @@ pub struct Painter<'a> {
     pub(super) result: &'a ResultReader,
     pub(super) arguments: &'a PictureArguments,
     pub(super) dimension: usize,
-    /// Title of the pictures, before the time.
+    /// Title of the pictures; the time of the output is appended.
     pub(super) title: String,
     /// Field and component of the drawn values, with label and unit.
     pub quantity: Quantity,
-    /// Result that is subtracted.
+    /// Result that is subtracted from the drawn result.
     pub(super) minus: Option<Subtrahend>,
     has_displacement: bool,
     pub(super) section: f64,
@@ -42,15 +43,15 @@ pub struct Painter<'a> {
     /// Field of the arrows.
     vectors: Option<StoredField>,
     pub(super) factor: f64,
-    /// Whether `--deform auto` found displacements; true with a given factor.
+    /// Whether `--deform auto` found displacements other than 0; true if `--deform` gives a factor.
     pub(super) is_displaced: bool,
-    /// Whether the points of a body are scattered, by index of the body.
+    /// For each body, whether its points are scattered.
     scattered: Vec<bool>,
-    /// Lines over the picture, by index of the file.
+    /// For each file of `--path`, the lines that are drawn over the picture.
     paths: Vec<Vec<Line>>,
 }
 
-/// The points of an output as they are drawn.
+/// The points of an output that are drawn.
 #[derive(Default)]
 pub(super) struct Points {
     positions: Vec<[f64; 3]>,
@@ -64,10 +65,11 @@ pub(super) struct Points {
 }
 
 impl<'a> Painter<'a> {
-    /// Create a painter of a result. An automatic displacement factor is chosen for the output `reference`.
+    /// Create a painter of the result with the file `path`. The default field, the automatic displacement
+    /// factor, and the distinction between lattices and scattered points follow from the output `reference`.
     ///
     /// # Errors
-    /// If an argument is wrong for this result.
+    /// If an argument is wrong for this result, or if a result cannot be read.
     pub fn new(
         arguments: &'a PictureArguments,
         path: &Path,
@@ -191,7 +193,7 @@ impl<'a> Painter<'a> {
         name
     }
 
-    /// Return the drawn values of consecutive points of the output `index`.
+    /// Return the drawn values of consecutive points of output `index`.
     pub(super) fn drawn_values(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<f64>> {
         let values = (self.result).field_of(&self.quantity.field, index, points.clone())?;
         let mut values = self.quantity.of(values);
@@ -201,8 +203,8 @@ impl<'a> Painter<'a> {
         Ok(values)
     }
 
-    /// Return whether the colour bar starts at 0: true for damage, which is never negative, and false for a
-    /// difference of damages.
+    /// Return whether a colour bar with a linear scale starts at 0: true for damage, which is never negative,
+    /// and false for a difference of damages.
     fn starts_at_zero(&self) -> bool {
         self.minus.is_none() && is_damage(&self.quantity.field)
     }
@@ -219,8 +221,8 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible; `None` without
-    /// displacements.
+    /// Return a factor that makes the drawn displacements visible: 1, 2 or 5 times a power of ten, and at
+    /// least 1. Return `None` if all displacements of output `index` are 0.
     fn automatic_factor(&self, index: usize) -> Result<Option<f64>> {
         let mut largest = 0.0_f64;
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
@@ -250,7 +252,8 @@ impl<'a> Painter<'a> {
         Ok(Some(step.unwrap_or(1.0) * power))
     }
 
-    /// Return whether the slice shows a position; true without a slice. `size` is the edge of the cell, m.
+    /// Return whether the slice shows the point at a position (m); true without a slice. `size` is the edge
+    /// of the cell of the point, m.
     pub(super) fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
         match self.view {
             View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),
@@ -262,13 +265,14 @@ impl<'a> Painter<'a> {
         !self.clips.iter().all(|clip| clip.holds(position))
     }
 
-    /// Return whether points may be left out.
+    /// Return whether a slice, a half space or a threshold may exclude points from the picture.
     pub(super) fn is_partial(&self) -> bool {
         let is_slice = matches!(self.view, View::Slice { .. });
         is_slice || !self.clips.is_empty() || self.threshold.is_some()
     }
 
-    /// Return the values for the threshold; `None` if these are the drawn values.
+    /// Return the values of the field of `--threshold-field`; `None` without this option, because the
+    /// threshold then applies to the drawn values.
     pub(super) fn threshold_values(
         &self,
         index: usize,
@@ -282,8 +286,8 @@ impl<'a> Painter<'a> {
         Ok(Some(quantity.of(values)))
     }
 
-    /// Read the points of an output, block by block. Keep only the points in the slice, the half spaces and
-    /// the range of values.
+    /// Read the points of an output, block by block. Keep only the points in the slice, in the half spaces
+    /// and in the range of the threshold.
     pub(super) fn points(&self, index: usize) -> Result<Points> {
         let mut found = Points::default();
         let count = self.result.points(index);
@@ -388,8 +392,8 @@ impl<'a> Painter<'a> {
         Ok(bodies.iter().map(is_scattered).collect())
     }
 
-    /// Return the limits of the drawn values. An automatic range covers all values of damage, which has no
-    /// outliers.
+    /// Return the limits of the drawn values. For damage, the automatic range covers all values: the few
+    /// points with damage are not outliers.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
         let limits = match self.range {
             range if self.arguments.log => Limits::logarithmic(values, range),
@@ -403,11 +407,11 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return the frame that encloses an output; `None` if no point is drawn. A film uses the union of the
-    /// frames of its outputs.
+    /// Return the frame of an output: the box and the limits of its drawn points; `None` if no point is
+    /// drawn. A film uses the union of the frames of its outputs.
     ///
     /// # Errors
-    /// If the result is damaged.
+    /// If the result is damaged, or has too many points for a picture.
     pub fn frame(&self, index: usize) -> Result<Option<Frame>> {
         let points = self.points(index)?;
         let scene = self.scene(&points);
@@ -422,11 +426,11 @@ impl<'a> Painter<'a> {
         }))
     }
 
-    /// Draw an output; `time` is the text of its time. Box and limits come from `frame`, or from the output
-    /// if `frame` is `None`.
+    /// Draw an output. The title contains the text `time`. The drawn box, the limits of the values and the
+    /// length of the arrows come from `frame`, or from the output if `frame` is `None`.
     ///
     /// # Errors
-    /// If the result is damaged.
+    /// If the result is damaged, or has too many points for a picture.
     pub fn image(&self, index: usize, time: &str, frame: Option<&Frame>) -> Result<Image> {
         let points = self.points(index)?;
         let scene = self.scene(&points);
@@ -443,7 +447,7 @@ impl<'a> Painter<'a> {
             title: title.trim_start(),
             range: match (self.range, limits) {
                 (Range::Values(range), _) => Some(range),
-                // The colour bar of damage starts at 0 in all pictures.
+                // With a linear scale, the colour bar of damage starts at 0 in all pictures.
                 (_, Some(limits)) if frame.is_some() || limits.is_cut() || self.minus.is_some() => {
                     let [low, high] = limits.shown;
                     let from_zero = self.starts_at_zero() && !self.arguments.log;

@@ -67,18 +67,18 @@ fn bare_name(name: &str) -> &str {
     name.split('[').next().unwrap_or_default().trim()
 }
 
-/// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of its
-/// nearest point.
+/// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of this
+/// point.
 pub struct NearestPoints<'a> {
     /// The lines, each with the index of its file.
     lines: Vec<(usize, &'a Line)>,
-    /// For each vertex of all lines, in order: distance of the nearest point found so far, and displacement
-    /// of this point, m.
+    /// For each vertex of all lines, in the order of `lines`: distance (m) from the nearest point found so
+    /// far, and displacement (m) of this point.
     nearest: Vec<(f64, [f64; 2])>,
 }
 
 impl<'a> NearestPoints<'a> {
-    /// Begin the search for the lines of these files.
+    /// Begin a search for the lines of several files. `files` has one entry per file: the lines of this file.
     pub fn new(files: &'a [Vec<Line>]) -> Self {
         let files = files.iter().enumerate();
         let lines = files.flat_map(|(number, lines)| lines.iter().map(move |line| (number, line)));
@@ -90,7 +90,8 @@ impl<'a> NearestPoints<'a> {
         }
     }
 
-    /// Search a block of points. `displacements` has three components per point, m.
+    /// Continue the search with a block of points: reference positions (m), and displacements (m) with three
+    /// components per point.
     pub fn search(&mut self, positions: &[[f64; 3]], displacements: &[f64]) {
         let vertices = self.lines.iter().flat_map(|(_, line)| line.iter());
         for (place, nearest) in vertices.zip(&mut self.nearest) {

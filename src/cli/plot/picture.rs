@@ -86,7 +86,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "FIELD")]
     pub(super) vectors: Option<String>,
 
-    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: damage for the field damage, otherwise viridis].
+    /// Colour map: viridis, turbo, coolwarm, grey or damage [default: coolwarm with --minus, damage for the
+    /// field damage, otherwise viridis].
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
@@ -99,7 +100,8 @@ pub struct PictureArguments {
     pub(super) width: u32,
 }
 
-/// Draw the last output, the output nearest to a time, or all outputs.
+/// Draw one output of a result (the last output, or the output nearest to a time) or all outputs, each as one
+/// picture.
 ///
 /// # Errors
 /// If the file is not a result, an argument is wrong, the field or component is missing, or a picture
@@ -149,8 +151,9 @@ pub fn nothing_to_draw(file: &Path) -> Error {
     Error::input(message)
 }
 
-/// Return the path of a file beside a result. For a further result, such as `result_edge.vtkhdf`, the file
-/// name starts with the name of the result. No field name starts with `result_`, so names are unique.
+/// Return the path of the file `name` in the folder of a result. For a further result, such as
+/// `result_edge.vtkhdf`, `result_edge_` is put before the name. No field name starts with `result_`, so the
+/// names are unique.
 pub fn beside(result: &Path, name: &str) -> PathBuf {
     let stem = result.file_stem().unwrap_or_default().to_string_lossy();
     let further = if stem.starts_with("result_") {
@@ -161,7 +164,7 @@ pub fn beside(result: &Path, name: &str) -> PathBuf {
     result.with_file_name(format!("{further}{name}"))
 }
 
-/// Insert a number into a file name: `name.png` becomes `name_0012.png`.
+/// Insert the index of an output into a file name: `name.png` becomes `name_0012.png`.
 fn numbered(path: &Path, index: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}_{index:04}.png"))

@@ -20,11 +20,12 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Create the quantity for a component or invariant of a field. The default is the value of a scalar, the
-    /// magnitude of a vector or a full tensor, and the von Mises equivalent of a symmetric tensor.
+    /// Create the quantity for a component or invariant of a field. If `component` is `None`, the quantity is
+    /// the value of a scalar, the magnitude of a vector or a full tensor, and the von Mises equivalent of a
+    /// symmetric tensor.
     ///
     /// # Errors
-    /// If the field has no such component.
+    /// If the field has no component or invariant with this name.
     pub fn new(field: &StoredField, component: Option<&str>) -> Result<Self> {
         let (names, invariants) = (field.component_names(), invariants(field.components));
         let kind = match component {

@@ -1,12 +1,13 @@
 //! Observed rates of convergence.
 
-/// Largest absolute rate of the search.
+/// Largest absolute rate of convergence that the search can find.
 const LARGEST_RATE: f64 = 30.0;
 
-/// Number of bisections, after which the interval is as small as the round-off of [`LARGEST_RATE`].
+/// Number of bisections. The interval of the search is then smaller than the round-off of [`LARGEST_RATE`].
 const BISECTIONS: usize = 60;
 
-/// Compute the rate of convergence p of each row of a series of pairs (h, f); `None` if a row has no rate.
+/// Compute the rate of convergence p of each row of a series; `None` for a row without a rate. Each row is a
+/// pair (h, f): a parameter such as the spacing, and the value of a run.
 ///
 /// - With a reference, |f − reference| ∝ h^p gives p from a row and the previous row.
 /// - Without a reference, f − f₀ ∝ h^p with unknown f₀ gives p from a row and the previous two rows.
@@ -29,7 +30,7 @@ pub fn rates(series: &[(f64, Option<f64>)], reference: Option<f64>) -> Vec<Optio
     (0..series.len()).map(rate).collect()
 }
 
-/// Return the N rows that end at `row`, if all of them have values.
+/// Return the last N rows up to `row`; `None` if there are fewer rows or one of these rows has no value.
 fn last<const N: usize>(series: &[(f64, Option<f64>)], row: usize) -> Option<[(f64, f64); N]> {
     let rows = series[..=row].last_chunk::<N>()?;
     rows.iter()
@@ -41,8 +42,8 @@ fn positive<const N: usize>(sizes: [f64; N]) -> Option<()> {
     sizes.iter().all(|h| *h > 0.0).then_some(())
 }
 
-/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio; `None` if h is not monotonic or there is no
-/// root.
+/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio; `None` if h₁, h₂ and h₃ neither increase nor
+/// decrease, or if there is no root between −[`LARGEST_RATE`] and [`LARGEST_RATE`].
 fn rate_of_differences([h1, h2, h3]: [f64; 3], ratio: f64) -> Option<f64> {
     let (up, down) = ((h1 / h2).ln(), (h3 / h2).ln());
     let monotonic = up * down < 0.0;
@@ -57,7 +58,7 @@ fn rate_of_differences([h1, h2, h3]: [f64; 3], ratio: f64) -> Option<f64> {
             -(p * up).exp_m1() / (p * down).exp_m1()
         }
     };
-    // The quotient increases with p if h decreases, and decreases with p if h increases.
+    // The quotient increases with p if h₁ > h₂ > h₃, and decreases with p if h₁ < h₂ < h₃.
     let sign = up.signum();
     let (mut low, mut high) = (-LARGEST_RATE, LARGEST_RATE);
     let above = |p: f64| sign * (quotient(p) - ratio) > 0.0;

@@ -1,11 +1,11 @@
-//! The combinations of values of a sweep.
+//! The combinations of values of a sweep. Each combination is a row of the sweep's table.
 
 use std::collections::HashSet;
 
 use fissure::error::{Error, Result};
 use fissure::message::suggestion;
 
-/// Largest length of a folder name that contains the values of a run, characters.
+/// Largest length of a folder name that contains the values of a run, bytes.
 const LONGEST_NAME: usize = 120;
 
 /// Name of a parameter or key, and its values as texts.
@@ -38,7 +38,7 @@ pub fn axis(text: &str) -> std::result::Result<Axis, String> {
     })
 }
 
-/// Split at commas outside of brackets and quotes.
+/// Split a text at commas outside of brackets and quotes.
 fn split(text: &str) -> Vec<String> {
     let mut parts = vec![String::new()];
     let (mut depth, mut quote) = (0, None);
@@ -62,9 +62,10 @@ fn split(text: &str) -> Vec<String> {
 }
 
 /// Parse a list of rows such as `1-4,7`. Rows count from 1 in the list, and from 0 in the returned indices.
+/// `count` is the number of all rows.
 ///
 /// # Errors
-/// If a part of the list is not a row or a range of rows.
+/// If a part of the list is not a row from 1 to `count` or a range of such rows.
 pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
     let mut rows = Vec::new();
     for part in list.split(',').map(str::trim) {
@@ -84,17 +85,17 @@ pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
     Ok(rows)
 }
 
-/// Combinations of the values of all axes.
+/// Combinations of the values of all axes. An axis is a parameter or key with its values.
 pub struct Design {
     pub axes: Vec<Axis>,
-    /// Indices into the values of the axes, for each row.
+    /// For each row (combination): one index per axis, into the values of this axis.
     pub rows: Vec<Vec<usize>>,
     zip: bool,
 }
 
 impl Design {
-    /// Create all combinations of the values; the last axis changes fastest. With `zip`, combine only the
-    /// k-th values of all axes; an axis with one value has this value in all rows.
+    /// Create all combinations of the values; the value of the last axis changes fastest. With `zip`, row k
+    /// combines the k-th values of all axes; an axis with one value has this value in all rows.
     ///
     /// # Errors
     /// If a name is given twice, or if zipped axes with several values have different numbers of values.
@@ -137,12 +138,12 @@ impl Design {
         Ok(Self { axes, rows, zip })
     }
 
-    /// Return the axes with several values.
+    /// Return the indices of the axes with several values.
     pub fn varied(&self) -> impl Iterator<Item = usize> {
         (0..self.axes.len()).filter(|axis| self.axes[*axis].values.len() > 1)
     }
 
-    /// Return the text of the value of an axis in a row.
+    /// Return the value of an axis in a row, as text.
     pub fn value(&self, row: &[usize], axis: usize) -> &str {
         &self.axes[axis].values[row[axis]]
     }
@@ -158,7 +159,8 @@ impl Design {
         (0..self.axes.len()).map(assignment).collect()
     }
 
-    /// Format a row for messages: its varied values, or all values if none is varied.
+    /// Format a row for messages: the names and values of the axes with several values, or of all axes if no
+    /// axis has several values.
     pub fn label(&self, row: &[usize]) -> String {
         self.label_without(row, None)
     }
@@ -173,8 +175,8 @@ impl Design {
         axes.iter().map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// Return the names of the runs' folders: the values if these give distinct names of at most
-    /// [`LONGEST_NAME`] characters, else numbers.
+    /// Return the folder name of each row: the label of the row, or `row_1`, `row_2`, … if the labels are not
+    /// distinct or a label has more than [`LONGEST_NAME`] bytes.
     pub fn folders(&self) -> Vec<String> {
         let safe = |c: char| c.is_ascii_alphanumeric() || "._+-=,".contains(c);
         let name = |row: &Vec<usize>| -> String {
@@ -199,8 +201,8 @@ impl Design {
         number(self.value(row, axis))
     }
 
-    /// Return the axis for rates and pictures: the named axis, or the first varied axis whose values are
-    /// numbers; `None` if there is no such axis.
+    /// Return the index of the axis for rates and pictures: the named axis or, without a name, the first axis
+    /// with several values that are all numbers; `None` if there is no such axis.
     ///
     /// # Errors
     /// If the named axis is missing, has one value, or has values that are not numbers.
@@ -229,7 +231,7 @@ impl Design {
     }
 
     /// Group the rows that differ only in the axis `abscissa`; with `zip`, all rows form one group. Return
-    /// the name and the rows of each group.
+    /// the name and the row indices of each group.
     pub fn groups(&self, abscissa: usize) -> Vec<(String, Vec<usize>)> {
         if self.zip {
             return vec![(String::new(), (0..self.rows.len()).collect())];

@@ -69,7 +69,7 @@ pub struct SweepArguments {
     #[arg(long, value_name = "[PICK:]COLUMN", value_parser = value::column)]
     value: Vec<Column>,
 
-    /// Expected number for a --value; with several of them, write the one that is meant as VALUE, such as
+    /// Expected number for a --value. With several --value options, VALUE names one of them, such as
     /// max:kinetic_energy=2.5. May be repeated.
     #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
     reference: Vec<Reference>,
@@ -113,8 +113,8 @@ impl SweepArguments {
     }
 }
 
-/// Return the runs of all combinations. The decks are validated, and the histories have the columns of all
-/// values.
+/// Return the runs of all combinations. Validate their decks, and check that their histories have the columns
+/// of all values to pick.
 ///
 /// # Errors
 /// If the deck is invalid with the values of a combination, or if a value has an unknown column. The message
@@ -144,10 +144,10 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
     design.rows.iter().zip(design.folders()).map(run).collect()
 }
 
-/// Run the missing combinations, and write the table and pictures of all combinations.
+/// Run the chosen combinations that are not complete, and write the table and pictures of all combinations.
 ///
 /// # Errors
-/// If the deck or an argument is wrong, a run fails, or a file cannot be written.
+/// If the deck or an argument is wrong, a run fails, a file cannot be written, or a signal stops the sweep.
 pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
     let design = Design::new(&arguments.set, arguments.zip)?;
     let chosen = match &arguments.rows {

@@ -14,19 +14,19 @@ use signal_hook::iterator::Signals;
 use super::SweepArguments;
 use crate::cli::file_error;
 
-/// File with the output of a run.
+/// File with the text that a run prints.
 pub const LOG: &str = "log.txt";
 
-/// File with the deck of a run and all defaults. This file identifies the run.
+/// File with the deck of a run and all defaults. Runs are the same if this file is the same.
 const DECK: &str = "deck_in_full.toml";
 
-/// Result of a run.
+/// File with the result of a run.
 const RESULT: &str = "result.vtkhdf";
 
 /// Marker file in the folder of a complete run.
 const COMPLETE: &str = "complete";
 
-/// Checkpoints of a run.
+/// Files with the checkpoints of a run.
 const CHECKPOINTS: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 
 /// Interval between checks of the processes.
@@ -43,7 +43,7 @@ pub struct Run {
     pub set: Vec<(String, String)>,
     /// The deck with all defaults.
     pub deck: String,
-    /// Horizons and spacings (m) and time steps (s, or fractions of the stable step).
+    /// Horizons and spacings (m) and time steps (s, or fractions of the stable step), see [`resolution`].
     pub resolution: Vec<f64>,
 }
 
@@ -102,7 +102,8 @@ impl Run {
         same && self.folder.join(COMPLETE).exists()
     }
 
-    /// Return the last error message of the run, or the last printed line.
+    /// Return the first line of the last error message of the run, or the last printed line if there is no
+    /// error message.
     pub fn last_words(&self) -> String {
         let log = std::fs::read(self.folder.join(LOG)).unwrap_or_default();
         let log = String::from_utf8_lossy(&log);
@@ -113,14 +114,14 @@ impl Run {
     }
 }
 
-/// Program that executes the runs.
+/// The program that executes a run: this executable, started by the command of `--launcher`.
 pub struct Program<'a> {
     arguments: &'a SweepArguments,
     fissure: PathBuf,
     launcher: Vec<String>,
 }
 
-/// A running process.
+/// The process of a run.
 struct Process {
     number: usize,
     child: Child,
@@ -148,14 +149,15 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// Execute the runs with the indices `due`, several at a time. Call `ended` with index, state and time
-    /// (s) of each run that is complete or failed. Return true if a signal or a limit stopped a run.
+    /// Execute the runs with the indices `due`, as many at a time as `--jobs` allows. Call `ended` with the
+    /// index, the state and the run time (s) of each run that is complete or failed. Return true if a signal
+    /// or a time limit stopped a run.
     ///
     /// A first SIGINT or SIGTERM makes all runs write checkpoints and stop; a second signal kills the runs.
     ///
     /// # Errors
-    /// If a run cannot be started, its marker file cannot be created, or `ended` fails. The other runs are
-    /// then stopped.
+    /// If signals cannot be received, a run cannot be started, a marker file cannot be created, or `ended`
+    /// fails. All running runs are then stopped.
     pub fn run_all(
         &self,
         runs: &[Run],
@@ -216,8 +218,8 @@ impl<'a> Program<'a> {
                 let is_stop = !status.success()
                     && (stopped || outcome.is_err() || status.code() == Some(STOPPED));
                 if is_stop {
-                    // A run also stops without a signal to this process, for example at the limit of a batch
-                    // job.
+                    // A run may stop although this process received no signal, for example at the time limit
+                    // of a batch job.
                     stopped |= outcome.is_ok();
                 } else if outcome.is_ok() {
                     outcome = ended(process.number, state, seconds);
@@ -232,7 +234,8 @@ impl<'a> Program<'a> {
         outcome.map(|()| stopped)
     }
 
-    /// Start a run, from its checkpoint if one exists.
+    /// Start a run; from a checkpoint if the folder has a checkpoint of this run and `--overwrite` is not
+    /// given.
     fn start(&self, run: &Run) -> Result<Child> {
         let folder = &run.folder;
         std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
@@ -278,8 +281,8 @@ impl<'a> Program<'a> {
             .stdin(Stdio::null())
             .stdout(log)
             .stderr(errors);
-        // In a separate process group, a run gets no signal from Ctrl-C; this process sends one signal
-        // instead.
+        // In a separate process group, a run does not receive the signal of Ctrl-C. This process receives
+        // that signal, and sends SIGUSR1 to the run.
         command.process_group(0);
         command.spawn().map_err(|error| {
             let program = command.get_program().to_string_lossy().into_owned();
@@ -296,7 +299,7 @@ fn words(status: ExitStatus) -> String {
     }
 }
 
-/// Send a signal to processes whose end has not been detected yet.
+/// Send a signal to processes that this program has not yet waited for.
 fn kill(processes: &[Process], signal: i32) {
     for process in processes {
         // SAFETY: the call only sends a signal. The id belongs to the child: the system does not reuse an id

@@ -21,17 +21,17 @@ pub struct Table<'a> {
     abscissa: Option<usize>,
     /// Compute rates even without a reference: the runs differ in resolution, or `--x` is given.
     has_rates: bool,
-    /// Values by run and column; `None` for incomplete runs.
+    /// Values by run and column; `None` for incomplete runs and for values that are not finite.
     values: Vec<Option<Vec<Option<f64>>>>,
     units: Vec<String>,
 }
 
-/// A column of the table, as printed and as written to sweep.csv.
+/// A column of the table, with separate texts for the printed table and for sweep.csv.
 struct Cells {
-    /// Printed and written heading.
+    /// Heading in the printed table, and in sweep.csv.
     heading: [String; 2],
     unit: String,
-    /// Printed and written text of each run.
+    /// Text of each run in the printed table, and in sweep.csv.
     texts: Vec<[String; 2]>,
 }
 
@@ -72,7 +72,7 @@ impl<'a> Table<'a> {
         self.values.iter().flatten().count()
     }
 
-    /// Write sweep.csv and the pictures, and print the table.
+    /// Write sweep.csv and the pictures. Print the table and the paths of the files if `prints`.
     ///
     /// # Errors
     /// If a file cannot be written.
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         self.values[row].as_ref()?[column]
     }
 
-    /// Return the columns: values of the axes, state, and picked values with errors and rates.
+    /// Return the columns of the table: values of the axes, state, and picked values with errors and rates.
     fn cells(&self) -> Vec<Cells> {
         let rows = 0..self.design.rows.len();
         let alike = |text: String| [text.clone(), text];
@@ -163,7 +163,7 @@ impl<'a> Table<'a> {
         cells
     }
 
-    /// Compute the rate of convergence of each row.
+    /// Compute the rate of convergence of a picked value for each row; `None` for a row without a rate.
     fn rates(&self, column: usize) -> Vec<Option<f64>> {
         let mut found = vec![None; self.design.rows.len()];
         let Some(abscissa) = self.abscissa else {
@@ -187,8 +187,8 @@ impl<'a> Table<'a> {
         rows.iter().map(pair).collect()
     }
 
-    /// Draw a value over the abscissa, one curve for each combination of the other parameters. Return false
-    /// if there is nothing to draw.
+    /// Draw a picked value over the abscissa, one curve for each combination of the other axes. Draw nothing
+    /// and return false if there is no abscissa, or if fewer than two runs have the value.
     fn draw(&self, column: usize, path: &Path) -> Result<bool> {
         let Some(abscissa) = self.abscissa else {
             return Ok(false);
@@ -206,7 +206,8 @@ impl<'a> Table<'a> {
                 range = [range[0].min(*h), range[1].max(*h)];
             }
             runs += points.len();
-            // Draw each run also as an isolated point, for which the chart draws a marker.
+            // Add each run to the curve again as an isolated point, because the chart draws isolated points
+            // as markers.
             let gap = [f64::NAN; 2];
             let markers: Vec<[f64; 2]> = points.iter().flat_map(|point| [gap, *point]).collect();
             let points = [points, markers].concat();
@@ -274,7 +275,7 @@ fn printed(cells: &[Cells]) -> String {
     lines.join("\n")
 }
 
-/// Format the table as CSV, with headings as in history.csv.
+/// Format the table as CSV, with headings such as `max_kinetic_energy [J]`, as in history.csv.
 fn csv(cells: &[Cells]) -> String {
     let quoted = |text: &str| {
         if text.contains([',', '"', '\n']) {

@@ -45,7 +45,8 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// Expected number for a picked value. `name` is the value; `None` refers to the only value.
+/// Expected number for a picked value. `name` says for which value; `None` stands for the only value of the
+/// sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     name: Option<Column>,
@@ -64,11 +65,11 @@ pub fn reference(text: &str) -> std::result::Result<Reference, String> {
     }
 }
 
-/// Return the reference of each value.
+/// Return the expected number of each value; `None` for a value without a reference.
 ///
 /// # Errors
-/// If a reference has an unknown value, a value has two references, or a reference has no name although there
-/// are several values.
+/// If a reference names an unknown value, if a value has two references, or if a reference names no value
+/// although there are several values or none.
 pub fn references(values: &[Column], references: &[Reference]) -> Result<Vec<Option<f64>>> {
     let mut found = vec![None; values.len()];
     for Reference { name, number } in references {
@@ -97,12 +98,12 @@ pub fn references(values: &[Column], references: &[Reference]) -> Result<Vec<Opt
 }
 
 impl Column {
-    /// Return the value as on the command line, such as `max:damage`.
+    /// Return the text of `--value`, such as `max:damage`.
     pub fn title(&self) -> String {
         format!("{}:{}", self.pick_name(), self.name)
     }
 
-    /// Return a name for files and columns, such as `max_damage`.
+    /// Return a name of the value for files and for columns of sweep.csv, such as `max_damage`.
     pub fn key(&self) -> String {
         format!("{}_{}", self.pick_name(), self.name)
     }
@@ -112,7 +113,8 @@ impl Column {
         found.map_or("", |(name, _)| name)
     }
 
-    /// Pick a number; `None` if it is not finite. `Max` and `Min` ignore numbers that are not finite.
+    /// Pick one of the numbers of a column; `None` if the picked number is not finite or there is no number.
+    /// `Max` and `Min` ignore numbers that are not finite.
     fn of(&self, numbers: &[f64]) -> Option<f64> {
         let finite = numbers.iter().copied().filter(|number| number.is_finite());
         let picked = match self.pick {
@@ -125,7 +127,8 @@ impl Column {
     }
 }
 
-/// Check that a history has the columns of all values. `columns` are the names and units of the history.
+/// Check that a history has the columns of all values. `columns` are the names and units of the columns of
+/// the history.
 ///
 /// # Errors
 /// If the column of a value is missing.
@@ -145,7 +148,8 @@ pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
     }
 }
 
-/// Read values and their units from the history in a folder.
+/// Read the picked values and their units from the history in a folder; `None` for a value that is not
+/// finite.
 ///
 /// # Errors
 /// If the history cannot be read or lacks a column.

@@ -4,16 +4,16 @@
 //! /                      attributes: the run (deck, version, command line, …)
 //! /VTKHDF                Version, Type = UnstructuredGrid; Points, Types, Offsets, Connectivity:
 //!                        one vertex per point, at its reference position, written once
-//! /VTKHDF/PointData/f    static fields [points], others [steps × points] (, components)
+//! /VTKHDF/PointData/f    a field f: [points] if static, else [steps × points]; and components
 //! /VTKHDF/Steps          NSteps; Values (times), Step (numbers), and offsets of a step's rows
-//! /history               table, a row per sample; attributes: columns, units, comma-separated
+//! /history               table, one row per sample; attributes: columns, units, comma-separated
 //! ```
 //!
 //! With adaptive refinement, each step is a separate VTK part. The points and static fields of all steps are
 //! then concatenated.
 //!
 //! On any number of ranks, a step is one part with points in the order of their ids. The data of a step is
-//! flushed before its row in the tables, so the file of a killed run has all complete steps.
+//! flushed before the step's row in the tables, so the file of a killed run has all complete steps.
 
 mod resume;
 
@@ -52,7 +52,7 @@ enum Counted {
     Points,
 }
 
-/// This rank's range of the rows of point data; the ranges of the ranks are contiguous.
+/// This rank's range of the rows of point data. The ranges of successive ranks adjoin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece {
     /// Number of points of all lower ranks.
@@ -65,7 +65,7 @@ pub struct Piece {
 /// one rank fails on all ranks, and the file is abandoned.
 ///
 /// Unless each step has its own points, space for all expected steps is allocated in advance. A new step then
-/// hardly changes metadata, and a killed run leaves a valid file.
+/// changes little metadata.
 pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
@@ -74,7 +74,7 @@ pub struct ResultFile<'a> {
     steps: u64,
     /// Time (s) and number of points of the steps of a resumed file.
     past: Vec<(f64, usize)>,
-    /// Total number of points of all steps.
+    /// Number of points, summed over all written steps: the number of written rows of each moving field.
     rows: u64,
     /// The datasets of the points; `None` if all steps have the same points.
     changing: Option<ChangingPoints>,
@@ -221,8 +221,8 @@ impl<'a> ResultFile<'a> {
         Ok(result)
     }
 
-    /// Set the points and static fields of the next step. The static fields must be the same fields as for
-    /// [`create`](Self::create).
+    /// Set the points and static fields of the next step. The static fields must have the names and order
+    /// that they had in [`create`](Self::create).
     ///
     /// # Errors
     /// If the points of the result never change, or a field has the wrong length. If a write fails, for
@@ -269,7 +269,7 @@ impl<'a> ResultFile<'a> {
 
     /// Append a step: its time (s), its number and this rank's values of the moving fields.
     ///
-    /// `values(k)` returns the values of moving field k. The step is flushed when this returns.
+    /// `values(k)` returns the values of moving field k. The step has been flushed when this method returns.
     ///
     /// # Errors
     /// If a field has the wrong length, or a write fails, for example because the disk is full.
@@ -312,7 +312,8 @@ impl<'a> ResultFile<'a> {
         &self.past
     }
 
-    /// Return the number of points of all ranks in the last step.
+    /// Return the number of points of all ranks: those of the last [`set_points`](Self::set_points) if each
+    /// step has its own points, else those of all steps.
     pub fn points(&self) -> u64 {
         self.piece.total
     }
@@ -400,8 +401,8 @@ impl<'a> ResultFile<'a> {
         }
     }
 
-    /// Return the causes of non-collective writes, as HDF5's bits over all ranks and writes; 0 if all were
-    /// collective.
+    /// Return the causes of non-collective writes, as HDF5's bits over all ranks and writes; 0 if all writes
+    /// were collective.
     pub fn no_collective_cause(&self) -> u32 {
         self.file.no_collective_cause()
     }
@@ -501,8 +502,8 @@ fn write_geometry(
     let dataset = file.create_dataset::<i64>("/VTKHDF/Connectivity", total, None)?;
     let own: Vec<i64> = (first..first + count).collect();
     file.write_rows(&dataset, piece.first, &own)?;
-    // n cells have n + 1 offsets: each rank writes the ends of its cells, and rank 0 also writes the start of
-    // the first cell.
+    // n cells have n + 1 offsets: each rank writes the end offsets of its cells, and rank 0 also writes the
+    // start offset of the first cell.
     let dataset =
         file.create_dataset::<i64>("/VTKHDF/Offsets", Rows::Fixed(piece.total + 1), None)?;
     let begin = if root { first } else { first + 1 };

@@ -24,17 +24,17 @@ struct Retained {
     rows: Option<u64>,
 }
 
-/// The history of a result and the number of its retained rows; `None` without a history.
+/// Description of the history of a result, and the number of its retained rows; `None` without a history.
 type KeptHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
     /// Resume a result after its first steps and history rows, and drop later steps and rows. Return the
     /// retained history rows.
     ///
-    /// A file is continued in place if the points never change, if deck and version are the same, and if the
-    /// file has space for all expected steps. No retained row then moves, so a kill loses no row. Otherwise,
-    /// or if the file is not writable, the retained part is copied to a new file, which then replaces the old
-    /// file.
+    /// A file is continued in place if the points never change, if deck and version are the same, if the file
+    /// has space for all expected steps, and if dropping the later rows frees no chunk. No retained row then
+    /// moves, so a kill loses no row. Otherwise, or if the file is not writable, the retained part is copied
+    /// to a new file, which then replaces the old file.
     ///
     /// # Errors
     /// If the old file cannot be read, or has fewer steps, or other points or fields. If a write fails, for
@@ -112,8 +112,8 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// Copy the retained part to a new file, which replaces the old file by a rename. A kill leaves the old
-    /// or the new file.
+    /// Copy the retained part to a new file, which replaces the old file by a rename. A kill leaves either
+    /// the old or the new file.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -162,7 +162,8 @@ impl<'a> ResultFile<'a> {
         finished
     }
 
-    /// Create a new file with the first steps of an old file. Times (s) and numbers of these steps are given.
+    /// Create the file `part` with the first steps of an old file. `times` (s) and `numbers` belong to these
+    /// steps.
     fn copy(
         old: &mut CollectiveFile<'a>,
         part: &Path,
@@ -194,8 +195,8 @@ impl<'a> ResultFile<'a> {
         result.record_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
     }
 
-    /// Write the times, the numbers and the count of the copied steps. `points` is the number of points of
-    /// each step.
+    /// Write the times (s) and the numbers of the copied steps, and the number of steps. `points` has the
+    /// number of points of each step.
     fn record_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
         for ((time, number), points) in times.iter().zip(numbers).zip(points) {
             append_one(&mut self.file, &mut self.numbers, *number)?;
@@ -232,8 +233,8 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Truncate a file to its retained part if the file can be continued in place; return false otherwise. For
-/// one rank.
+/// Prepare a file for a continuation in place: truncate the file to its retained part, and set its
+/// attributes. Return false, without a change, if the file cannot be continued in place. For one rank.
 ///
 /// # Errors
 /// If a write fails.
@@ -244,7 +245,8 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
         file.close()?;
         Ok(fits)
     });
-    // A file that is read-only or locked by a reader is copied instead. The copy reports any damage.
+    // Return false for a file that is read-only, locked by a reader or damaged: the file is then copied, and
+    // the copy reports any damage.
     let opened = match checked {
         Ok(true) => CollectiveFile::open_to_append(path, &alone).ok(),
         _ => None,
@@ -266,8 +268,9 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     Ok(true)
 }
 
-/// Test whether a file can be continued in place: points that never change, same number of points, same deck
-/// and version, space for all expected steps, and no chunk freed by the truncation.
+/// Test whether a file can be continued in place. The conditions are: points that never change, the same
+/// number of points, the same deck and version, space for all expected steps, and no chunk that the
+/// truncation frees.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,
@@ -306,7 +309,8 @@ fn has_room(
     Ok(true)
 }
 
-/// Return the datasets whose lengths count steps or rows, with the lengths after truncation.
+/// Return the paths of the datasets whose lengths count steps or history rows, with the lengths after
+/// truncation.
 fn counted_rows(retained: Retained) -> Vec<(String, u64)> {
     let mut counted = vec![
         (format!("{STEPS}/Values"), retained.steps),
