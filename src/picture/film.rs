@@ -24,6 +24,7 @@ impl Film {
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_animated(frames, 0)?;
         encoder.set_frame_delay(1, rate)?;
+        encoder.validate_sequence(true);
         let writer = encoder.write_header()?;
         Ok(Self { writer })
     }
@@ -31,15 +32,16 @@ impl Film {
     /// Append a frame.
     ///
     /// # Errors
-    /// If the file cannot be written, or the frame has another number of pixels than the first frame.
+    /// If the file cannot be written, if the frame has another number of pixels than the first frame, or if
+    /// all frames have been appended.
     pub fn append(&mut self, frame: &Image) -> std::io::Result<()> {
         Ok(self.writer.write_image_data(&frame.rgb)?)
     }
 
-    /// End the film after its last frame. It is not checked whether all frames have been appended.
+    /// End the film after its last frame.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// If the file cannot be written, or frames are missing.
     pub fn finish(self) -> std::io::Result<()> {
         Ok(self.writer.finish()?)
     }

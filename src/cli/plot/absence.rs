@@ -88,7 +88,7 @@ impl Painter<'_> {
             }
         }
         let message = match (self.view, &self.arguments.threshold) {
-            _ if kept == [none; 3] => {
+            _ if kept == [none; 3] && !self.arguments.clip.is_empty() => {
                 let between = [Axis::X, Axis::Y, Axis::Z].map(|axis| {
                     let [low, high] = all[axis.index()];
                     format!("{} = {low:.4e} and {high:.4e} m", axis.letter())
