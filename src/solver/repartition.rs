@@ -1,7 +1,8 @@
 //! Rebalance during a run, when the computing times of the ranks differ too much.
 //!
-//! Points migrate as in a restart on other ranks. The state is redistributed by id, bonds are found again,
-//! and their stored data are restored. The result of the run is therefore bitwise independent of rebalances.
+//! Points migrate as in a restart on another number of ranks. The state is redistributed by id, bonds are
+//! found again, and their stored data are restored. The result of the run is therefore bitwise independent of
+//! rebalances.
 
 use std::time::{Duration, Instant};
 
@@ -17,7 +18,8 @@ use super::{Simulation, Stepper};
 /// Result of a rebalance; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repartition {
-    /// Time that the slowest rank spent on bonds before the rebalance, divided by the mean over the ranks.
+    /// Time that the slowest rank spent on bonds since the previous check, divided by the mean over the
+    /// ranks.
     pub imbalance: f64,
     /// Number of points that changed their owner.
     pub moved: u64,

@@ -7,7 +7,7 @@ use crate::problem::{PointSource, Problem};
 
 /// Return an error if a point would have too many neighbours, or a rank too many points. The numbers are
 /// estimated from the shapes of the problem. `cutoffs` is the longest bond (m) of each pair of blocks,
-/// row-major.
+/// row-major; `ranks` is the number of ranks.
 ///
 /// # Errors
 /// If one of the numbers is too large. The message names the horizon or the body; the error is the same on

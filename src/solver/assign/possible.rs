@@ -11,8 +11,9 @@ use crate::problem::{
 /// of bodies.
 ///
 /// # Errors
-/// If a law does not support its dimension, its damage, its thermal expansion or a horizon, or if pairs have
-/// impossible damage. Most such faults of decks are found earlier, when the decks are read.
+/// If a law does not support the dimension of the problem, or the damage, the thermal expansion or a horizon
+/// of its body; or if the bonds of a pair of bodies cannot have the damage of the pair. Most of these errors
+/// are found earlier, when the deck is read.
 pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     for body in &problem.bodies {
         let law = &body.material.law;
@@ -154,8 +155,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     Err(Error::input(message).at(&body.span))
 }
 
-/// Return an error if the damage of a body is incompatible with the damage of a body that it may be bonded
-/// to, or with another setting.
+/// Return an error if the damage of a body is incompatible with another setting of the problem, or with the
+/// damage of another body to which bonds may join this body.
 fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
@@ -189,7 +190,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     damage_fault(problem, body, damage).map_or(Ok(()), error)
 }
 
-/// Reason why bonds of a body cannot break by this damage in this problem, if there is one.
+/// Return the reason why bonds of a body cannot break by this damage in this problem; `None` if they can.
 fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
     if let DamageRule::Energy { calibration, .. } = damage.rule
         && !calibration.is_for(problem.dimension.count())

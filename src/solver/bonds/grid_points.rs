@@ -13,8 +13,8 @@ use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits, ReadRotations};
 use super::list_points::load_history;
 
-/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes are
-/// finite but have no meaning.
+/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes keep the
+/// initial values of the arrays, which have no meaning.
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
     displacement: [Column; D],
@@ -144,8 +144,8 @@ unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {
-    /// Copy the displacements of consecutive owned points, of which `first` is the first local index. Copy
-    /// their thermal stretches if the run has temperatures.
+    /// Copy the displacements of consecutive owned points to their slots. `first` is the local index of the
+    /// first of these points. Also copy their thermal stretches if the run has temperatures.
     ///
     /// # Safety
     /// No other thread may write any of these points at the same time.
@@ -309,12 +309,12 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// Load the bonds of a lane group at one offset. `FAST_PATH` omits the data of the criterion, the
-    /// breakable bits, the thermal stretches, and the closed forms for |x| above
+    /// Load the bonds of a lane group at the offset with index `o`. `FAST_PATH` omits the data of the
+    /// criterion, the breakable bits, the thermal stretches, and the closed forms for |x| above
     /// [`NEAR`](crate::material::bond::NEAR).
     ///
     /// # Safety
-    /// The lane group must belong to the grid, and the offset to the lane group.
+    /// The lane group must belong to the grid, and `o` must be the index of one of its offsets.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd, const FAST_PATH: bool>(
         &self,

@@ -32,7 +32,8 @@ pub struct BlockLaws {
     pub weibull: Option<Weibull>,
     /// Factor of the critical work by the direction of a bond; `None` if it is 1 in all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Data of these points that criteria read for bonds between bodies with a separate damage law.
+    /// Data of the block's points that criteria read for bonds to other bodies, if the pair of bodies has a
+    /// separate damage law.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
@@ -40,7 +41,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Data that the failure criteria read for bonds between two bodies that have a separate damage law.
+/// Data of points that failure criteria read for bonds between two bodies with a separate damage law for
+/// these bonds.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.
@@ -54,7 +56,7 @@ pub struct PairReads {
 }
 
 impl PairReads {
-    /// Add the data that a damage law reads to the requested data.
+    /// Mark the data that a damage law reads, in addition to the data marked before.
     pub fn add(&mut self, law: &DamageLaw) {
         self.breaks = true;
         self.truncation_factors |= law.family_correction() > 0.0;

@@ -6,7 +6,8 @@ use crate::material::rotation::IDENTITY;
 
 use super::interaction::BlockLaws;
 
-/// Selection of the [`Limits`] that the criteria of a run read; the same on all ranks.
+/// Selection of the point data ([`Limits`] and rotations) that the criteria of a run read; the same on all
+/// ranks.
 #[derive(Debug, Clone, Copy)]
 pub struct LimitsRead {
     /// Whether thresholds are read.
@@ -20,7 +21,7 @@ pub struct LimitsRead {
 }
 
 impl LimitsRead {
-    /// Collect the limits that the damage laws of the blocks, and of pairs of bodies, read in `D` dimensions.
+    /// Collect the data that the damage laws of the blocks and of pairs of bodies read, in `D` dimensions.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());
@@ -44,13 +45,13 @@ impl LimitsRead {
     }
 }
 
-/// [`Limits`] by column. A column that no criterion reads is empty.
+/// [`Limits`] and rotations by column. A column that no criterion reads is empty.
 pub struct LimitColumns {
     /// Failure thresholds, indexed by local point (lists) or grid slot (lattices).
     pub thresholds: Column,
     /// Truncation factors, indexed like the thresholds.
     pub truncation_factors: Column,
-    /// Rotations by component; in 2-D only q_z and q₀ are stored.
+    /// Rotations as quaternions, in the order q_x, q_y, q_z, q₀. In 2-D, only q_z and q₀ are stored.
     pub rotations: [Column; 4],
     /// Stress measures, Pa, in the order of [`StressMeasure::ALL`]; −∞ for points that carry no stress.
     pub stresses: [Column; StressMeasure::ALL.len()],
@@ -129,7 +130,8 @@ impl<'a> ReadLimits<'a> {
     }
 
     /// Load the limits of eight points. `take` is called only for columns whose length was checked. Stresses
-    /// are loaded only if `may_read_stresses`; the caller passes a constant.
+    /// are loaded only if `may_read_stresses`. This argument is a constant, so the compiler removes the
+    /// branch.
     #[inline(always)]
     pub fn eight(&self, may_read_stresses: bool, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();

@@ -93,8 +93,8 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
-/// Kernel that sums V_j times the fraction of its stiffness that bond ij has lost, m³. The sum contains the
-/// intact neighbours within the horizon of point i.
+/// Kernel that sums, over the intact neighbours j within the horizon of point i, V_j times the fraction of
+/// the stiffness that bond ij has lost, m³.
 #[derive(Clone, Copy)]
 pub struct Softened {
     /// The law of point i.
@@ -137,9 +137,10 @@ fn add_tensor<S: Simd, const D: usize>(
     }
 }
 
-/// Kernel that sums D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy, zz,
-/// xy, yz, xz. C is the sum of [`Law::stiffness`] of both ends. An end whose law [resists displacements
-/// across](Law::resists_across) the bonds contributes its part of C times I instead of n⊗n.
+/// Kernel that sums D = Σ V_j C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
+/// zz, xy, yz, xz. n is ξ/|ξ|, and C is the sum of [`Law::stiffness`] of both ends times their weights. An
+/// end whose law [resists displacements across](Law::resists_across) the bonds contributes its part of C
+/// times I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -189,11 +190,12 @@ impl<const D: usize> Kernel<D> for Stiffness {
     }
 }
 
-/// Kernel that sums the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
+/// Kernel that sums the Kirchhoff stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz. T is
+/// the force state of point i, and Y = ξ + η.
 ///
-/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ.
-/// Multiplied by Fᵀ, it is this sum: the Kirchhoff stress, which is symmetric and rotates with the body.
-/// Linear laws use ξ in place of Y.
+/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ. Times Fᵀ,
+/// this stress is the Kirchhoff stress Σ T⊗Y Ṽ, which is symmetric and rotates with the body. Linear laws use
+/// ξ in place of Y.
 #[derive(Clone, Copy)]
 pub struct Stress {
     /// Law of point i.
@@ -252,8 +254,8 @@ impl<const D: usize> Kernel<D> for StressAcross {
     }
 }
 
-/// Kernel that sums the tensors of the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ, diagonal
-/// entries first, and Σ ω η⊗ξ Ṽ row by row.
+/// Kernel that sums two tensors over the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ (diagonal
+/// entries, then mixed entries), and Σ ω η⊗ξ Ṽ (row by row).
 #[derive(Clone, Copy)]
 pub struct FamilyTensors {
     /// Exclude thermal stretches.
@@ -285,8 +287,8 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
 }
 
 /// Kernel that sums the rate of change of the strain energy density, Σ T·(v_j − v_i) Ṽ over the intact bonds,
-/// if every point moves with its rate v. The first values of the points are v by component. The unit is J/m³
-/// times the unit of v divided by m.
+/// if every point moves with its rate v. The first values of the points are v by component. The unit of the
+/// sum is J/m⁴ times the unit of v.
 #[derive(Clone, Copy)]
 pub struct EnergyRate {
     /// Law of point i.
@@ -320,8 +322,9 @@ impl<const D: usize> Kernel<D> for EnergyRate {
     }
 }
 
-/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of
-/// the whole family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
+/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ in d dimensions. ε is the extension of the
+/// bond, or ξ·η/|ξ| for linear laws. The first sum is the weighted volume m = Σ ω|ξ|²Ṽ of the whole family
+/// (m⁵). The second sum is Σ ω|ξ|εṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether ε is linear in η.

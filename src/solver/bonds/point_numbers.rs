@@ -68,8 +68,9 @@ impl PointNumbers {
         }
     }
 
-    /// Compute the constants of some owned points from the columns of sums over their initial families. Also
-    /// compute their [truncation factors](Law::truncation_factor), unless that column is empty.
+    /// Compute the constants of a range of owned points from `sums`, the columns of sums over their initial
+    /// families. Also compute their [truncation factors](Law::truncation_factor), unless that column is
+    /// empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         points: Range<usize>,
@@ -118,14 +119,14 @@ impl PointNumbers {
         }
     }
 
-    /// The point numbers of an owned point.
+    /// Return the point numbers of an owned point; entries without a column are 0.
     pub fn of(&self, point: usize) -> [f64; NUMBERS] {
         let get = |k: usize| self.columns.get(k).and_then(|column| column.get(point));
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Compute the columns of rotations of some owned points from the sums of the first pass. Components with
-    /// empty columns are skipped.
+    /// Compute the rotations of a range of owned points, by column, from the sums of the first pass.
+    /// Components with empty columns are skipped.
     pub fn find_rotations<const D: usize>(
         &self,
         points: Range<usize>,
@@ -157,8 +158,8 @@ impl PointNumbers {
         });
     }
 
-    /// Compute the point numbers of some owned points from the sums of a pass. If `bond_update` stores changes,
-    /// store plastic flow in `plastic`.
+    /// Compute the point numbers of a range of owned points from the sums of a pass. If `bond_update` is
+    /// [`BondUpdate::Step`], store the plastic states after flow in `plastic`.
     pub fn finish<const D: usize>(
         &mut self,
         pass: usize,

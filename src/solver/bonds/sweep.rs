@@ -76,7 +76,7 @@ trait Part: Sized + Send {
 trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
-    /// Run the kernel over a part; `base` is the local index of the first entry of the results.
+    /// Run the kernel over a part; `base` is the local index of the point of the first entry of the results.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -350,7 +350,9 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
 }
 
 /// Number of lane groups that skip the fast path after a failed attempt. The fast path is a loop without
-/// failure criterion; it fails if |x| of a bond exceeds the limit of the series. Large |x| occur in clusters.
+/// failure criterion. An attempt fails if |x| of a bond exceeds
+/// [`Criterion::limit`](crate::damage::Criterion::limit). Large |x| occur in clusters, so further attempts
+/// would probably fail.
 const FAST_PATH_BACKOFF: usize = 7;
 
 /// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates
@@ -409,8 +411,8 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sum over the bonds of a lane group; `None` if a bond is beyond the series limit. The arguments are copied
-/// so that they stay in registers.
+/// Sum over the bonds of a lane group; `None` if |x| of a bond exceeds the limit of the kernel's criterion.
+/// The arguments are copied so that they stay in registers.
 ///
 /// # Safety
 /// The lane group must belong to the grid of `points`.

@@ -48,7 +48,7 @@ pub fn apply_initials<const D: usize>(
     Ok(())
 }
 
-/// Set the displacements and velocities of some owned points from a file. Collective.
+/// Set the displacements and velocities of `points`, local indices of owned points, from a file. Collective.
 fn apply_file<const D: usize>(
     initial: &Initial,
     file: &InitialFile,

@@ -58,9 +58,9 @@ impl Temperatures {
         self.time = None;
     }
 
-    /// Set temperature and thermal stretch of the points of a part, if they have changed. If several
-    /// conditions apply to a point, the last one counts. A point without a condition has the reference
-    /// temperature of its material.
+    /// Set temperature and thermal stretch of the points of a part, if they may have changed. If several
+    /// conditions apply to a point, the last of these conditions in the deck counts. A point without a
+    /// condition has the reference temperature of its material.
     pub fn apply<const D: usize>(&self, heated: &[Heated], part: &mut Part<'_, D>) {
         let (model, first) = (part.model, part.first);
         let (Some([temperature]), Some([stretch]), true) = (

@@ -14,7 +14,7 @@ pub struct ContactNow {
     pub friction: f64,
     /// Energy dissipated by contact damping so far, J.
     pub damping: f64,
-    /// Contacts of all pairs of points.
+    /// Contacts between points of all bodies.
     pub all: Touching,
     /// Contacts of each pair of bodies that has a separate contact rule.
     pub pairs: Vec<Touching>,

@@ -104,8 +104,8 @@ struct Partner {
     rank: u64,
 }
 
-/// Find the points of other ranks within `reach` (m) of owned points in this dimension, sorted by owner, then
-/// by id. Also return the exchange plan of these points for `width` values per point. Collective.
+/// Find the points of other ranks within `reach` (m) of owned points, sorted by owner, then by id. `own` are
+/// the owned points. Also return the exchange plan of these points for `width` values per point. Collective.
 fn find(
     comm: &dyn Communicator,
     own: &[Ghost],

@@ -18,8 +18,9 @@ use super::{CHUNK, Contact};
 const SKIN: f64 = 0.4;
 
 impl<const D: usize> Contact<D> {
-    /// Repeat the search if the lists are stale or if a point has moved by more than half the skin. Returns
-    /// whether all positions are finite on all ranks. Collective.
+    /// Repeat the search if the lists are stale or if a point has moved by more than half the skin since the
+    /// last search. Returns whether all positions on all ranks are finite; otherwise the search is not
+    /// repeated. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,

@@ -11,13 +11,14 @@ use super::rigid::RigidState;
 /// The step is lengthened after this number of consecutive steps that could have been longer.
 const CALM: u64 = 100;
 
-/// Limits that contact sets for the time step, over all ranks. They include contacts that will begin within
-/// two steps.
+/// Limits that contact sets for the time step, over all ranks. The limits include contacts that will begin
+/// within the look-ahead. k is the stiffness of a contact (N/m), c its damping coefficient (N s/m), and m the
+/// mass of the point or rigid body (kg).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
     /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
-    /// squared angular frequencies.
+    /// squares of the angular frequencies.
     pub stiffness: f64,
     /// Largest 2 Σ c/m, 1/s.
     pub damping: f64,
