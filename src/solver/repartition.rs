@@ -51,8 +51,9 @@ impl BalanceWatch {
     /// result; otherwise return `None`. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     pub fn look<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -119,8 +120,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// check. Returns the number of points over all ranks that changed their owner. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

@@ -464,8 +464,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Set the velocities of supported points, and compute the reactions. Returns whether all values are
-    /// finite.
+    /// Set the velocities of supported points, and compute the reactions. Returns whether these velocities
+    /// and reactions are finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
         if self.is_quasi_static() {
             return self.walk(|part, here| here.project_residual(part));
@@ -526,9 +526,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Check on all ranks that all values are finite and that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// - If a value is not finite. The message names a condition that is not finite or causes a thermal
-    ///   stretch of −1 or less. Without such a condition, the message names a point: at the earliest step at
-    ///   which points have values that are not finite, the point with the smallest id.
+    /// - If a value is not finite. The message names a condition or initial value that is not finite, or a
+    ///   temperature that causes a thermal stretch of −1 or less. If there is none, the message names a
+    ///   point: at the earliest step at which points have values that are not finite, the point with the
+    ///   smallest id.
     /// - If the motion of a rigid body is not finite. The message names this body.
     /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
     ///   is one.

@@ -9,8 +9,8 @@ use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time
 use super::motion::Clock;
 use super::motion::clock::steps_to;
 
-/// Maximum number of steps of a stage. Much larger numbers are not exact in floating point, and so short a
-/// step may not change the time.
+/// Maximum number of steps of a stage. Much larger numbers are not exact in floating point, and the steps
+/// would be so short that they may not change the time.
 const MOST_STEPS: f64 = 1e15;
 
 /// Return the first step (s) of each stage, and the number of steps of the stage if no bond breaks. `stable`
@@ -38,7 +38,7 @@ pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
 }
 
 /// Return the first step (s) of a stage, and the number of its steps if no bond breaks. `length` is the
-/// duration of the stage, s.
+/// duration of the stage (s), and `stable` is the stable step with the density of the materials (s).
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
         if stable.is_infinite() {

@@ -28,8 +28,8 @@ struct Constants {
     horizon: f64,
 }
 
-/// Return the constants that points of block `here` use for their bonds to block `there`. They follow from
-/// the interface rule of the two bodies or, within a body, from the rule of its refinement.
+/// Return the constants that points of block `here` use for their bonds to block `there`. The constants
+/// follow from the interface rule of the two bodies or, within a body, from `Refinement::bonds`.
 fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
     let [own, other] = [here, there].map(|block| (block.body.material.elastic, block.horizon));
     let combine = |of: fn(f64, f64) -> f64| Constants {
@@ -107,7 +107,7 @@ fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) ->
     Some(own(&given(problem, body, None, constants)))
 }
 
-/// Create the law of a body with these constants. `damage` is the damage of its bonds; `None` for bonds
+/// Create the law of a body with these constants. `damage` is the damage of the bonds; `None` for bonds
 /// without damage.
 fn build(
     problem: &Problem,
@@ -176,8 +176,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Return which data of this body's points are read by the failure criteria of its bonds to other bodies.
-/// Only pairs of bodies with a separate damage law count.
+/// Return which data of this body's points are read by the failure criteria of bonds to other bodies. Only
+/// pairs of bodies with a separate damage law count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();

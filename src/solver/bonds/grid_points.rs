@@ -138,9 +138,9 @@ pub struct OwnedPlaces<'a, const D: usize> {
     values: PhantomData<&'a mut f64>,
 }
 
-// SAFETY: threads write to its columns only under the conditions of `take`.
+// SAFETY: threads write to the columns only under the conditions of `take`.
 unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
-// SAFETY: threads write to its columns only under the conditions of `take`.
+// SAFETY: threads write to the columns only under the conditions of `take`.
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {

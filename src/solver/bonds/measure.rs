@@ -180,7 +180,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Out-of-plane stretch F_zz of an owned point in plane stress, at its deformation gradient and plastic
-    /// state. `None` if the law does not compute it; see [`Law::stretch_across`].
+    /// state. `None` if the law does not compute this stretch; see [`Law::stretch_across`].
     pub fn stretch_across(
         &self,
         model: &Model<D>,
@@ -247,7 +247,7 @@ impl<const D: usize> Forces<D> {
     /// [evaluation](Self::evaluate). `rate` contains the components of v at the local points, including
     /// ghosts. The unit of the result is J/m⁴ times the unit of v.
     pub fn energy_rate(&mut self, owned: usize, rate: [Column; D]) -> Vec<f64> {
-        // The kernel reads the rates as the first values of the points.
+        // The kernel reads the rates as the first point numbers.
         for grid in &mut self.grids {
             grid.insert_numbers(&rate);
         }

@@ -78,7 +78,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // AVX2 is enough: this kernel runs only at set-up, after refinements, and for outputs.
+    // AVX2 is enough: this kernel runs only at set-up, after refinements and rebalances, and for outputs.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const WANTED: Wanted = wanted(true);
 
@@ -138,9 +138,9 @@ fn add_tensor<S: Simd, const D: usize>(
 }
 
 /// Kernel that sums D = Σ V_j C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
-/// zz, xy, yz, xz. n is ξ/|ξ|, and C is the sum of [`Law::stiffness`] of both ends times their weights. An
-/// end whose law [resists displacements across](Law::resists_across) the bonds contributes its part of C
-/// times I instead of n⊗n.
+/// zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both ends. An end whose law
+/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times I instead of
+/// n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -154,7 +154,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
     type Far = AnyPoint;
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // AVX2 is enough: this kernel runs only at set-up and after refinements.
+    // AVX2 is enough: this kernel runs only at set-up, and after refinements and rebalances.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = wanted(false);
@@ -287,8 +287,8 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
 }
 
 /// Kernel that sums the rate of change of the strain energy density, Σ T·(v_j − v_i) Ṽ over the intact bonds,
-/// if every point moves with its rate v. The first values of the points are v by component. The unit of the
-/// sum is J/m⁴ times the unit of v.
+/// if every point moves with its rate v. The first point numbers are the components of v. The unit of the sum
+/// is J/m⁴ times the unit of v.
 #[derive(Clone, Copy)]
 pub struct EnergyRate {
     /// Law of point i.

@@ -68,7 +68,7 @@ enum Pass {
     /// Smallest stretch of the intact bonds of each point; the threshold of the point follows from this
     /// stretch.
     SmallestStretch,
-    /// The point sum with this index, for the laws that have one.
+    /// The point sum with this index, for the laws with such a point sum.
     PointSum(usize),
     /// The forces.
     Force,
@@ -101,7 +101,7 @@ pub fn history_fits<const D: usize>(
     })
 }
 
-/// Strengths of the owned points relative to their blocks; empty without scatter.
+/// Strength f of each owned point, a random factor on its threshold; empty without scatter.
 fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64> {
     if blocks.iter().all(|block| block.weibull.is_none()) {
         return Vec::new();
@@ -125,7 +125,7 @@ pub struct Forces<const D: usize> {
     numbers: PointNumbers,
     /// Point data that failure criteria read.
     limits: LimitColumns,
-    /// Strengths of the owned points relative to their blocks; empty without scatter.
+    /// Strength f of each owned point, a random factor on its threshold; empty without scatter.
     strength: Vec<f64>,
     /// The passes of a force evaluation.
     passes: Vec<Pass>,

@@ -69,8 +69,8 @@ impl PointNumbers {
     }
 
     /// Compute the constants of a range of owned points from `sums`, the columns of sums over their initial
-    /// families. Also compute their [truncation factors](Law::truncation_factor), unless that column is
-    /// empty.
+    /// families. Also compute the [truncation factors](Law::truncation_factor) of these points, unless
+    /// `truncation_factors` is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         points: Range<usize>,

@@ -14,7 +14,7 @@ use crate::solver::bonds::BondUpdate;
 const MAX_BONDS: f64 = 1e6;
 
 /// Relative growth of the separation per step. A small growth limits how far bonds exceed their criterion
-/// when they break. The overshoot energy is subtracted.
+/// when they break. The remaining overshoot energy is subtracted from the result.
 const GROWTH: f64 = 0.01;
 
 /// Ratio of the first separation to the separation at which the first bond is expected to break.

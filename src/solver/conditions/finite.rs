@@ -19,8 +19,8 @@ const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z 
 ///
 /// # Errors
 /// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
-/// deck that fails the check, and the point with the smallest id at which it fails. The error is the same on
-/// all ranks.
+/// deck that fails the check. Of the points at which this entry fails, the message names the point with the
+/// smallest id. The error is the same on all ranks.
 pub fn are_finite<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,

@@ -94,7 +94,7 @@ fn apply_file<const D: usize>(
 
 /// Read displacement and velocity of the owned points from a file, 2 D values per point; NaN for points
 /// without a row. Each rank reads a part of the rows, and sends each row to the rank whose range of ids
-/// contains its id. Collective.
+/// contains the id of the row. Collective.
 fn values_of_owned<const D: usize>(
     file: &InitialFile,
     comm: &dyn Communicator,

@@ -38,8 +38,8 @@ pub struct Loaded<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// Create the load of the condition with this index. Each component of the force density (N/m³) is its
-    /// expression times its factor.
+    /// Create the load of the condition with this index. Each component of the force density (N/m³) is the
+    /// expression times the factor of this component.
     pub fn new(condition: usize, values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {

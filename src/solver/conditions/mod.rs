@@ -532,8 +532,8 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Set the velocities of supported points, and compute the reactions. Returns whether all values are
-    /// finite.
+    /// Set the velocities of supported points, and compute the reactions. Returns whether these velocities
+    /// and reactions are finite.
     pub fn apply_velocities(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {

@@ -189,7 +189,8 @@ impl Supported {
     }
 
     /// Set the velocities of the points and compute the reactions. Together with the other forces, the
-    /// reactions give the prescribed motion in the Verlet scheme. Returns whether all values are finite.
+    /// reactions give the prescribed motion in the Verlet scheme. Returns whether these velocities and
+    /// reactions are finite.
     pub fn apply_velocities<const D: usize>(
         &self,
         supports: &[Support],
@@ -219,7 +220,8 @@ impl Supported {
 
     /// Set the velocities of the points, and compute the reactions that give the required total force
     /// density. `wanted` returns the velocity (m/s) and the total force density (N/m³) of a point, given its
-    /// index in this support and its index in the part. Returns whether all values are finite.
+    /// index in this support and its index in the part. Returns whether the velocities and reactions are
+    /// finite.
     fn react<const D: usize>(
         &self,
         component: usize,

@@ -7,8 +7,8 @@
 //! The contact distance never exceeds the reference distance, so an undeformed body has no contact forces.
 //! Crack faces consist of points whose bonds have broken.
 //!
-//! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so their states
-//! are identical.
+//! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so the states of
+//! the bodies are the same on all ranks.
 //!
 //! Repulsion follows from the new positions. Friction and damping follow from the velocities half a step
 //! earlier. Their work in a step is computed by the trapezoidal rule.
@@ -234,9 +234,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
-    /// friction and damping from the velocities in the middle of the step, record the work of both, and apply
-    /// the second half kick of rigid bodies. Otherwise, friction and damping do not change. If a position is
-    /// not finite, nothing is added. Collective.
+    /// friction and damping from the velocities in the middle of the step, record the energy that friction
+    /// and damping dissipate, and apply the second half kick of rigid bodies. Otherwise, friction and damping
+    /// do not change. If a position is not finite, nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,

@@ -48,7 +48,7 @@ enum Stiffness {
     /// Factor (N/m^D) of ℓ^(D − 1), where ℓ is the mean edge (m) of both points: the stiffness of a layer of
     /// material between the points.
     OfLayer(f64),
-    /// Factor (N/m⁷) of the product of both volumes.
+    /// Factor (N/m⁷) of the product of the volumes of both points.
     OfVolumes(f64),
 }
 

@@ -25,7 +25,8 @@ pub(super) fn distance(
             let along = place.dot(&axis);
             let across = place - along * axis;
             let length = across.norm();
-            // As for a box, in the plane through the axis of the cylinder and the position.
+            // The distance is computed as for a box, in the plane through the axis of the cylinder and the
+            // position.
             let beyond = [along.abs() - half_length, length - radius];
             let normals = [along.signum() * axis, direction(across, length)];
             outside(&beyond, &normals)
@@ -136,8 +137,8 @@ mod tests {
                 );
                 let (apart, normal) = distance(shape, place, 3);
                 assert!((normal.norm() - 1.0).abs() < 1e-12);
-                // `surface` is on the surface, and moving by `apart` along the normal changes the distance
-                // by `apart`.
+                // `surface` lies on the surface of the shape, and a move along the normal changes the
+                // distance by the length of the move.
                 let surface = place - apart * normal;
                 assert!(
                     distance(shape, surface, 3).0.abs() < 1e-12,

@@ -12,8 +12,9 @@ use super::rigid::RigidState;
 const CALM: u64 = 100;
 
 /// Limits that contact sets for the time step, over all ranks. The limits include contacts that will begin
-/// within the look-ahead. k is the stiffness of a contact (N/m), c its damping coefficient (N s/m), and m the
-/// mass of the point or rigid body (kg).
+/// within the look-ahead. k is the stiffness of a contact (N/m), c is the damping coefficient of a contact (N
+/// s/m), and 1/m is the inverse mass of a point or the [mobility](super::rigid::RigidBody::mobility) of a
+/// rigid body (1/kg).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
@@ -105,7 +106,8 @@ impl<const D: usize> Contact<D> {
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Count the steps that could have been longer; reset the count if the present step could not.
+    /// Count the consecutive steps that could have been longer. Reset the count if the present step could not
+    /// have been longer.
     pub fn count_calm(&mut self, could_be_longer: bool) {
         self.demand.calm = if could_be_longer {
             self.demand.calm + 1

@@ -93,7 +93,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Whether the step is one at which points are checked for refinement.
+    /// Whether points are checked for refinement at the present step.
     pub fn is_refinement_due(&self) -> bool {
         self.trigger().is_some_and(|trigger| {
             // At the end of a stage, no check is made, because the first step of the next stage may have
@@ -107,8 +107,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Return the numbers of created and removed points; `None` if the grids do not change. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -162,8 +163,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// other grids no longer have. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -212,12 +214,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Restore the grids of a checkpoint, at time 0. `state` contains the refined and the suppressed nodes,
-    /// as in [`Grids::state`]. Collective.
+    /// Create the run on the grids of a checkpoint, at time 0. `state` contains the refined and the
+    /// suppressed nodes, as in [`Grids::state`]. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks.
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
