@@ -12,7 +12,7 @@ pub struct Model<const D: usize> {
     pub reference: [Vec<f64>; D],
     /// Volumes, m³; owned points, then ghosts.
     pub volume: PaletteColumn,
-    /// Block of each owned point.
+    /// Index of the block of each owned point.
     pub block: Vec<u16>,
     /// Global ids; owned points, then ghosts.
     pub ids: Vec<u64>,

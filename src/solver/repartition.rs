@@ -62,7 +62,8 @@ impl BalanceWatch {
             return Ok(None);
         };
         let is_due = stepper.clock().number().is_multiple_of(rule.every_steps);
-        // All iterations of a load step have the same step number, so only the last one is checked.
+        // All iterations of a load step have the same step number, so the check is made only after the last
+        // iteration.
         if !is_due || !stepper.load_step().is_settled {
             return Ok(None);
         }

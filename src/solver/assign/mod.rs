@@ -394,7 +394,7 @@ pub fn assign<const D: usize>(
         if *pair_damage == InterfaceDamage::Unbreakable
             && [&here, &there].into_iter().any(wears_out)
         {
-            // The law breaks bonds by their history whatever the criterion.
+            // Such a law breaks bonds by their history, whatever the criterion is.
             bonds.protect(|_| true);
         }
         let stiffness = ends.each_ref().map(|end| end.stiffness);

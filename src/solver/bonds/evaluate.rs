@@ -84,8 +84,8 @@ pub struct Acting<'a, const D: usize> {
 
 impl<const D: usize> Forces<D> {
     /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
-    /// written the data of the owned points. `bond_update` selects which bond states change. Afterwards,
-    /// [`Self::broken`] returns the changes by bonds that broke. Collective.
+    /// written the data of the owned points. `bond_update` says whether bonds break, and how the bond history
+    /// advances. Afterwards, [`Self::broken`] returns the changes by bonds that broke. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,

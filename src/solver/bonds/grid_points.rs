@@ -47,7 +47,8 @@ impl<const D: usize> GridValues<D> {
         Arc::ptr_eq(&self.grid, grid)
     }
 
-    /// Copy the displacements of the ghosts, and their thermal stretches if the run has temperatures.
+    /// Copy the displacements of the ghosts to their slots, and the thermal stretches if the run has
+    /// temperatures.
     pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D], thermal_stretch: Option<&[f64]>) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
             self.grid.update(Which::Ghosts, values, places);
@@ -69,7 +70,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the point numbers of some of the local points, from column `first` on.
+    /// Copy the point numbers of the selected local points to their slots, from column `first` on.
     pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);
@@ -92,12 +93,12 @@ impl<const D: usize> GridValues<D> {
         self.numbers.drain(..count);
     }
 
-    /// Copy the thresholds of some of the local points.
+    /// Copy the thresholds of the selected local points to their slots.
     pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
         self.grid.update(which, values, &mut self.limits.thresholds);
     }
 
-    /// Copy the rotations of some of the local points.
+    /// Copy the rotations of the selected local points to their slots.
     pub fn update_rotations(&mut self, which: Which, rotations: &[Column; 4]) {
         for (places, values) in self.limits.rotations.iter_mut().zip(rotations) {
             if !values.is_empty() {
@@ -106,7 +107,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the stress measures of some of the local points.
+    /// Copy the stress measures of the selected local points to their slots.
     pub fn update_stresses(&mut self, which: Which, stresses: &[Column]) {
         for (places, values) in self.limits.stresses.iter_mut().zip(stresses) {
             if !values.is_empty() {
@@ -115,7 +116,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the truncation factors of the local points.
+    /// Copy the truncation factors of all local points to their slots.
     pub fn update_truncation_factors(&mut self, values: &[f64]) {
         let places = &mut self.limits.truncation_factors;
         self.grid.update(Which::All, values, places);
@@ -180,7 +181,8 @@ impl<const D: usize> OwnedPlaces<'_, D> {
 /// The points of a grid in the form that a kernel reads.
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
-    /// Thermal stretches of the points; `None` if the kernel does not remove them from the bonds.
+    /// Thermal stretches of the points; `None` if the run has no temperatures, or if the kernel does not
+    /// remove thermal stretches from the bonds.
     thermal_stretch: Option<&'a [f64]>,
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,

@@ -87,8 +87,8 @@ impl PointNumbers {
             Law::<D>::constants(&law, sums, &mut numbers);
             (numbers, Law::<D>::truncation_factor(&law, sums))
         };
-        // Neighbours on a lattice usually have equal families, so each thread reuses the constants of the
-        // last point.
+        // Consecutive points of a lattice usually have equal families, so each thread reuses the constants of
+        // the last point.
         let found = points.clone().into_par_iter().with_min_len(CHUNK);
         let found = found.map_init(
             || None,

@@ -355,8 +355,8 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
 /// would probably fail.
 const FAST_PATH_BACKOFF: usize = 7;
 
-/// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates
-/// their time.
+/// Choice of the loop for the next lane group. Lists have no fast path, because loading points j takes most
+/// of the time.
 struct FastPathGate {
     /// Whether the kernel may skip its criterion, and does not remove thermal stretches.
     is_allowed: bool,

@@ -115,7 +115,8 @@ impl<const D: usize> Loaded<D> {
         self.load
     }
 
-    /// Iterate over the points, by their index in the part, and the force density on them, N/m³.
+    /// Iterate over the points. Each item is the index of a point in the part, and the force density on this
+    /// point (N/m³).
     pub fn densities(&self) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
         let points = self.points.iter().map(|point| usize::from(*point));
         points.zip(self.force.iter().copied())

@@ -374,7 +374,7 @@ impl<const D: usize> Conditions<D> {
         free
     }
 
-    /// Sum the force of the supports on this rank's points of a set by component, N. `members` are the sorted
+    /// Sum the forces that supports exert on some owned points, by component (N). `members` are the sorted
     /// local indices of these points.
     pub fn reaction(&self, model: &Model<D>, fields: &Fields<D>, members: &[u32]) -> [ExactSum; D] {
         let mut sums = [const { ExactSum::ZERO }; D];

@@ -34,7 +34,7 @@ pub struct Touching {
     pub force: Vec<f64>,
 }
 
-/// Sums of a pair of bodies on one rank.
+/// Sums over the contacts of a pair of bodies on one rank.
 struct PairSum<const D: usize> {
     /// Number of contacts of owned points. A pair of points counts twice over all ranks.
     count: u64,

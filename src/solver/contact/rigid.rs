@@ -68,7 +68,7 @@ pub(super) struct RigidBody {
 
 /// Exact sums of the forces and torques that the points exert on a rigid body.
 pub(super) struct WrenchSums {
-    /// Sums of contact, friction and damping.
+    /// Sums of all contact forces, of friction, and of contact damping.
     sums: [[ExactSum; WRENCH]; 3],
 }
 
@@ -310,7 +310,8 @@ impl RigidBody {
         (Vector3::from(place) - Vector3::from(self.state.position)).norm()
     }
 
-    /// Add the opposite of the contact force on a point at a position (m) to the sums.
+    /// Add to `sums` the force and torque that a point at a position (m) exerts on the body. `touch` is the
+    /// contact force of the body on the point.
     pub fn add_opposite<const D: usize>(
         &self,
         sums: &mut WrenchSums,
@@ -405,7 +406,7 @@ impl RigidBody {
     }
 }
 
-/// Rotate `rotation` by an angular velocity (1/s) over a time (s).
+/// Return `rotation`, followed by a rotation with an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
     // (1 + ½ Δt ω) q needs no sine; the error of the angle is of third order in Δt.

@@ -22,7 +22,7 @@ pub(super) struct Rows {
 pub(super) struct FoundPair {
     /// Id of the other point.
     pub id: u64,
-    /// Index of the other point.
+    /// Index of the other point: owned points first, then ghosts.
     pub other: u32,
 }
 

@@ -45,8 +45,8 @@ pub struct Regridded {
 pub struct Refined {
     /// Kinetic and strain energy that refinements have added, J; negative if they have removed energy.
     pub energy: f64,
-    /// Number of intact bonds that refinements have added, minus the number of removed bonds. Each bond
-    /// counts twice.
+    /// Number of intact bonds that refinements have added, minus the number of intact bonds that refinements
+    /// have removed. Each bond counts twice.
     pub bonds: i64,
 }
 
