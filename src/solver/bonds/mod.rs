@@ -355,7 +355,7 @@ impl<const D: usize> Forces<D> {
         self.instructions
     }
 
-    /// Plan of the halo exchanges between force passes.
+    /// Plan of the halo exchanges of a force evaluation.
     pub fn halo(&self) -> &Halo {
         &self.halo
     }
