@@ -609,8 +609,9 @@ fn starts_deformed(problem: &Problem) -> bool {
             || problem.conditions.iter().any(placed))
 }
 
-/// Break the bonds that cross a pre-crack, and count them by crack. The test starts from the end with the
-/// lower id. Both ends of a bond, also on different ranks, therefore get the same result.
+/// Break the bonds that cross a pre-crack. Return the number of these bonds for each pre-crack. The test
+/// starts from the end with the lower id. Both ends of a bond, also on different ranks, therefore get the
+/// same result.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

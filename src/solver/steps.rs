@@ -171,7 +171,7 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
 
 /// Return the first step (s) of a stage with an adaptive rule, and the number of its steps if no bond breaks.
 /// `step` and `steps` are the length and the number of steps without the rule, and `length` is the duration
-/// of the stage, s. The first step is at most `largest` and grows up to `largest`.
+/// of the stage, s. The first step is at most `largest`; later steps grow up to `largest`.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
     match rule.largest {
         Some(largest) if largest < step => (largest, steps_to(length, largest)),

@@ -387,8 +387,8 @@ impl<const D: usize> Forces<D> {
                     .with_min_len(CHUNK)
                     .zip(points)
                     .for_each(|(value, point)| {
-                        // A point without intact bonds has the minimum ∞. Its threshold is that for a
-                        // smallest stretch of 0.
+                        // A point without intact bonds has the minimum ∞. The threshold of such a point is
+                        // computed for a smallest stretch of 0.
                         let smallest = if value.is_infinite() {
                             0.0
                         } else {

@@ -198,9 +198,10 @@ impl<const D: usize> Forces<D> {
         })
     }
 
-    /// Compute the constants of the points from sums over their initial families. Also set the truncation
-    /// factors and the thresholds that criteria read. Thresholds are not set here if any of them follows the
-    /// smallest stretch. Call after pre-cracks are cut and before other bonds break. Collective.
+    /// Compute the constants of the points ([`Law::CONSTANTS`]) from sums over their initial families. Also
+    /// set the truncation factors and the thresholds that criteria read. Thresholds are not set here if any
+    /// of them follows the smallest stretch. Call after pre-cracks are cut and before other bonds break.
+    /// Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
         if read.thresholds && !self.passes.contains(&Pass::SmallestStretch) {

@@ -38,15 +38,15 @@ pub struct PointNumbers {
     pub first_changing: usize,
     /// Number of point sums before the force sum.
     pub passes: usize,
-    /// Whether any law has constants.
+    /// Whether any law has constants: point numbers that do not change, [`Law::CONSTANTS`].
     pub with_constants: bool,
     /// Sums of a pass over the bonds, by column.
     pub sums: Vec<Column>,
 }
 
 impl PointNumbers {
-    /// Allocate the point numbers for the laws of the blocks, which are the same on all ranks, and set them
-    /// to 0.
+    /// Allocate the point numbers that the laws of the blocks declare, with the value 0. The blocks and laws
+    /// are the same on all ranks.
     pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);

@@ -91,7 +91,7 @@ fn unit(axis: usize) -> [f64; 3] {
     std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 })
 }
 
-/// Fracture energy of cracks with this normal in a body, J/m²; `None` if the damage of the body has no
+/// Fracture energy of cracks with this normal in a body, J/m²; `None` if the body has no damage with a
 /// fracture energy.
 fn fracture_energy(problem: &Problem, body: usize, normal: [f64; 3]) -> Option<f64> {
     let body = &problem.bodies[body];

@@ -172,7 +172,7 @@ impl Supported {
             let place = &mut moving.displacement[point];
             match support.motion {
                 Motion::Displacement => *place = value(&at[1], k),
-                // Trapezoidal rule for the velocity, from the displacement before the drift.
+                // Integrate the velocity by the trapezoidal rule, from the displacement before the drift.
                 Motion::Velocity if *step > 0.0 => {
                     *place = self.moved_from[k];
                     for at in at {

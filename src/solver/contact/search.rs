@@ -146,8 +146,8 @@ impl<const D: usize> Contact<D> {
         self.is_stale = false;
     }
 
-    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Their bonds have broken in
-    /// the last evaluation, or a rollback has restored these bonds.
+    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Bonds of these points have
+    /// broken in the last evaluation, or a rollback has restored these bonds.
     pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
         for broken in forces.broken() {
             let point = broken.point;

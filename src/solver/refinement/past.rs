@@ -142,7 +142,7 @@ impl Past {
         (0..owned).filter(|point| !self.leaves[*point])
     }
 
-    /// Local indices of a node and of its parents; `None` if this rank does not have all of them.
+    /// Local indices of a node and of its parents; `None` if this rank does not have all of these points.
     fn with_parents(
         &self,
         grids: &Grids<'_>,
