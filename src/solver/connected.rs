@@ -66,7 +66,7 @@ impl Pieces {
         self.0[i.max(j)] = i.min(j);
     }
 
-    /// Find the root of a point's tree, and shorten the path to it.
+    /// Find the root of a point's tree, and shorten the path from the point to the root.
     fn root(&mut self, mut point: usize) -> usize {
         let Self(parents) = self;
         while parents[point] != point {

@@ -23,8 +23,8 @@ pub struct Model<const D: usize> {
     pub damping: Vec<f64>,
     /// Thermal expansion of each block.
     pub expansion: Vec<Expansion>,
-    /// Number of interior points, which are owned points without bonds to ghosts. They have the lowest local
-    /// indices.
+    /// Number of interior points, which are owned points without bonds to ghosts. Interior points have the
+    /// lowest local indices.
     pub interior: usize,
     /// Number of points over all ranks.
     pub total: u64,

@@ -31,7 +31,7 @@ use super::size;
 use super::steps::choose_steps;
 
 /// Extra reach, as a fraction of the longest bond, in the search for ghosts and for points near pre-cracks.
-/// It is needed because points may deviate from their grid by a millionth of a cell.
+/// This reach is needed because points may deviate from their grid by a millionth of a cell.
 const SLACK: f64 = 1e-5;
 
 /// A run on one rank.
@@ -73,7 +73,7 @@ pub struct Simulation<'a, const D: usize> {
     pub stable_step: f64,
     /// Time and step of the present stage.
     pub clock: Clock,
-    /// Integrator of the present stage; `None` while it advances the simulation.
+    /// Integrator of the present stage; `None` while the integrator advances the simulation.
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
     /// Progress of the load step; `is_settled` is true in explicit stages.
     pub load_step: LoadStep,
@@ -163,8 +163,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Distribute the points of the given grids over the ranks, and create the bonds of these points.
     /// `pieces` are the points of this rank before the distribution. Initial values are not set, and forces
-    /// are not evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if it is not
-    /// known. `between` is the same as for [`Self::set_up`].
+    /// are not evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if the cost
+    /// is not known. `between` is the same as for [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -176,7 +176,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // With this slack, both ends of a bond of the largest length exist on the rank, for any rounding of
-        // its length.
+        // the bond length.
         let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
@@ -290,9 +290,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Make one step, with or without its second half kick, or one iteration of a load step.
-    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied; it
-    /// must be false if a stage begins or if contact changes the step. Returns whether the second half kick
-    /// of this step must still be applied. Collective.
+    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied. This
+    /// argument must be false if a stage begins or if contact changes the step. Returns whether the second
+    /// half kick of this step must still be applied. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
@@ -322,7 +322,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Make one explicit step without its second half kick. If the second half kick of the previous step is
-    /// pending, apply it first. Collective.
+    /// pending, apply that half kick first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
         let before = self.clock;
@@ -598,7 +598,7 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
 }
 
 /// Whether bonds may break at the initial positions, because initial displacements or conditions can stretch
-/// them.
+/// bonds.
 fn starts_deformed(problem: &Problem) -> bool {
     let placed = |condition: &Condition| {
         let action = &condition.action;

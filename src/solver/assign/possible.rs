@@ -12,7 +12,7 @@ use crate::problem::{
 ///
 /// # Errors
 /// If a law does not support the dimension of the problem, or the damage, the thermal expansion or a horizon
-/// of its body; or if the bonds of a pair of bodies cannot have the damage of the pair. Most of these errors
+/// of a body; or if the bonds of a pair of bodies cannot have the damage of the pair. Most of these errors
 /// are found earlier, when the deck is read.
 pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     for body in &problem.bodies {
@@ -101,7 +101,7 @@ fn pair_damage_is_possible(
     Ok(())
 }
 
-/// Return an error if a law does not support the horizon of some of its bonds.
+/// Return an error if the law of a body does not support the horizon of some bonds of this body.
 fn horizons_are_possible(problem: &Problem) -> Result<()> {
     for here in problem.blocks() {
         let law = &here.body.material.law;
@@ -190,7 +190,8 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     damage_fault(problem, body, damage).map_or(Ok(()), error)
 }
 
-/// Return the reason why bonds of a body cannot break by this damage in this problem; `None` if they can.
+/// Return the reason why bonds of a body cannot break by this damage in this problem; `None` if the bonds can
+/// break.
 fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
     if let DamageRule::Energy { calibration, .. } = damage.rule
         && !calibration.is_for(problem.dimension.count())

@@ -2,8 +2,8 @@
 //!
 //! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends evaluate the
 //! criterion with the same operations. The force sums exclude the bonds that break. Point numbers that follow
-//! from sums over bonds, and the forces that depend on them, are then recomputed. This is done only at the
-//! points that a broken bond affects.
+//! from sums over bonds, and the forces that depend on these point numbers, are then recomputed. They are
+//! recomputed only at the points that a broken bond affects.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -156,8 +156,9 @@ impl<const D: usize> Forces<D> {
         energy
     }
 
-    /// Send the new point numbers to the ranks that read them. `own` are the owned points with new point
-    /// numbers. Return the owned points whose forces may change; points may occur twice. Collective.
+    /// Send the new point numbers to the ranks with ghosts of these points. `own` are the owned points with
+    /// new point numbers. Return the owned points whose forces may change; points may occur twice.
+    /// Collective.
     fn send_numbers(
         &mut self,
         comm: &dyn Communicator,

@@ -57,7 +57,7 @@ pub(super) enum HaloContent {
 pub struct ForceTimes {
     /// Sums over bonds.
     pub bonds: Duration,
-    /// Packing and unpacking of messages, and waiting for them.
+    /// Packing and unpacking of messages, and waiting for messages.
     pub halo: Duration,
 }
 
@@ -75,8 +75,8 @@ pub struct Acting<'a, const D: usize> {
     /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates the
     /// stretches of ghosts.
     pub thermal_stretch: Option<&'a mut [f64]>,
-    /// Internal force density of the owned points, N/m³. It must be 0 on entry, because bond forces are
-    /// added to it.
+    /// Internal force density of the owned points, N/m³. The force density must be 0 on entry, because the
+    /// evaluation adds the bond forces.
     pub force: &'a mut [Vec<f64>; D],
     /// Plastic state of the owned points. Only [`BondUpdate::Step`] changes this state.
     pub plastic: PlasticColumns<'a>,
@@ -261,7 +261,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Copy computed or received thresholds, point numbers, rotations and stress measures to the grids, where
-    /// lattice bonds read them.
+    /// lattice bonds read these values.
     pub(super) fn update(&mut self, content: HaloContent, which: Which) {
         for grid in &mut self.grids {
             match content {

@@ -10,7 +10,7 @@ use super::kernel::{Group, Kernel};
 /// Changes of bond state in a force evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BondUpdate {
-    /// Bonds break, and their history advances to the end of a step of this length (s).
+    /// Bonds break, and the bond history advances to the end of a step of this length (s).
     Step(f64),
     /// Forces follow from the bond history at the end of a step of this length (s). The history is not
     /// stored, and no bond breaks.

@@ -316,7 +316,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// [`NEAR`](crate::material::bond::NEAR).
     ///
     /// # Safety
-    /// The lane group must belong to the grid, and `o` must be the index of one of its offsets.
+    /// The lane group must belong to the grid, and `o` must be the index of an offset of the lattice.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd, const FAST_PATH: bool>(
         &self,

@@ -24,13 +24,13 @@ pub struct Interaction {
 pub struct BlockLaws {
     /// Material law of the block.
     pub law: AnyLaw,
-    /// Damage law of the block, if it has one.
+    /// Damage law of the block; `None` for a block without damage.
     pub damage: Option<DamageLaw>,
     /// Whether the law also breaks bonds by their history.
     pub wears_out: bool,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// Factor of the critical work by the direction of a bond; `None` if it is 1 in all directions.
+    /// Factor of the critical work by the direction of a bond; `None` if the factor is 1 in all directions.
     pub direction: Option<ToughnessByDirection>,
     /// Data of the block's points that criteria read for bonds to other bodies, if the pair of bodies has a
     /// separate damage law.

@@ -94,10 +94,10 @@ impl LimitColumns {
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    /// Stress measure that the criterion reads, Pa; `None` if it reads no stress.
+    /// Stress measure that the criterion reads, Pa; `None` if the criterion reads no stress.
     stresses: Option<&'a [f64]>,
     /// Whether the criterion reads thresholds, truncation factors or stress measures. If not, one branch
-    /// skips them.
+    /// skips all of these columns.
     any: bool,
 }
 

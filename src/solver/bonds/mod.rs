@@ -3,9 +3,9 @@
 //! A force evaluation is a list of passes, created once from the laws in use. Each pass is a sum over the
 //! bonds of every point. Later passes read the results of a pass at point i, or at both i and j. A pass
 //! begins with a halo exchange if it reads values that other ranks have changed: first displacements and
-//! thermal stretches, later thresholds and point numbers. Point numbers are values of a point that its law
-//! computes from sums over its bonds, such as the dilatation. Interior points are processed while messages
-//! are in flight.
+//! thermal stretches, later thresholds and point numbers. Point numbers are values of a point, such as the
+//! dilatation, that the law of the point computes from sums over the bonds of the point. Interior points are
+//! processed while messages are in flight.
 //!
 //! Bonds that meet their criterion break in the pass that sums the forces. Point numbers and forces that
 //! depend on broken bonds are then recomputed, see `broken.rs`.
@@ -86,7 +86,7 @@ fn history_width<const D: usize>(interaction: &Interaction) -> usize {
 /// Check that the bond history fits in memory.
 ///
 /// # Errors
-/// If it does not fit. The error names the pair of blocks with the largest bond history.
+/// If the bond history does not fit. The error names the pair of blocks with the largest bond history.
 pub fn history_fits<const D: usize>(
     interactions: &[Interaction],
 ) -> std::result::Result<(), Fault> {
@@ -101,7 +101,7 @@ pub fn history_fits<const D: usize>(
     })
 }
 
-/// Strength f of each owned point, a random factor on its threshold; empty without scatter.
+/// Strength f of each owned point, a random factor on the threshold of the point; empty without scatter.
 fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64> {
     if blocks.iter().all(|block| block.weibull.is_none()) {
         return Vec::new();
@@ -125,7 +125,7 @@ pub struct Forces<const D: usize> {
     numbers: PointNumbers,
     /// Point data that failure criteria read.
     limits: LimitColumns,
-    /// Strength f of each owned point, a random factor on its threshold; empty without scatter.
+    /// Strength f of each owned point, a random factor on the threshold of the point; empty without scatter.
     strength: Vec<f64>,
     /// The passes of a force evaluation.
     passes: Vec<Pass>,
@@ -200,7 +200,7 @@ impl<const D: usize> Forces<D> {
 
     /// Compute the constants of the points ([`Law::CONSTANTS`]) from sums over their initial families. Also
     /// set the truncation factors and the thresholds that criteria read. Thresholds are not set here if any
-    /// of them follows the smallest stretch. Call after pre-cracks are cut and before other bonds break.
+    /// threshold follows the smallest stretch. Call after pre-cracks are cut and before other bonds break.
     /// Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);

@@ -1,5 +1,5 @@
-//! Point numbers: values of a point that its law declares and computes from sums over its bonds, such as the
-//! dilatation.
+//! Point numbers: values of a point, such as the dilatation, that the law of the point declares, and computes
+//! from sums over the bonds of the point.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
 /// Point numbers, one column per number. The first columns contain owned points and ghosts, because bonds
-/// read them. The other columns, which only laws read, contain owned points only.
+/// read these columns. The other columns, which only laws read, contain owned points only.
 pub struct PointNumbers {
     /// The point numbers by column; 0 for points whose law does not have that number.
     pub columns: Vec<Column>,

@@ -184,7 +184,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
     }
 }
 
-/// Halve a part until tasks are small, and run them.
+/// Halve a part repeatedly until the tasks are small, and run the tasks.
 fn split<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
@@ -437,13 +437,13 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over all bonds of a lane group. It returns the sums, and a bit for each point (lane) with a
-/// breaking bond.
+/// Task that sums over all bonds of a lane group. The task returns the sums, and a bit for each point (lane)
+/// with a breaking bond.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.
     points: GridPoints<'p, K, D>,
-    /// The bits of all bonds, including broken bonds, if the kernel reads them.
+    /// The bits of all bonds, including broken bonds; `None` if the kernel does not read these bits.
     whole: Option<&'t [u8]>,
     vector: &'t mut VectorBonds<'v>,
 }
@@ -592,7 +592,7 @@ struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
     /// The bits of all bonds of all lane groups, including broken bonds; empty if the kernel does not need
-    /// them.
+    /// these bits.
     whole: Vec<u8>,
 }
 

@@ -1,5 +1,5 @@
-//! The ghosts of contact: points of other ranks that may touch owned points. They differ from the ghosts of
-//! the bonds, because contact depends on present positions.
+//! The ghosts of contact: points of other ranks that may touch owned points. These ghosts differ from the
+//! ghosts of the bonds, because contact depends on present positions.
 //!
 //! Any two ranks can have contact. Each cell of present positions has a home rank, given by the hash of the
 //! cell. The home rank informs every rank with points in the cell about the other ranks with points in this
@@ -52,8 +52,8 @@ pub(super) struct Ghosts<const D: usize> {
 }
 
 impl<const D: usize> Ghosts<D> {
-    /// Find the points of other ranks within `reach` (m) of owned points. [`Self::update`] must be called
-    /// to exchange their motion. Collective.
+    /// Find the points of other ranks within `reach` (m) of owned points. Call [`Self::update`] afterwards to
+    /// exchange the motion of these points. Collective.
     pub fn within(
         comm: &dyn Communicator,
         dimension: Dimension,

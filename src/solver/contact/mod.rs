@@ -11,7 +11,7 @@
 //! the bodies are the same on all ranks.
 //!
 //! Repulsion follows from the new positions. Friction and damping follow from the velocities half a step
-//! earlier. Their work in a step is computed by the trapezoidal rule.
+//! earlier. The work of friction and damping in a step is computed by the trapezoidal rule.
 
 mod by_pair;
 mod cells;

@@ -97,7 +97,7 @@ pub(super) struct Demand {
 /// The contact force between two points, or of a rigid body on a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch<const D: usize> {
-    /// Repulsive force on the first point, N; it has the potential `energy`.
+    /// Repulsive force on the first point, N. The potential of this force is `energy`.
     pub repulsion: [f64; D],
     /// Force of normal damping on the first point, N.
     pub damping: [f64; D],

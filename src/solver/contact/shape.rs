@@ -100,8 +100,8 @@ pub(super) fn inertia(shape: &RigidShape, dimension: usize) -> Matrix3<f64> {
                 square(0) + square(2),
                 square(0) + square(1),
             );
-            // The moment about an axis is 0 if the box has no extent across this axis. It is replaced by 1,
-            // so the tensor is invertible.
+            // The moment about an axis is 0 if the box has no extent across this axis. Such a moment is
+            // replaced by 1, so the tensor is invertible.
             Matrix3::from_diagonal(&moments.map(|moment| if moment > 0.0 { moment } else { 1.0 }))
         }
         RigidShape::HalfSpace { .. } => Matrix3::identity(),

@@ -37,8 +37,8 @@ pub struct ContactState {
 }
 
 impl ContactState {
-    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included; the next
-    /// evaluation finds them.
+    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included, because the next
+    /// evaluation finds these points.
     pub fn words(&self) -> Vec<u64> {
         let demand = bytemuck::cast_slice(std::slice::from_ref(&self.demand));
         [demand, bytemuck::cast_slice(&self.rigid)].concat()

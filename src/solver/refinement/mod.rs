@@ -43,7 +43,7 @@ pub struct Regridded {
 /// Total changes by all refinements since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Refined {
-    /// Kinetic and strain energy that refinements have added, J; negative if they have removed energy.
+    /// Kinetic and strain energy that refinements have added, J; negative if refinements have removed energy.
     pub energy: f64,
     /// Number of intact bonds that refinements have added, minus the number of intact bonds that refinements
     /// have removed. Each bond counts twice.
@@ -265,8 +265,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Break the bonds that were broken before the refinement, and new bonds that cross facets. `rows` are
-    /// the rows of [`Kept`] of the owned points. `broken` contains the ids of the neighbours j of their
-    /// broken bonds, and `lengths` the number of these ids for each point. Collective.
+    /// the rows of [`Kept`] of the owned points. `broken` contains the ids of the neighbours j of all broken
+    /// bonds, and `lengths` the number of these ids for each owned point. Collective.
     fn inherit(
         &mut self,
         rows: &[f64],
