@@ -121,8 +121,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
 }
 
 /// Detect the grid of a body's points. The result is `None` unless all points lie on the grid and have the
-/// same volume, which must equal the volume of a cell with the relative tolerance [`VOLUME`]. If the points
-/// form a single layer in any direction, their volume is not compared with a cell. Collective.
+/// same volume. This volume must equal the volume of a cell, with the relative tolerance [`VOLUME`]. If the
+/// points form a single layer in any direction, their volume is not compared with a cell. Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,

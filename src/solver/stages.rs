@@ -25,8 +25,8 @@ impl<const D: usize> Simulation<'_, D> {
         (self.is_stage_over() && next < self.stages.len()).then_some(next)
     }
 
-    /// Number of the last step of the run, if the present step length stays the same up to the end of the
-    /// stage, and each later stage takes its expected number of steps.
+    /// Return the expected number of the last step of the run. The present step length is assumed to stay the
+    /// same up to the end of the stage. Each later stage is assumed to take its expected number of steps.
     pub fn last_step(&self) -> u64 {
         let later = self.steps[self.stage + 1..].iter();
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()

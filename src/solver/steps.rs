@@ -18,8 +18,10 @@ const MOST_STEPS: f64 = 1e15;
 /// unless `[time.adaptive] largest` limits the step.
 ///
 /// # Errors
-/// If no point has a bond and a stage has load steps or an automatic step, if a stage has too many steps to
-/// count, if a step is too long for viscous damping, or if the adaptive rule may repeat a step too often.
+/// - If no point has a bond, and a stage has load steps or an automatic step.
+/// - If a stage has too many steps to count.
+/// - If a step is too long for viscous damping.
+/// - If the adaptive rule may repeat a step too often.
 pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     let mut start = 0.0;
     let choose = |stage: Stage| {
@@ -101,9 +103,9 @@ fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Resul
 /// Maximum number of times that a step may be rolled back and repeated; each repeat costs as much as a step.
 const MOST_REPEATS: f64 = 100.0;
 
-/// Return an error if the adaptive rule may repeat a step too often, if its smallest step gives too many
-/// steps, or if its largest step is too long for viscous damping. `length` is the duration of the stage (s),
-/// and `step` is the step without the rule (s).
+/// Return an error if the adaptive rule may repeat a step too often, or if its smallest step gives too many
+/// steps. Also return an error if its largest step is too long for viscous damping. `length` is the duration
+/// of the stage (s), and `step` is the step without the rule (s).
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
     let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));

@@ -155,8 +155,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     Err(Error::input(message).at(&body.span))
 }
 
-/// Return an error if the damage of a body is incompatible with another setting of the problem, or with the
-/// damage of another body to which bonds may join this body.
+/// Return an error if the damage of a body is incompatible with another setting of the problem. Also return
+/// an error if bonds may join this body and another body with incompatible damage.
 fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());

@@ -13,8 +13,8 @@ use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits, ReadRotations};
 use super::list_points::load_history;
 
-/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes keep the
-/// initial values of the arrays, which have no meaning.
+/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes keep their
+/// initial values, and have no meaning.
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
     displacement: [Column; D],

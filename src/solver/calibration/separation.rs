@@ -35,9 +35,12 @@ const CHECK_INTERVAL: u32 = 20;
 /// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
 ///
-/// The result is `None` if the body has no fracture energy, is on no lattice, has a law or damage that is not
-/// possible, has bonds that break by stress, or has too large families. It is also `None` if the block does
-/// not separate.
+/// The result is `None` in these cases:
+///
+/// - the body has no fracture energy, or is on no lattice;
+/// - the law or the damage of the body is not possible, or bonds break by stress;
+/// - the families are too large;
+/// - the block does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;

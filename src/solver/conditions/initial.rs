@@ -12,8 +12,8 @@ use super::{members, not_empty};
 /// Set the initial displacements and velocities. Collective.
 ///
 /// # Errors
-/// If a set is empty, or a file cannot be read, has an invalid row, or does not have exactly one row for each
-/// point of the set. The error is the same on all ranks.
+/// If a set is empty; or if a file cannot be read, has an invalid row, or does not have exactly one row for
+/// each point of its set. The error is the same on all ranks.
 pub fn apply_initials<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,

@@ -122,8 +122,8 @@ fn body_of<'p, const D: usize>(problem: &'p Problem, model: &Model<D>, point: u3
     problem.block(usize::from(model.block[point as usize])).body
 }
 
-/// Return an input error if a load acts on a layer whose thickness is the spacing, and a loaded point on any
-/// rank belongs to a body without a single spacing. Collective.
+/// Check a load that acts on a layer whose thickness is the spacing: return an input error if a loaded point
+/// on any rank belongs to a body without a single spacing. Collective.
 fn have_depths<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -207,8 +207,11 @@ impl<const D: usize> Conditions<D> {
     /// component of a point, the later support applies. Collective.
     ///
     /// # Errors
-    /// If a set is empty, or if a load acts on a layer whose thickness is the spacing and a loaded point has
-    /// no single spacing. The error is the same on all ranks.
+    /// - If a set is empty.
+    /// - If a load acts on a layer whose thickness is the spacing, and a loaded point belongs to a body
+    ///   without a single spacing.
+    ///
+    /// The error is the same on all ranks.
     pub fn new(
         problem: &Problem,
         comm: &dyn Communicator,

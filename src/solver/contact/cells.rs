@@ -70,7 +70,7 @@ impl Cells {
     }
 
     /// Call `visit` with the index of every point in the cell of a position (m) and in the adjacent cells.
-    /// These include all points whose distance from the position is at most one edge of a cell.
+    /// The visited points include all points whose distance from the position is at most the edge of a cell.
     pub fn near(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
         let mask = self.starts.len() - 2;
         for cell in neighbourhood(cell_of(place, self.edge), self.dimension) {

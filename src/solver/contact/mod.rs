@@ -234,9 +234,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
-    /// friction and damping from the velocities in the middle of the step, record the energy that friction
-    /// and damping dissipate, and apply the second half kick of rigid bodies. Otherwise, friction and damping
-    /// do not change. If a position is not finite, nothing is added. Collective.
+    /// friction and damping from the velocities in the middle of the step, and record the energy that they
+    /// dissipate. Also apply the second half kick of rigid bodies. An evaluation that does not end a step
+    /// does not change friction and damping. If a position is not finite, nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
