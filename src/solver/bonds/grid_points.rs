@@ -77,7 +77,8 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Insert columns over the local points before the point numbers.
+    /// Insert columns in front of the columns of the point numbers. `columns` contain the values of the local
+    /// points.
     pub fn insert_numbers(&mut self, columns: &[Column]) {
         let by_slot = |values: &Column| {
             let mut places = Column::new(0, self.grid.slots(), 0.0);

@@ -58,8 +58,8 @@ pub struct LimitColumns {
 }
 
 impl LimitColumns {
-    /// Allocate the columns in `read` for `count` points. `number` is the index of the first of these columns
-    /// among all columns that a loop reads, see [`Column`].
+    /// Allocate the columns that `read` selects, with `count` entries each. `number` is the index of the
+    /// first of these columns among all columns that a loop reads, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {

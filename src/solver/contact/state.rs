@@ -99,7 +99,7 @@ impl<const D: usize> Contact<D> {
     /// Stable step (s) with contact; `step` is the stable step without contact.
     ///
     /// With damping from the velocities half a step earlier, Δt² ω² + 2 Δt C/m < 4 is stable. Here ω² is the
-    /// sum of 4/`step`² and the limit of stiffness, and C/m is the limit of damping.
+    /// sum of 4/`step`² and `StepDemand::stiffness`, and C/m is `StepDemand::damping`.
     pub fn stable_step(&self, step: f64) -> f64 {
         let square = 4.0 / (step * step) + self.demand.stiffness;
         let damping = self.demand.damping;
