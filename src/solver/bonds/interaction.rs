@@ -30,7 +30,8 @@ pub struct BlockLaws {
     pub wears_out: bool,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// Factor of the critical work by the direction of a bond; `None` if the factor is 1 in all directions.
+    /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
+    /// all directions.
     pub direction: Option<ToughnessByDirection>,
     /// Data of the block's points that criteria read for bonds to other bodies, if the pair of bodies has a
     /// separate damage law.

@@ -16,7 +16,8 @@ use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
 
-/// Edge of a cell divided by the search radius. Large cells have fewer points near their borders.
+/// Edge of a cell divided by the search radius. In large cells, a smaller fraction of the points lies near
+/// the borders of the cell.
 const CELL: f64 = 4.0;
 
 /// A point in messages to other ranks.
