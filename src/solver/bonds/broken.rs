@@ -31,7 +31,8 @@ pub struct Broken<const D: usize> {
     /// Energy that the point loses, J: its part of the energy of the broken bonds, and the change of its
     /// remaining energy.
     pub energy: f64,
-    /// The point's part of the energy of the broken bonds above their criterion when they broke, J.
+    /// The point's part of the overshoot energy of the broken bonds, J: the energy of a bond above its
+    /// criterion when it breaks.
     pub overshoot: f64,
     /// Force density that the point loses, N/m³: the forces of the broken bonds, and the change of the forces
     /// of other bonds.

@@ -5,7 +5,8 @@ use crate::points::bins::Bins;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 
-/// Ratio of a facet's side to a cell's side, so that rounding opens no gap.
+/// Ratio of the side of a facet to the side of a cell. The ratio is above 1, so round-off opens no gap
+/// between facets.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
 /// The facets of all ranks. A facet lies between two adjacent points whose bond is broken, or was broken when
