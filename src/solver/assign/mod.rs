@@ -201,8 +201,8 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
-/// Return the damage law that a damage of the deck gives the bonds at an end with these constants. `body` is
-/// the body of this end.
+/// Return the damage law of bonds at an end with these constants, from the damage in the deck. `body` is the
+/// body of this end.
 fn damage_law(
     problem: &Problem,
     body: &Body,

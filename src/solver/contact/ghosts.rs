@@ -105,8 +105,8 @@ struct Partner {
     rank: u64,
 }
 
-/// Find the points of other ranks within `reach` (m) of owned points, sorted by owner, then by id. `own` are
-/// the owned points. Also return the exchange plan of these points for `width` values per point. Collective.
+/// Find the points of other ranks within `reach` (m) of the owned points `own`. Return the found points,
+/// sorted by owner, then by id, and the plan to exchange `width` values per found point. Collective.
 fn find(
     comm: &dyn Communicator,
     own: &[Ghost],
