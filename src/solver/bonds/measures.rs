@@ -16,6 +16,7 @@ pub(super) const fn wanted(linear: bool) -> Wanted {
 }
 
 /// Kernel that computes the sums of each point, by index:
+///
 /// 0. strain energy density of the intact bonds within the horizon of the point, J/m³;
 /// 1. volume of the intact neighbours within the horizon of the point, m³;
 /// 2. number of intact bonds, including bonds longer than the horizon of the point;
