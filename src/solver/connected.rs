@@ -5,21 +5,22 @@ use crate::comm::total;
 use super::Simulation;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Replace each entry of columns over the local points by the minimum over all points that intact bonds
-    /// connect to its point. Collective.
+    /// In each column over the local points, replace the entry of a point by the minimum over its piece: the
+    /// points of all ranks that chains of intact bonds connect to the point. Collective.
     pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
         let mut pieces = Pieces::new(self.model.volume.len());
         self.forces.for_each_intact(|i, j| pieces.join(i, j));
         self.spread_least_over(pieces, columns);
     }
 
-    /// Replace each entry of columns over the local points by the minimum over the piece of its point. Pieces
-    /// of different ranks are connected if they contain the same point. Collective.
+    /// In each column over the local points, replace the entry of a point by the minimum over its piece.
+    /// `pieces` are the pieces of this rank. Pieces of different ranks count as one piece if they contain the
+    /// same point. Collective.
     pub(super) fn spread_least_over(&mut self, mut pieces: Pieces, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
         loop {
-            // First find the minimum over connected points on this rank, then include the points of other
-            // ranks.
+            // Exchange the ghost values, then find the minima over the pieces of this rank. Repeat this until
+            // no entry changes on any rank.
             self.forces.bring_all(self.comm, columns);
             let mut changed = 0;
             for column in columns.iter_mut() {
@@ -40,7 +41,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Return the fragment id of each owned point: the smallest id among this point and all points that
-    /// intact bonds connect to it. Collective.
+    /// chains of intact bonds connect to this point. Collective.
     pub fn fragment_ids(&mut self) -> Vec<f64> {
         let mut ids: Vec<f64> = self.model.ids.iter().map(|id| *id as f64).collect();
         self.spread_least(&mut [&mut ids]);
@@ -49,7 +50,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Disjoint sets of connected local points. Entry k is the parent of point k in the tree of its set.
+/// Disjoint sets of connected local points. Entry k is the parent of point k in the tree of the set that
+/// contains point k; a root is its own parent.
 pub(super) struct Pieces(Vec<usize>);
 
 impl Pieces {
@@ -64,7 +66,7 @@ impl Pieces {
         self.0[i.max(j)] = i.min(j);
     }
 
-    /// Find the root of a point's tree, and shorten the path to it.
+    /// Find the root of a point's tree, and shorten the path from the point to the root.
     fn root(&mut self, mut point: usize) -> usize {
         let Self(parents) = self;
         while parents[point] != point {

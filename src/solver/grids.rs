@@ -12,7 +12,7 @@ use crate::points::bins::Bins;
 use crate::problem::{FamilyRule, Kind, PointSource, Problem, Quadrature};
 
 /// Tolerance as a fraction of a cell's edge: for points that must lie at cell centres, and for grids that
-/// must coincide.
+/// must coincide. Two coordinates that differ by at most this fraction of the longest bond count as equal.
 const ON_GRID: f64 = 1e-6;
 
 /// Largest cell index; integers up to this size are exact in floating point.
@@ -28,7 +28,8 @@ struct Cells {
     edges: [f64; 3],
 }
 
-/// Find the grids of a deck; `longest` is the length of the longest bond, m. Collective.
+/// Find the regular grids on which the points of whole bodies lie. `longest` is the length of the longest
+/// bond, m. The result is empty if the deck requests lists. Collective.
 ///
 /// # Errors
 /// If the deck requests lattices and the points of a body do not lie on a regular grid or have different
@@ -69,7 +70,8 @@ pub fn grids(
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };
-        // The grids of all refinement levels have a point at the centre of a level-0 cell.
+        // The centre of a level-0 cell lies on the grid of every refinement level, so all levels have the
+        // same `centre`.
         let is_shape = matches!(body.points, PointSource::Lattice { .. });
         let refinement = problem.refinement.as_ref().filter(|_| is_shape);
         for level in 0..=refinement.map_or(0, |refinement| refinement.levels) {
@@ -81,7 +83,8 @@ pub fn grids(
     Ok(grids)
 }
 
-/// Record that the points of a block lie on a grid, either a known one or a new one.
+/// Record that the points of a block lie on a grid: mark the block in a known grid that coincides with this
+/// grid, or add a new grid.
 fn add(
     grids: &mut Vec<GridFrame>,
     Cells { centre, edges }: Cells,
@@ -107,7 +110,8 @@ fn add(
     }
 }
 
-/// The grid of a lattice in the deck, from a corner of a cell (m) and the edges (m).
+/// Return the grid of a lattice in the deck. `origin` is a corner of a cell (m), and `edges` are the edges of
+/// the cells (m).
 fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
     let mut centre = [0.0; 3];
     for k in 0..dimension {
@@ -117,8 +121,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
 }
 
 /// Detect the grid of a body's points. The result is `None` unless all points lie on the grid and have the
-/// same volume, equal to the volume of a cell. If the points form a single layer, their volume is not
-/// compared with a cell. Collective.
+/// same volume. This volume must equal the volume of a cell, with the relative tolerance [`VOLUME`]. If the
+/// points form a single layer in any direction, their volume is not compared with a cell. Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -131,7 +135,8 @@ fn detected(
         let owned = &domain.points[..domain.owned];
         owned.iter().filter(|point| point.block as usize == body)
     };
-    // Minimum over the ranks of: coordinates, negative coordinates, gaps, volume, negative volume.
+    // Minima over the points of all ranks: coordinates (entries 0 to 2), negative coordinates (3 to 5), gaps
+    // (6 to 8), volume (9), negative volume (10).
     let mut smallest = [f64::MAX; 11];
     let [gap_x, gap_y, gap_z] = smallest_gaps(domain, body, longest);
     (smallest[6], smallest[7], smallest[8]) = (gap_x, gap_y, gap_z);
@@ -148,7 +153,7 @@ fn detected(
     for k in 0..dimension {
         let (low, high, gap) = (smallest[k], -smallest[3 + k], smallest[6 + k]);
         centre[k] = low;
-        // If the points form a single layer, any edge fits.
+        // If the points form a single layer in direction k, any edge fits.
         edges[k] = if gap < f64::MAX {
             (high - low) / ((high - low) / gap).round()
         } else {
@@ -171,8 +176,9 @@ fn detected(
     (good[0] == 1.0).then_some(Cells { centre, edges })
 }
 
-/// Smallest nonzero difference of each coordinate between two points of a body. Only pairs up to the length
-/// of the longest bond (m) count, so the minimum over all ranks does not depend on their number.
+/// Return the smallest nonzero difference of each coordinate (m) between two local points of a body;
+/// `f64::MAX` if there is none. Only pairs at a distance of at most `longest` (m) count, so the minimum over
+/// all ranks does not depend on the number of ranks.
 fn smallest_gaps(domain: &Domain, body: usize, longest: f64) -> [f64; 3] {
     let of_body = |point: &&Point| point.block as usize == body;
     let places: Vec<[f64; 3]> = domain

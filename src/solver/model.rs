@@ -1,4 +1,4 @@
-//! Constant data of a run: the points and their properties.
+//! Data of the points and blocks that time steps do not change.
 
 use crate::dimension::Dimension;
 use crate::partition::Domain;
@@ -6,27 +6,29 @@ use crate::problem::{Material, Problem};
 
 use super::palette_column::PaletteColumn;
 
-/// The local points by component, and the properties of the blocks.
+/// Reference data of the local points, and the properties of the blocks.
 pub struct Model<const D: usize> {
     /// Reference positions by component, m; owned points, then ghosts.
     pub reference: [Vec<f64>; D],
     /// Volumes, m³; owned points, then ghosts.
     pub volume: PaletteColumn,
-    /// Block of each owned point.
+    /// Index of the block of each owned point.
     pub block: Vec<u16>,
     /// Global ids; owned points, then ghosts.
     pub ids: Vec<u64>,
     /// Density of each block, multiplied by the density scale of the present stage, kg/m³.
     pub density: Vec<f64>,
-    /// Viscous damping r of each block, 1/s.
+    /// Rate r of viscous damping of each block, 1/s. The damping force density at a velocity u̇ is −r ρ u̇,
+    /// with the density ρ.
     pub damping: Vec<f64>,
     /// Thermal expansion of each block.
     pub expansion: Vec<Expansion>,
-    /// Number of owned points without bonds to ghosts; they come first.
+    /// Number of interior points, which are owned points without bonds to ghosts. Interior points have the
+    /// lowest local indices.
     pub interior: usize,
     /// Number of points over all ranks.
     pub total: u64,
-    /// Number of points of level 0 over all ranks; they have the lowest ids.
+    /// Number of points of level 0 over all ranks. These points have the lowest ids.
     pub coarsest: u64,
 }
 
@@ -35,7 +37,7 @@ pub struct Model<const D: usize> {
 pub struct Expansion {
     /// Free thermal stretch per kelvin, 1/K.
     pub stretch_per_kelvin: f64,
-    /// Temperature with zero thermal stretch.
+    /// Temperature with zero thermal stretch, in the unit of the prescribed temperatures.
     pub reference_temperature: f64,
 }
 
@@ -122,13 +124,13 @@ impl<const D: usize> Model<D> {
         self.expansion[usize::from(self.block[point])]
     }
 
-    /// Viscous damping r of an owned point, 1/s.
+    /// Rate r of viscous damping of an owned point, 1/s.
     pub fn damping_of(&self, point: usize) -> f64 {
         self.damping[usize::from(self.block[point])]
     }
 
-    /// A component of the force density (N/m³) on an owned point after subtraction of the viscous damping at
-    /// a velocity (m/s).
+    /// Return `force`, a component of the force density on an owned point (N/m³), plus the viscous damping −r
+    /// ρ u̇. `velocity` is the same component of the velocity u̇, m/s.
     #[inline]
     pub fn less_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
         let damping = self.damping_of(point);

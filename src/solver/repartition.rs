@@ -1,7 +1,8 @@
 //! Rebalance during a run, when the computing times of the ranks differ too much.
 //!
-//! Points migrate as in a restart on other ranks. The state is redistributed by id, bonds are found again,
-//! and their stored data are restored. The result of the run is therefore bitwise independent of rebalances.
+//! Points migrate as in a restart on another number of ranks. The state is redistributed by id, bonds are
+//! found again, and their stored data are restored. The result of the run is therefore bitwise independent of
+//! rebalances.
 
 use std::time::{Duration, Instant};
 
@@ -17,7 +18,8 @@ use super::{Simulation, Stepper};
 /// Result of a rebalance; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repartition {
-    /// Time that the slowest rank spent on bonds before the rebalance, divided by the mean over the ranks.
+    /// Time that the slowest rank spent on bonds since the previous check, divided by the mean over the
+    /// ranks.
     pub imbalance: f64,
     /// Number of points that changed their owner.
     pub moved: u64,
@@ -49,8 +51,9 @@ impl BalanceWatch {
     /// result; otherwise return `None`. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     pub fn look<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -59,7 +62,8 @@ impl BalanceWatch {
             return Ok(None);
         };
         let is_due = stepper.clock().number().is_multiple_of(rule.every_steps);
-        // All iterations of a load step have the same step number, so only the last one is checked.
+        // All iterations of a load step have the same step number, so the check is made only after the last
+        // iteration.
         if !is_due || !stepper.load_step().is_settled {
             return Ok(None);
         }
@@ -117,8 +121,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// check. Returns the number of points over all ranks that changed their owner. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

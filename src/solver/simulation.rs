@@ -30,8 +30,8 @@ use super::refinement::{self, Refined};
 use super::size;
 use super::steps::choose_steps;
 
-/// Extra reach of ghosts as a fraction of the longest bond, because points may deviate from their grid by a
-/// millionth of a cell.
+/// Extra reach, as a fraction of the longest bond, in the search for ghosts and for points near pre-cracks.
+/// This reach is needed because points may deviate from their grid by a millionth of a cell.
 const SLACK: f64 = 1e-5;
 
 /// A run on one rank.
@@ -66,14 +66,14 @@ pub struct Simulation<'a, const D: usize> {
     /// Number of bonds of the owned points that each pre-crack cuts. A bond between two owned points counts
     /// twice.
     pub cut: Vec<u64>,
-    /// Number of bonds of the owned points that were intact before any bond could break. A bond between two
-    /// owned points counts twice. `None` if no bond can break at the start.
+    /// Number of bonds of the owned points that are intact after pre-cracks were cut and before the forces at
+    /// time 0. A bond between two owned points counts twice. `None` if no bond can break at time 0.
     pub intact_at_start: Option<u64>,
     /// Stable step with the density of the materials, s.
     pub stable_step: f64,
     /// Time and step of the present stage.
     pub clock: Clock,
-    /// Integrator of the present stage; `None` while it advances the simulation.
+    /// Integrator of the present stage; `None` while the integrator advances the simulation.
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
     /// Progress of the load step; `is_settled` is true in explicit stages.
     pub load_step: LoadStep,
@@ -111,7 +111,8 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// The first point of a rank whose motion, force or reaction is not finite.
+/// The first point of a rank whose motion, force or reaction is not finite: at the earliest step, the point
+/// with the smallest id.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
@@ -131,8 +132,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
 
-    /// Same as [`Self::new`], with a call of `between` after each phase of the set-up. An error of `between`
-    /// ends the set-up; the error must be the same on all ranks.
+    /// Same as [`Self::new`], with a call of `between` between the phases of the set-up. An error of
+    /// `between` ends the set-up; the error must be the same on all ranks.
     ///
     /// # Errors
     /// The errors of [`Self::new`] and of `between`.
@@ -160,9 +161,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Distribute the points of grids and create their bonds. Initial values are not set, and forces are not
-    /// evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if it is not known.
-    /// `between` is the same as for [`Self::set_up`].
+    /// Distribute the points of the given grids over the ranks, and create the bonds of these points.
+    /// `pieces` are the points of this rank before the distribution. Initial values are not set, and forces
+    /// are not evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if the cost
+    /// is not known. `between` is the same as for [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -173,8 +175,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let cutoffs = cutoffs(problem);
         let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-        // With this slack, both ends of a bond at the limit exist on the rank, for any rounding of the bond
-        // length.
+        // With this slack, both ends of a bond of the largest length exist on the rank, for any rounding of
+        // the bond length.
         let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
@@ -257,7 +259,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Set the displacements of supported points, and evaluate the forces at time 0. Collective.
+    /// Set the displacements and velocities of supported points, and evaluate all forces and reactions at
+    /// time 0. Collective.
     fn begin(&mut self) {
         self.apply_displacements(0.0, 0.0);
         self.apply_loads(0.0, true);
@@ -287,9 +290,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Make one step, with or without its second half kick, or one iteration of a load step.
-    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied; it
-    /// must be false at the beginning of a stage. Returns whether the second half kick of this step must
-    /// still be applied. Collective.
+    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied. This
+    /// argument must be false if a stage begins or if contact changes the step. Returns whether the second
+    /// half kick of this step must still be applied. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
@@ -306,7 +309,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         is_pending
     }
 
-    /// Apply the second half kick of the present step.
+    /// Apply the second half kick of the step that ends at the present time.
     pub(super) fn kick(&mut self) {
         let start = Instant::now();
         let clock = self.clock;
@@ -319,7 +322,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Make one explicit step without its second half kick. If the second half kick of the previous step is
-    /// pending, apply it first. Collective.
+    /// pending, apply that half kick first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
         let before = self.clock;
@@ -397,7 +400,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(bond_update);
     }
 
-    /// Same as [`Self::evaluate`], if [`Part::write_bond_inputs`] has been called for all parts of the
+    /// Same as [`Self::evaluate`], after [`Part::write_bond_inputs`] has been called for all parts of the
     /// points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let is_quasi_static = self.is_quasi_static();
@@ -450,7 +453,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Update the external forces at `time` (s). Without `all`, only loads that have changed are computed.
+    /// Update the external forces at `time` (s). Without `all`, only loads that may have changed are
+    /// computed.
     pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
         self.conditions
             .set_loads(time, self.load_factors.present(), all);
@@ -460,8 +464,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Set the velocities of supported points, and compute the reactions. Returns whether all values are
-    /// finite.
+    /// Set the velocities of supported points, and compute the reactions. Returns whether these velocities
+    /// and reactions are finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
         if self.is_quasi_static() {
             return self.walk(|part, here| here.project_residual(part));
@@ -486,16 +490,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Record the first point whose motion is not finite, at the time of a clock, unless a point has been
-    /// recorded before.
+    /// Record the owned point with the smallest id whose motion, force or reaction is not finite, with the
+    /// step and time of a clock. If a point has been recorded before, nothing changes.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
             self.bad = self.first_bad(clock);
         }
     }
 
-    /// Find the point with the smallest id whose motion, force or reaction is not finite. The clock gives
-    /// step and time of the record.
+    /// Find the owned point with the smallest id whose motion, force or reaction is not finite. The clock
+    /// gives the step and the time of the record.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -522,11 +526,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Check on all ranks that all values are finite and that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// If a value is not finite, the message names a condition that is not finite or causes a thermal stretch
-    /// of −1 or less. Without such a condition, it names a point with such a value: from the earliest step,
-    /// the point with the smallest id. If the motion of a rigid body is not finite, the message names this
-    /// body. If no equilibrium has been found, it names a loaded piece that no support holds, if there is
-    /// one.
+    /// - If a value is not finite. The message names a condition or initial value that is not finite, or a
+    ///   temperature that causes a thermal stretch of −1 or less. If there is none, the message names a
+    ///   point: at the earliest step at which points have values that are not finite, the point with the
+    ///   smallest id.
+    /// - If the motion of a rigid body is not finite. The message names this body.
+    /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
+    ///   is one.
     pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -580,8 +586,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// Complete a step (s) with the forces at the new positions: loads, second half kick, supports and work.
-/// Returns whether all values are finite.
+/// Complete a step of length `step` (s) with the forces at the new positions: loads, second half kick,
+/// supports and work. Returns whether all velocities and reactions are finite.
 fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, step: f64) -> bool {
     here.apply_loads(part);
     let finite = verlet::second_half_kick(part, step);
@@ -592,7 +598,7 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
 }
 
 /// Whether bonds may break at the initial positions, because initial displacements or conditions can stretch
-/// them.
+/// bonds.
 fn starts_deformed(problem: &Problem) -> bool {
     let placed = |condition: &Condition| {
         let action = &condition.action;
@@ -603,8 +609,9 @@ fn starts_deformed(problem: &Problem) -> bool {
             || problem.conditions.iter().any(placed))
 }
 
-/// Break the bonds that cross a pre-crack, and count them by crack. The test starts from the end with the
-/// lower id. Both ends of a bond, also on different ranks, therefore get the same result.
+/// Break the bonds that cross a pre-crack. Return the number of these bonds for each pre-crack. The test
+/// starts from the end with the lower id. Both ends of a bond, also on different ranks, therefore get the
+/// same result.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

@@ -7,11 +7,11 @@ use crate::problem::{PointSource, Problem};
 
 /// Return an error if a point would have too many neighbours, or a rank too many points. The numbers are
 /// estimated from the shapes of the problem. `cutoffs` is the longest bond (m) of each pair of blocks,
-/// row-major.
+/// row-major; `ranks` is the number of ranks.
 ///
 /// # Errors
-/// If one of the numbers is too large. The message names the horizon or the body; the error is the same on
-/// all ranks.
+/// If one of the numbers is too large, or if cells of a lattice are too far from the origin to be numbered.
+/// The message names the horizon or the body; the error is the same on all ranks.
 pub fn is_feasible(problem: &Problem, cutoffs: &[f64], ranks: usize) -> Result<()> {
     let blocks = problem.block_count();
     (0..problem.bodies.len()).try_for_each(|body| lattice::is_feasible(problem, body, ranks))?;

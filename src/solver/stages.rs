@@ -25,7 +25,8 @@ impl<const D: usize> Simulation<'_, D> {
         (self.is_stage_over() && next < self.stages.len()).then_some(next)
     }
 
-    /// Number of the last step of the run, if the step does not change.
+    /// Return the expected number of the last step of the run. The present step length is assumed to stay the
+    /// same up to the end of the stage. Each later stage is assumed to take its expected number of steps.
     pub fn last_step(&self) -> u64 {
         let later = self.steps[self.stage + 1..].iter();
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
@@ -78,11 +79,12 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Conserve the momentum of the points after their densities were multiplied by a factor. Components with
-    /// prescribed motion keep their velocity. Record the change of kinetic energy. Returns whether all values
-    /// are finite. Collective.
+    /// prescribed motion keep their velocity. Record the change of kinetic energy. Returns whether the
+    /// velocities and reactions of supported points are finite. Collective.
     ///
-    /// With conserved momentum, the change of density exerts no force. Conserved velocities would need an
-    /// impulse. Conserved kinetic energy would need an impulse that depends on the frame of reference.
+    /// If momentum is conserved, the change of density exerts no force. To conserve the velocities instead
+    /// would need an impulse. To conserve the kinetic energy would need an impulse that depends on the frame
+    /// of reference.
     fn keep_momentum(&mut self, factor: f64) -> bool {
         let before = self.kinetic_energy() / factor;
         let components = self.fields.velocity.iter_mut();
@@ -95,7 +97,7 @@ impl<const D: usize> Simulation<'_, D> {
         finite
     }
 
-    /// Kinetic energy over all ranks, J. Collective.
+    /// Kinetic energy of the points of all ranks, J. Collective.
     fn kinetic_energy(&self) -> f64 {
         let model = &self.model;
         let mut sum = [ExactSum::ZERO];
@@ -108,7 +110,7 @@ impl<const D: usize> Simulation<'_, D> {
         reduce(self.comm, &mut sum)[0]
     }
 
-    /// Activate the conditions and the density of a stage.
+    /// Activate the conditions, the integrator and the density of a stage.
     pub(super) fn enter(&mut self, stage: usize) {
         if stage != self.stage
             && let Some(conditions) = self.waiting[stage].take()
@@ -122,7 +124,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.scale_density();
     }
 
-    /// If the stage is adaptive, start its rule with the present step.
+    /// If the present stage has an adaptive step, start the adaptive rule with the step of the clock.
     pub(super) fn begin_adapting(&mut self) {
         if let Some(rule) = self.time_rule().adaptive {
             self.step_control.begin(&rule, self.clock.step());

@@ -1,4 +1,5 @@
-//! The leapfrog driver: it defers the second half kick of a step until a caller requests the state.
+//! The leapfrog driver: it defers the second half kick of a step until the next step, or until a caller
+//! requests the state.
 
 use crate::comm::Communicator;
 use crate::error::{Error, Result};
@@ -16,10 +17,10 @@ use super::simulation::Times;
 ///
 /// Velocities are defined at half steps, as in the leapfrog form of Verlet. A step ends with the forces at
 /// the new positions. The second half kick of this step is applied together with the first half kick of the
-/// next step, in one loop over the points. Until then, velocities, reactions, external forces, damping and
-/// their energies do not yet have their values at the full step. Therefore the simulation is accessible only
-/// through [`Self::at_full_step`], which applies the pending half kick first. The number of these calls does
-/// not change the results.
+/// next step, in one loop over the points. Until then, the velocities, reactions and external forces do not
+/// yet have their values at the full step. The same holds for the external work, and for the power and energy
+/// of damping. Therefore a caller gets the [`Simulation`] only from [`Self::at_full_step`], which applies the
+/// pending half kick first. The number of these calls does not change the results.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
     /// Whether the second half kick of the last step must still be applied.
@@ -130,7 +131,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &self.simulation.load_factors
     }
 
-    /// Index of the load condition with this name.
+    /// Return the index of the load with this name, among all conditions of the problem.
     ///
     /// # Errors
     /// If no condition has this name, or if the condition is not a load.
@@ -151,8 +152,9 @@ impl<'a, const D: usize> Stepper<'a, D> {
         )))
     }
 
-    /// Multiply a load by a factor from the next step or load step on. All ranks must pass the same factor.
-    /// If the load is unknown or the factor is not finite, [`Self::wrong_request`] returns an error.
+    /// Set the factor on a load. The factor acts from the next step or load step on. All ranks must pass the
+    /// same factor. If the load is unknown or the factor is not finite, the factor does not change, and
+    /// [`Self::wrong_request`] returns the error.
     pub fn set_load_factor(&mut self, name: &str, factor: f64) {
         let checked = self.load(name).and_then(|load| {
             if factor.is_finite() {

@@ -9,17 +9,19 @@ use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time
 use super::motion::Clock;
 use super::motion::clock::steps_to;
 
-/// Maximum number of steps of a stage. Larger numbers are not exact in floating point, and steps may be too
-/// small to change the time.
+/// Maximum number of steps of a stage. Much larger numbers are not exact in floating point, and the steps
+/// would be so short that they may not change the time.
 const MOST_STEPS: f64 = 1e15;
 
 /// Return the first step (s) of each stage, and the number of steps of the stage if no bond breaks. `stable`
-/// is the stable step, s. An automatic step divides the stage evenly, unless `[time.adaptive] largest` limits
-/// the step.
+/// is the stable step with the density of the materials, s. An automatic step divides the stage evenly,
+/// unless `[time.adaptive] largest` limits the step.
 ///
 /// # Errors
-/// If there is no stable step, if there are more steps than can be counted, if a step is too long for viscous
-/// damping, or if the adaptive rule may repeat a step too often.
+/// - If no point has a bond, and a stage has load steps or an automatic step.
+/// - If a stage has too many steps to count.
+/// - If a step is too long for viscous damping.
+/// - If the adaptive rule may repeat a step too often.
 pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     let mut start = 0.0;
     let choose = |stage: Stage| {
@@ -38,7 +40,7 @@ pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
 }
 
 /// Return the first step (s) of a stage, and the number of its steps if no bond breaks. `length` is the
-/// duration of the stage, s.
+/// duration of the stage (s), and `stable` is the stable step with the density of the materials (s).
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
         if stable.is_infinite() {
@@ -85,8 +87,8 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     Error::input(message).at(&problem.places.horizon)
 }
 
-/// Return a step (s) and the number of steps in a stage of duration `length` (s). It is an error if the steps
-/// are too many to count.
+/// Return the given step (s) and number of steps of a stage of duration `length` (s). Return an error if the
+/// number exceeds [`MOST_STEPS`].
 fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(
@@ -101,9 +103,9 @@ fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Resul
 /// Maximum number of times that a step may be rolled back and repeated; each repeat costs as much as a step.
 const MOST_REPEATS: f64 = 100.0;
 
-/// Return an error if the adaptive rule may repeat a step too often, if its smallest step gives too many
-/// steps, or if its largest step is too long for viscous damping. `length` is the duration of the stage (s),
-/// and `step` is the chosen step (s).
+/// Return an error if the adaptive rule may repeat a step too often, or if its smallest step gives too many
+/// steps. Also return an error if its largest step is too long for viscous damping. `length` is the duration
+/// of the stage (s), and `step` is the step without the rule (s).
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
     let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));
@@ -153,7 +155,7 @@ pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) 
 }
 
 /// Return an error if a step (s) is too long for viscous damping. `key` is the key of `[time]` that gives the
-/// step.
+/// step, and `place` is the span of this key in the deck.
 fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64) -> Result<()> {
     let rate = damping(problem);
     if rate * step <= SIGN_CHANGES {
@@ -171,7 +173,7 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
 
 /// Return the first step (s) of a stage with an adaptive rule, and the number of its steps if no bond breaks.
 /// `step` and `steps` are the length and the number of steps without the rule, and `length` is the duration
-/// of the stage, s. The first step is at most `largest` and grows up to `largest`.
+/// of the stage, s. The first step is at most `largest`; later steps grow up to `largest`.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
     match rule.largest {
         Some(largest) if largest < step => (largest, steps_to(length, largest)),
@@ -180,8 +182,8 @@ fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64
     }
 }
 
-/// Number of steps in a duration `length` (s). The step starts at the first step (s) and is multiplied by
-/// `rule.raise` after each round of `rule.steps` steps, up to the largest step (s).
+/// Number of steps in a duration `length` (s). The step starts at `first` (s) and is multiplied by
+/// `rule.raise` after each round of `rule.steps` steps, up to `largest` (s).
 fn raised(rule: &Adaptive, [first, largest]: [f64; 2], length: f64) -> f64 {
     let round = rule.steps as f64;
     let growth = rule.raise - 1.0;

@@ -28,7 +28,8 @@ struct Constants {
     horizon: f64,
 }
 
-/// Constants at point i of the bonds from block `here` to block `there`, by the rule for these blocks.
+/// Return the constants that points of block `here` use for their bonds to block `there`. The constants
+/// follow from the interface rule of the two bodies or, within a body, from `Refinement::bonds`.
 fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
     let [own, other] = [here, there].map(|block| (block.body.material.elastic, block.horizon));
     let combine = |of: fn(f64, f64) -> f64| Constants {
@@ -55,7 +56,7 @@ fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
 }
 
 /// Return the bond stiffness at an end with these constants, in arbitrary units. Micromoduli are proportional
-/// to E/δ^(d+1).
+/// to E/δ^(d+1) in d dimensions.
 fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
     let Constants { elastic, horizon } = constants;
     elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
@@ -80,7 +81,7 @@ fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     }
 }
 
-/// Input for creating the law of a body with this damage.
+/// Return the input for creating the law of a body with this damage and these constants.
 fn given<'a>(
     problem: &Problem,
     body: &'a Body,
@@ -106,7 +107,7 @@ fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) ->
     Some(own(&given(problem, body, None, constants)))
 }
 
-/// Create the law of a body with these constants. `damage` is the damage of its bonds; `None` for bonds
+/// Create the law of a body with these constants. `damage` is the damage of the bonds; `None` for bonds
 /// without damage.
 fn build(
     problem: &Problem,
@@ -117,7 +118,8 @@ fn build(
     (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
-/// Volume correction factors of the cells of `neighbours` in the families of points with this horizon (m).
+/// Return the volume correction factors of the cells of block `neighbours` in the families of points with
+/// this horizon (m).
 fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
     // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
@@ -166,7 +168,7 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     }
 }
 
-/// Damage law of bonds that break at the end of their softening.
+/// Return the damage law of bonds that break at the end of their softening, at the stretch `critical`.
 fn softened(critical: f64) -> DamageLaw {
     DamageLaw::CriticalStretch(CriticalStretch {
         critical,
@@ -174,8 +176,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Return which data of this body's points the failure criteria read. Only bonds between two bodies with a
-/// separate damage law for these bonds count.
+/// Return which data of this body's points are read by the failure criteria of bonds to other bodies. Only
+/// pairs of bodies with a separate damage law count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -199,7 +201,8 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
-/// Damage law of bonds at an end with these constants.
+/// Return the damage law of bonds at an end with these constants, from the damage in the deck. `body` is the
+/// body of this end.
 fn damage_law(
     problem: &Problem,
     body: &Body,
@@ -256,7 +259,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
             Criterion::Stretch(i.critical)
         }
         [CriticalStretch(i), CriticalStretch(j)] => {
-            // Each end compares the stretch with its own threshold only.
+            // With the factor ∞, the critical stretch of one end does not limit the stretch m_e of the other
+            // end, see [`StretchConversion`].
             let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
             let conversion = StretchConversion { ratios, stiffness };
             Criterion::StretchBetween([i.critical, j.critical], conversion)
@@ -270,7 +274,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
 }
 
 /// Failure criterion of the bonds between two blocks, from the damage of both blocks; see [`Criterion`]. A
-/// block without damage has no threshold. `per_point` is whether thresholds are stored per point.
+/// block without damage sets no threshold. `ends` are the indices of both blocks. `per_point` says whether
+/// thresholds are stored per point.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
@@ -353,8 +358,8 @@ fn criterion(
     }
 }
 
-/// Create the interaction of each pair of blocks: its bonds, with their weights, laws and criterion. `blocks`
-/// are the laws of all blocks.
+/// Create an interaction from the bonds of each pair of blocks (`all`): the bonds with their weights, laws
+/// and failure criterion. `blocks` are the laws of all blocks.
 ///
 /// # Errors
 /// If there is not enough memory for the weights.
@@ -389,7 +394,7 @@ pub fn assign<const D: usize>(
         if *pair_damage == InterfaceDamage::Unbreakable
             && [&here, &there].into_iter().any(wears_out)
         {
-            // The law breaks bonds by their history whatever the criterion.
+            // Such a law breaks bonds by their history, whatever the criterion is.
             bonds.protect(|_| true);
         }
         let stiffness = ends.each_ref().map(|end| end.stiffness);
@@ -416,7 +421,7 @@ struct End {
     own_critical_stretch: Option<f64>,
     /// See [`bond_stiffness`].
     stiffness: f64,
-    /// Damage law at this end, if the two bodies have a separate damage law.
+    /// Damage law at this end; `None` if the two bodies have no separate damage law.
     pair_damage: Option<DamageLaw>,
     /// Horizon, m.
     horizon: f64,
@@ -425,7 +430,7 @@ struct End {
 }
 
 impl End {
-    /// Weight of the volume of a neighbour at ξ (m) from the point.
+    /// Return the weight of the volume of a neighbour at the offset ξ (m) from the point at this end.
     fn weight(&self, offset: [f64; 3]) -> f64 {
         let share = self.share.at(offset);
         match &self.built.influence {
@@ -435,7 +440,7 @@ impl End {
     }
 }
 
-/// Set the weights of the bonds between two blocks, unless all are 1.
+/// Set the weights of the bonds between two blocks, unless all weights are 1.
 fn weigh<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

@@ -11,8 +11,9 @@ use crate::problem::{
 /// of bodies.
 ///
 /// # Errors
-/// If a law does not support its dimension, its damage, its thermal expansion or a horizon, or if pairs have
-/// impossible damage. Most such faults of decks are found earlier, when the decks are read.
+/// If a law does not support the dimension of the problem, or the damage, the thermal expansion or a horizon
+/// of a body; or if the bonds of a pair of bodies cannot have the damage of the pair. Most of these errors
+/// are found earlier, when the deck is read.
 pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     for body in &problem.bodies {
         let law = &body.material.law;
@@ -100,7 +101,7 @@ fn pair_damage_is_possible(
     Ok(())
 }
 
-/// Return an error if a law does not support the horizon of some of its bonds.
+/// Return an error if the law of a body does not support the horizon of some bonds of this body.
 fn horizons_are_possible(problem: &Problem) -> Result<()> {
     for here in problem.blocks() {
         let law = &here.body.material.law;
@@ -154,8 +155,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     Err(Error::input(message).at(&body.span))
 }
 
-/// Return an error if the damage of a body is incompatible with the damage of a body that it may be bonded
-/// to, or with another setting.
+/// Return an error if the damage of a body is incompatible with another setting of the problem. Also return
+/// an error if bonds may join this body and another body with incompatible damage.
 fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
@@ -189,7 +190,8 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     damage_fault(problem, body, damage).map_or(Ok(()), error)
 }
 
-/// Reason why bonds of a body cannot break by this damage in this problem, if there is one.
+/// Return the reason why bonds of a body cannot break by this damage in this problem; `None` if the bonds can
+/// break.
 fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
     if let DamageRule::Energy { calibration, .. } = damage.rule
         && !calibration.is_for(problem.dimension.count())

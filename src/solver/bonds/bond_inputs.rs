@@ -7,7 +7,7 @@ use super::Forces;
 use super::grid_points::{GridValues, OwnedPlaces};
 use super::list_points::{self, Node};
 
-/// Bond inputs of a range of owned points. Different threads hold disjoint ranges.
+/// Write access to the bond inputs of a range of owned points. Different threads hold disjoint ranges.
 pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
     /// List nodes of these points; empty if there is no list.
@@ -50,14 +50,15 @@ impl<const D: usize> BondInputs<'_, D> {
         assert!(columns.all(|column| column.len() == count));
         list_points::update(self.nodes, displacement, thermal_stretch);
         for places in self.places {
-            // SAFETY: the ranges of different values are disjoint, so no other thread writes these points.
+            // SAFETY: different `BondInputs` have disjoint ranges of points, so no other thread writes these
+            // points.
             unsafe { places.take(self.points.start, displacement, thermal_stretch) };
         }
     }
 }
 
 impl<const D: usize> Forces<D> {
-    /// Call `work` with the bond inputs of all owned points.
+    /// Call `work` with the bond inputs of all owned points; `owned` is the number of these points.
     pub fn with_bond_inputs<R>(
         &mut self,
         owned: usize,

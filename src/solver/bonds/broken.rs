@@ -2,8 +2,8 @@
 //!
 //! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends evaluate the
 //! criterion with the same operations. The force sums exclude the bonds that break. Point numbers that follow
-//! from sums over bonds, and the forces that depend on them, are then recomputed. This is done only at the
-//! points that a broken bond affects.
+//! from sums over bonds, and the forces that depend on these point numbers, are then recomputed. They are
+//! recomputed only at the points that a broken bond affects.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -26,12 +26,13 @@ const GAP: usize = 64;
 pub struct Broken<const D: usize> {
     /// Local index of the owned point.
     pub point: usize,
-    /// Number of its bonds that broke.
+    /// Number of bonds of the point that broke.
     pub count: u64,
     /// Energy that the point loses, J: its part of the energy of the broken bonds, and the change of its
     /// remaining energy.
     pub energy: f64,
-    /// The point's part of the energy of the broken bonds above their criterion when they broke, J.
+    /// The point's part of the overshoot energy of the broken bonds, J: the energy of a bond above its
+    /// criterion when it breaks.
     pub overshoot: f64,
     /// Force density that the point loses, N/m³: the forces of the broken bonds, and the change of the forces
     /// of other bonds.
@@ -69,8 +70,8 @@ impl<const D: usize> Forces<D> {
         &self.broken
     }
 
-    /// Merge the changes by broken bonds per point, and recompute the point numbers and forces that depend on
-    /// these bonds. Called after the force sums. Collective.
+    /// Merge the entries of [`Self::broken`] that belong to the same point, and recompute the point numbers
+    /// and forces that depend on the broken bonds. Called after the force sums. Collective.
     pub(super) fn settle(
         &mut self,
         comm: &dyn Communicator,
@@ -112,10 +113,10 @@ impl<const D: usize> Forces<D> {
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Recompute the point numbers of some points. Record the energy that the points lose by this change,
-    /// except the part that plastic flow dissipates.
+    /// Recompute the point numbers of a range of points. Record the energy that the points lose by this
+    /// change, without the energy that plastic flow dissipates.
     fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
-        // The states of the points have already advanced over the step.
+        // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);
         let Acting { force, plastic, .. } = acting;
         let before = self.held(model, points.clone(), plastic);
@@ -138,8 +139,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Sum of the stored energy density and the density that plastic flow has dissipated, J/m³, at some
-    /// points.
+    /// Return the stored energy density plus the energy density that plastic flow has dissipated (J/m³), for
+    /// each point of a range.
     fn held(
         &mut self,
         model: &Model<D>,
@@ -156,8 +157,9 @@ impl<const D: usize> Forces<D> {
         energy
     }
 
-    /// Send the new point numbers to the ranks that read them. Return the owned points whose forces may
-    /// change. Collective.
+    /// Send the new point numbers to the ranks with ghosts of these points. `own` are the owned points with
+    /// new point numbers. Return the owned points whose forces may change; points may occur twice.
+    /// Collective.
     fn send_numbers(
         &mut self,
         comm: &dyn Communicator,
@@ -186,14 +188,16 @@ impl<const D: usize> Forces<D> {
             }
         }
         changed.retain(|point| *point < owned);
-        // Bonds to ghosts are stored only at the owned point, so all border points are recomputed.
+        // A bond to a ghost is stored only at its owned point, so the owned neighbours of a ghost are not
+        // known. If any ghost has new point numbers, the forces on all border points are recomputed.
         if flags[owned..].iter().any(|flag| *flag > 0.0) {
             changed.extend(model.interior..owned);
         }
         changed
     }
 
-    /// Recompute the forces on some points, and record the changes of their force densities as lost forces.
+    /// Recompute the forces on a range of points, and record the changes of the force densities as lost
+    /// forces.
     fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
         let before = force
             .each_ref()
@@ -223,7 +227,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Merge the points to ascending ranges. Each range contains whole lane groups.
+    /// Merge points to ascending ranges of whole lane groups. A range may also contain other points, see
+    /// [`GAP`].
     fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
         let mut ranges: Vec<Range<usize>> = points.map(|point| self.lane_group(point)).collect();
         ranges.sort_unstable_by_key(|range| range.start);

@@ -10,12 +10,13 @@ use super::measures::{PAIRS, wanted};
 
 type Vector = Vector3<f64>;
 
-/// Fraction of the trace of C = Σ ω (ξ − ξ̄)⊗(ξ − ξ̄) Ṽ, a sum over all bonds of a point, that is added to
-/// the diagonal of C. With this fraction, C of a single layer of points is invertible.
+/// Fraction of the trace of C that is added to the diagonal of C, so that C is invertible for a single layer
+/// of points. C = Σ ω (ξ − ξ̄)⊗(ξ − ξ̄) Ṽ is a sum over all bonds of a point, with the mean ξ̄ of
+/// [`Moments::mean`].
 const LAYER: f64 = 1e-9;
 
-/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D, with ω as in
-/// [`FamilyTensors`](super::measures::FamilyTensors). The sums are:
+/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D. ω and Ṽ are those
+/// of [`FamilyTensors`](super::measures::FamilyTensors). The sums are, by index:
 ///
 /// - 0: Σ ω Ṽ over all bonds, m³;
 /// - 1 to 3: Σ ω ξ Ṽ over all bonds, m⁴;
@@ -70,7 +71,7 @@ impl Moments {
         self.0[10] > 0.0
     }
 
-    /// Mean ξ̄ of the family, m; 0 for a point without a family.
+    /// Mean ξ̄ of the reference vectors of all bonds with the weights ω Ṽ, m; 0 for a point without bonds.
     pub fn mean(&self) -> Vector {
         match self.0[0] {
             0.0 => Vector::zeros(),
@@ -78,9 +79,9 @@ impl Moments {
         }
     }
 
-    /// Gradient of a function that is 1 at the neighbours with a broken bond and 0 at the other neighbours,
-    /// 1/m. The result is the gradient of the linear function that fits best, by least squares with the
-    /// weights ω Ṽ. The result is 0 if the matrix C, see `LAYER`, is not invertible.
+    /// Compute the gradient (1/m) of a linear function of the neighbours' positions. The function is the best
+    /// fit, by least squares with the weights ω Ṽ, to the value 1 at neighbours with a broken bond and 0 at
+    /// the others. The gradient is 0 if the matrix C is not invertible, see `LAYER`.
     pub fn gradient(&self) -> Vector {
         let mean = self.mean();
         let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);

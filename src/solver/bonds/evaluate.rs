@@ -25,14 +25,15 @@ use super::{Forces, Pass};
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Number of interior points per thread between two calls that advance the messages. In 3-D, these points
-/// take a few tenths of a millisecond.
+/// Number of interior points per thread between two calls that advance the messages. In 3-D, the sums over
+/// the bonds of these points take a few tenths of a millisecond.
 const PIECE: usize = 4096;
 
 /// Maximum number of columns of [`Forces::changing_columns`].
 const MOST_CHANGING: usize = MOST.point + 4 + StressMeasure::ALL.len();
 
-/// Columns of [`Forces::halo_columns`] and their number. Some columns may be empty.
+/// The columns that [`Forces::halo_columns`] returns, and the number of these columns. Further entries of the
+/// array are empty.
 type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
 
 /// Point data that a pass receives from other ranks.
@@ -40,10 +41,14 @@ type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
 pub(super) enum HaloContent {
     /// Displacements, and thermal stretches if the run has temperatures.
     Motion,
+    /// Failure thresholds that follow the smallest stretches.
     Thresholds,
+    /// Point numbers, rotations and stress measures that change before each force sum.
     PointNumbers,
-    /// Nothing is sent; the point numbers of owned points are copied to the grids.
+    /// Nothing is sent. The point numbers, rotations and stress measures of owned points are copied to the
+    /// grids.
     OwnedOnly,
+    /// No data are sent or copied.
     None,
 }
 
@@ -52,7 +57,7 @@ pub(super) enum HaloContent {
 pub struct ForceTimes {
     /// Sums over bonds.
     pub bonds: Duration,
-    /// Packing and unpacking of messages, and waiting for them.
+    /// Packing and unpacking of messages, and waiting for messages.
     pub halo: Duration,
 }
 
@@ -70,17 +75,17 @@ pub struct Acting<'a, const D: usize> {
     /// Thermal stretches of the local points; `None` in runs without temperatures. The evaluation updates the
     /// stretches of ghosts.
     pub thermal_stretch: Option<&'a mut [f64]>,
-    /// Internal force density of the owned points, N/m³. It must be 0 on entry, because bond forces are
-    /// added to it.
+    /// Internal force density of the owned points, N/m³. The force density must be 0 on entry, because the
+    /// evaluation adds the bond forces.
     pub force: &'a mut [Vec<f64>; D],
-    /// Plastic state of the owned points; changed only in a step.
+    /// Plastic state of the owned points. Only [`BondUpdate::Step`] changes this state.
     pub plastic: PlasticColumns<'a>,
 }
 
 impl<const D: usize> Forces<D> {
     /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
-    /// written the data of the owned points. `bond_update` selects which bond states change. Afterwards,
-    /// [`Self::broken`] returns the changes by bonds that broke. Collective.
+    /// written the data of the owned points. `bond_update` says whether bonds break, and how the bond history
+    /// advances. Afterwards, [`Self::broken`] returns the changes by bonds that broke. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -219,8 +224,8 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// Return the name and the number of columns of each message to ghosts in a force evaluation. If bonds
-    /// break, the point numbers are sent a second time.
+    /// Return the name and the number of columns of each halo exchange of a force evaluation. If bonds break,
+    /// the point numbers are sent a second time.
     pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
         let mut thermal_stretch = Vec::new();
         let mut sizes = Vec::new();
@@ -241,7 +246,7 @@ impl<const D: usize> Forces<D> {
         sizes
     }
 
-    /// Return the point data that pass `turn` receives from other ranks.
+    /// Return the point data that the pass with index `turn` receives from other ranks.
     fn content(&self, turn: usize) -> HaloContent {
         match (
             turn.checked_sub(1).map(|before| self.passes[before]),
@@ -256,7 +261,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Copy computed or received thresholds, point numbers, rotations and stress measures to the grids, where
-    /// lattice bonds read them.
+    /// lattice bonds read these values.
     pub(super) fn update(&mut self, content: HaloContent, which: Which) {
         for grid in &mut self.grids {
             match content {
@@ -312,7 +317,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Sum a pass over the bonds of a range of owned points.
+    /// Run a pass over the bonds of a range of owned points, and add the results to the columns of this pass.
     pub(super) fn run(
         &mut self,
         pass: Pass,
@@ -363,7 +368,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Compute the thresholds, or the point numbers and rotations, of some points from the sums of a pass.
+    /// Compute the thresholds, or the point numbers and rotations, of a range of points from the sums of a
+    /// pass.
     pub(super) fn finish(
         &mut self,
         pass: Pass,
@@ -381,8 +387,8 @@ impl<const D: usize> Forces<D> {
                     .with_min_len(CHUNK)
                     .zip(points)
                     .for_each(|(value, point)| {
-                        // A point without intact bonds has the minimum ∞. Its threshold is that for a
-                        // smallest stretch of 0.
+                        // A point without intact bonds has the minimum ∞. The threshold of such a point is
+                        // computed for a smallest stretch of 0.
                         let smallest = if value.is_infinite() {
                             0.0
                         } else {

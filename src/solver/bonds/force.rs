@@ -10,7 +10,7 @@ use super::kernel::{Group, Kernel};
 /// Changes of bond state in a force evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BondUpdate {
-    /// Bonds break, and their history advances to the end of a step of this length (s).
+    /// Bonds break, and the bond history advances to the end of a step of this length (s).
     Step(f64),
     /// Forces follow from the bond history at the end of a step of this length (s). The history is not
     /// stored, and no bond breaks.
@@ -20,7 +20,7 @@ pub enum BondUpdate {
 }
 
 impl BondUpdate {
-    /// Time increment of the bond history, s.
+    /// Time increment of the bond history, s; `None` if the history does not advance.
     #[inline(always)]
     pub fn history_step(self) -> Option<f64> {
         match self {
@@ -57,7 +57,8 @@ pub struct Force<L> {
 }
 
 impl<L> Force<L> {
-    /// Return the weighted sum of the force states of both ends of each bond.
+    /// Return the weighted difference T_i⟨ξ⟩ − T_j⟨−ξ⟩ of the force states of each bond, see
+    /// [`Law::bond_force`].
     #[inline(always)]
     fn weighted<S: Simd, const D: usize>(
         &self,
@@ -72,9 +73,9 @@ impl<L> Force<L> {
         L::bond_force(simd, laws, &group.bond, points, &group.history, weights)
     }
 
-    /// Return the work of the force states of each bond between two whole cells, J/m⁶, from the weighted
-    /// force density. The result is 0 if the criterion does not read the work. The force state of a point
-    /// does no work beyond the horizon of the point.
+    /// Return the work of the force states of each bond, J/m⁶. `total` is the result of [`Self::weighted`].
+    /// Volume fractions do not reduce the work. The force state of a point does no work beyond the horizon of
+    /// the point. The result is 0 if the criterion does not read the work.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,
@@ -111,7 +112,8 @@ impl<L> Force<L> {
         weights.sum(i, j)
     }
 
-    /// Time increment of the bond history that the evaluation computes, s; `None` if it computes no history.
+    /// Time increment of the bond history that the evaluation computes, s; `None` if the evaluation computes
+    /// no history.
     #[inline(always)]
     fn advances_history<const D: usize>(&self) -> Option<f64>
     where
@@ -124,7 +126,8 @@ impl<L> Force<L> {
         }
     }
 
-    /// Return a bit for each bond that breaks by its history at an end that acts on it.
+    /// Return a bit for each bond that breaks by its history. Only the histories of ends that act on the bond
+    /// count.
     #[inline(always)]
     fn worn_out<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> u8
     where

@@ -13,8 +13,8 @@ use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits, ReadRotations};
 use super::list_points::load_history;
 
-/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes are
-/// finite but have no meaning.
+/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes keep their
+/// initial values, and have no meaning.
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
     displacement: [Column; D],
@@ -47,7 +47,8 @@ impl<const D: usize> GridValues<D> {
         Arc::ptr_eq(&self.grid, grid)
     }
 
-    /// Copy the displacements of the ghosts, and their thermal stretches if the run has temperatures.
+    /// Copy the displacements of the ghosts to their slots, and the thermal stretches if the run has
+    /// temperatures.
     pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D], thermal_stretch: Option<&[f64]>) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
             self.grid.update(Which::Ghosts, values, places);
@@ -69,14 +70,15 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the point numbers of some of the local points, from column `first` on.
+    /// Copy the point numbers of the selected local points to their slots, from column `first` on.
     pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);
         }
     }
 
-    /// Insert columns over the local points before the point numbers.
+    /// Insert columns in front of the columns of the point numbers. `columns` contain the values of the local
+    /// points.
     pub fn insert_numbers(&mut self, columns: &[Column]) {
         let by_slot = |values: &Column| {
             let mut places = Column::new(0, self.grid.slots(), 0.0);
@@ -92,12 +94,12 @@ impl<const D: usize> GridValues<D> {
         self.numbers.drain(..count);
     }
 
-    /// Copy the thresholds of some of the local points.
+    /// Copy the thresholds of the selected local points to their slots.
     pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
         self.grid.update(which, values, &mut self.limits.thresholds);
     }
 
-    /// Copy the rotations of some of the local points.
+    /// Copy the rotations of the selected local points to their slots.
     pub fn update_rotations(&mut self, which: Which, rotations: &[Column; 4]) {
         for (places, values) in self.limits.rotations.iter_mut().zip(rotations) {
             if !values.is_empty() {
@@ -106,7 +108,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the stress measures of some of the local points.
+    /// Copy the stress measures of the selected local points to their slots.
     pub fn update_stresses(&mut self, which: Which, stresses: &[Column]) {
         for (places, values) in self.limits.stresses.iter_mut().zip(stresses) {
             if !values.is_empty() {
@@ -115,7 +117,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the truncation factors of the local points.
+    /// Copy the truncation factors of all local points to their slots.
     pub fn update_truncation_factors(&mut self, values: &[f64]) {
         let places = &mut self.limits.truncation_factors;
         self.grid.update(Which::All, values, places);
@@ -138,14 +140,14 @@ pub struct OwnedPlaces<'a, const D: usize> {
     values: PhantomData<&'a mut f64>,
 }
 
-// SAFETY: threads write to its columns only under the conditions of `take`.
+// SAFETY: threads write to the columns only under the conditions of `take`.
 unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
-// SAFETY: threads write to its columns only under the conditions of `take`.
+// SAFETY: threads write to the columns only under the conditions of `take`.
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {
-    /// Copy the displacements of consecutive owned points, of which `first` is the first local index. Copy
-    /// their thermal stretches if the run has temperatures.
+    /// Copy the displacements of consecutive owned points to their slots. `first` is the local index of the
+    /// first of these points. Also copy their thermal stretches if the run has temperatures.
     ///
     /// # Safety
     /// No other thread may write any of these points at the same time.
@@ -180,7 +182,8 @@ impl<const D: usize> OwnedPlaces<'_, D> {
 /// The points of a grid in the form that a kernel reads.
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
-    /// Thermal stretches of the points; `None` if the kernel does not remove them from the bonds.
+    /// Thermal stretches of the points; `None` if the run has no temperatures, or if the kernel does not
+    /// remove thermal stretches from the bonds.
     thermal_stretch: Option<&'a [f64]>,
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
@@ -309,12 +312,12 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// Load the bonds of a lane group at one offset. `FAST_PATH` omits the data of the criterion, the
-    /// breakable bits, the thermal stretches, and the closed forms for |x| above
+    /// Load the bonds of a lane group at the offset with index `o`. `FAST_PATH` omits the data of the
+    /// criterion, the breakable bits, the thermal stretches, and the closed forms for |x| above
     /// [`NEAR`](crate::material::bond::NEAR).
     ///
     /// # Safety
-    /// The lane group must belong to the grid, and the offset to the lane group.
+    /// The lane group must belong to the grid, and `o` must be the index of an offset of the lattice.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd, const FAST_PATH: bool>(
         &self,

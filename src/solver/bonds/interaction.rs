@@ -24,15 +24,17 @@ pub struct Interaction {
 pub struct BlockLaws {
     /// Material law of the block.
     pub law: AnyLaw,
-    /// Damage law of the block, if it has one.
+    /// Damage law of the block; `None` for a block without damage.
     pub damage: Option<DamageLaw>,
     /// Whether the law also breaks bonds by their history.
     pub wears_out: bool,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// Factor of the critical work by the direction of a bond; `None` if it is 1 in all directions.
+    /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
+    /// all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Data of these points that criteria read for bonds between bodies with a separate damage law.
+    /// Data of the block's points that criteria read for bonds to other bodies, if the pair of bodies has a
+    /// separate damage law.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
@@ -40,7 +42,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Data that the failure criteria read for bonds between two bodies that have a separate damage law.
+/// Data of points that failure criteria read for bonds between two bodies with a separate damage law for
+/// these bonds.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.
@@ -54,7 +57,7 @@ pub struct PairReads {
 }
 
 impl PairReads {
-    /// Add the data that a damage law reads to the requested data.
+    /// Mark the data that a damage law reads, in addition to the data marked before.
     pub fn add(&mut self, law: &DamageLaw) {
         self.breaks = true;
         self.truncation_factors |= law.family_correction() > 0.0;

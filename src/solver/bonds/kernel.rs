@@ -8,7 +8,7 @@ use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
 
-/// Eight bonds ij with the data of both points and their history.
+/// Eight bonds ij with their history and the data of both points.
 pub struct Group<'a, K: Kernel<D>, const D: usize> {
     /// Geometry of the bonds in the form that laws read.
     pub bond: Bond<D>,
@@ -89,8 +89,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Sums, eight lanes per quantity. Each quantity is added to one column of the points.
     type Sums: LaneTuple;
 
-    /// Sums over the bonds that break in this sweep, eight lanes per quantity. They are returned only for
-    /// points with such bonds.
+    /// Sums over the bonds that break in this sweep, eight lanes per quantity. A sweep returns these sums
+    /// only for points with such bonds.
     type Broken: LaneTuple;
 
     /// Point numbers of points i that the kernel reads.
@@ -102,7 +102,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Bond history that the kernel reads.
     type BondHistory: LaneTuple;
 
-    /// Rotations of points i and j, if the kernel's criterion can read them.
+    /// Rotations of the families of points i and j; empty if the kernel's criterion cannot read rotations.
     type Rotation: LaneTuple;
 
     /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.
@@ -115,7 +115,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// most outputs.
     const ISA_SET: IsaSet = IsaSet::One;
 
-    /// Whether to compile a second loop for lane groups whose bonds all stay within the series limit.
+    /// Whether to compile a second loop for lane groups whose bonds are all within the series limit, |x| ≤
+    /// [`Criterion::limit`]. x is defined in [`crate::material::bond`].
     const HAS_FAST_PATH: bool = false;
 
     /// Whether to load the bits of all bonds, broken ones included.
@@ -136,7 +137,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::WANTED.linear
     }
 
-    /// [`Self::WANTED`] for linear or nonlinear bonds.
+    /// Return [`Self::WANTED`]. With [`Self::ANY_LAW`], `is_linear` says whether the bonds are linear.
     #[inline(always)]
     fn wanted(is_linear: bool) -> Wanted {
         let mut wanted = Self::WANTED;
@@ -146,8 +147,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         wanted
     }
 
-    /// Whether sums depend only on reference positions and intact bits. A lattice then caches them per bit
-    /// pattern. Such a kernel must not break or change bonds.
+    /// Whether sums depend only on reference positions and intact bits. The sums of a lattice are then cached
+    /// per bit pattern. Such a kernel must not break or change bonds.
     #[inline(always)]
     fn is_undeformed(&self) -> bool {
         false

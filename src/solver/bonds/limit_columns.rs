@@ -6,7 +6,8 @@ use crate::material::rotation::IDENTITY;
 
 use super::interaction::BlockLaws;
 
-/// Selection of the [`Limits`] that the criteria of a run read; the same on all ranks.
+/// Selection of the point data ([`Limits`] and rotations) that the criteria of a run read; the same on all
+/// ranks.
 #[derive(Debug, Clone, Copy)]
 pub struct LimitsRead {
     /// Whether thresholds are read.
@@ -20,7 +21,7 @@ pub struct LimitsRead {
 }
 
 impl LimitsRead {
-    /// Collect the limits that the damage laws of the blocks, and of pairs of bodies, read in `D` dimensions.
+    /// Collect the data that the damage laws of the blocks and of pairs of bodies read, in `D` dimensions.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());
@@ -44,21 +45,21 @@ impl LimitsRead {
     }
 }
 
-/// [`Limits`] by column. A column that no criterion reads is empty.
+/// [`Limits`] and rotations by column. A column that no criterion reads is empty.
 pub struct LimitColumns {
     /// Failure thresholds, indexed by local point (lists) or grid slot (lattices).
     pub thresholds: Column,
     /// Truncation factors, indexed like the thresholds.
     pub truncation_factors: Column,
-    /// Rotations by component; in 2-D only q_z and q₀ are stored.
+    /// Rotations as quaternions, in the order q_x, q_y, q_z, q₀. In 2-D, only q_z and q₀ are stored.
     pub rotations: [Column; 4],
     /// Stress measures, Pa, in the order of [`StressMeasure::ALL`]; −∞ for points that carry no stress.
     pub stresses: [Column; StressMeasure::ALL.len()],
 }
 
 impl LimitColumns {
-    /// Allocate the columns in `read` for `count` points. `number` is the index of the first of these columns
-    /// among all columns that a loop reads, see [`Column`].
+    /// Allocate the columns that `read` selects, with `count` entries each. `number` is the index of the
+    /// first of these columns among all columns that a loop reads, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
@@ -93,10 +94,10 @@ impl LimitColumns {
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    /// Stress measure that the criterion reads, Pa; `None` if it reads no stress.
+    /// Stress measure that the criterion reads, Pa; `None` if the criterion reads no stress.
     stresses: Option<&'a [f64]>,
     /// Whether the criterion reads thresholds, truncation factors or stress measures. If not, one branch
-    /// skips them.
+    /// skips all of these columns.
     any: bool,
 }
 
@@ -129,7 +130,8 @@ impl<'a> ReadLimits<'a> {
     }
 
     /// Load the limits of eight points. `take` is called only for columns whose length was checked. Stresses
-    /// are loaded only if `may_read_stresses`; the caller passes a constant.
+    /// are loaded only if `may_read_stresses`. This argument is a constant, so the compiler removes the
+    /// branch.
     #[inline(always)]
     pub fn eight(&self, may_read_stresses: bool, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();

@@ -202,7 +202,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         for component in &xi[1..] {
             square = simd.multiply_add(*component, *component, square);
         }
-        // Compute 1/|ξ|² first: x needs only this quotient, so x does not wait for the square root.
+        // Compute 1/|ξ|² first: x of `material::bond` needs only this quotient, so the computation of x does
+        // not wait for the square root.
         let inverse_square = Lanes::splat(1.0) / square;
         let inverse = inverse_square.sqrt();
         let reference = Reference {
@@ -255,8 +256,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 }
 
-/// Load the history of the bonds of a group for point i and for point j. A kernel that reads only the
-/// history of point i may read fewer numbers than are stored.
+/// Load the history of the bonds of a group for point i and for point j. If `H` has fewer numbers than are
+/// stored per end, only the history of point i is valid, unless [`LaneTuple::PADDED`].
 #[inline(always)]
 pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 2] {
     if H::COUNT == 0 {

@@ -23,8 +23,8 @@ pub struct Stored {
     pub energy: Vec<f64>,
     /// Volume of the intact neighbours within the horizon of the point, m³.
     pub volume: Vec<f64>,
-    /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³. Empty if no law softens, or
-    /// if this sum was not requested.
+    /// Sum over the intact neighbours j: V_j times the fraction of the stiffness that bond ij has lost, m³.
+    /// Empty if no law softens, or if this sum was not requested.
     pub softened: Vec<f64>,
     /// Number of intact bonds, including bonds longer than the horizon of the point.
     pub neighbours: Vec<f64>,
@@ -34,7 +34,8 @@ pub struct Stored {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Sum a kernel over all bonds of the owned points, by column.
+    /// Allocate columns of zeros over the owned points, and call `sweep` with these columns for each pair of
+    /// blocks with bonds. Return the columns.
     fn measure(
         &mut self,
         owned: usize,
@@ -127,7 +128,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(of_point).collect()
     }
 
-    /// Sum D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.
+    /// Sum the tensor D of each owned point (N/m⁴), see `measures::Stiffness`: columns xx, yy, zz, xy, yz,
+    /// xz.
     pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let laws = interaction.laws.laws();
@@ -178,7 +180,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Out-of-plane stretch F_zz of an owned point in plane stress, at its deformation gradient and plastic
-    /// state. `None` if the law does not compute it; see [`Law::stretch_across`].
+    /// state. `None` if the law does not compute this stretch; see [`Law::stretch_across`].
     pub fn stretch_across(
         &self,
         model: &Model<D>,
@@ -243,9 +245,9 @@ impl<const D: usize> Forces<D> {
     /// Rate of change of the strain energy density of each owned point, if every point moves with its `rate`:
     /// Σ T·(v_j − v_i) Ṽ over the intact bonds, with the force states T of the last
     /// [evaluation](Self::evaluate). `rate` contains the components of v at the local points, including
-    /// ghosts. The unit is J/m³ times the unit of v divided by m.
+    /// ghosts. The unit of the result is J/m⁴ times the unit of v.
     pub fn energy_rate(&mut self, owned: usize, rate: [Column; D]) -> Vec<f64> {
-        // The kernel reads the rates as the first values of the points.
+        // The kernel reads the rates as the first point numbers.
         for grid in &mut self.grids {
             grid.insert_numbers(&rate);
         }

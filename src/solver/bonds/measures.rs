@@ -16,7 +16,8 @@ pub(super) const fn wanted(linear: bool) -> Wanted {
 }
 
 /// Kernel that computes the sums of each point, by index:
-/// 0. strain energy density of its intact bonds, J/m³;
+///
+/// 0. strain energy density of the intact bonds within the horizon of the point, J/m³;
 /// 1. volume of the intact neighbours within the horizon of the point, m³;
 /// 2. number of intact bonds, including bonds longer than the horizon of the point;
 /// 3. energy density that all bonds have dissipated without breaking, J/m³.
@@ -78,7 +79,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // AVX2 is enough: this kernel runs only at set-up, after refinements, and for outputs.
+    // AVX2 is enough: this kernel runs only at set-up, after refinements and rebalances, and for outputs.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const WANTED: Wanted = wanted(true);
 
@@ -93,8 +94,8 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
-/// Kernel that sums V_j times the fraction of its stiffness that bond ij has lost, m³. The sum contains the
-/// intact neighbours within the horizon of point i.
+/// Kernel that sums, over the intact neighbours j within the horizon of point i, V_j times the fraction of
+/// the stiffness that bond ij has lost, m³.
 #[derive(Clone, Copy)]
 pub struct Softened {
     /// The law of point i.
@@ -137,9 +138,10 @@ fn add_tensor<S: Simd, const D: usize>(
     }
 }
 
-/// Kernel that sums D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy, zz,
-/// xy, yz, xz. C is the sum of [`Law::stiffness`] of both ends. An end whose law [resists displacements
-/// across](Law::resists_across) the bonds contributes its part of C times I instead of n⊗n.
+/// Kernel that sums D = Σ V_j C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
+/// zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both ends. An end whose law
+/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times I instead of
+/// n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -153,7 +155,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
     type Far = AnyPoint;
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // AVX2 is enough: this kernel runs only at set-up and after refinements.
+    // AVX2 is enough: this kernel runs only at set-up, and after refinements and rebalances.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = wanted(false);
@@ -189,11 +191,12 @@ impl<const D: usize> Kernel<D> for Stiffness {
     }
 }
 
-/// Kernel that sums the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
+/// Kernel that sums the Kirchhoff stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz. T is
+/// the force state of point i, and Y = ξ + η.
 ///
-/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ.
-/// Multiplied by Fᵀ, it is this sum: the Kirchhoff stress, which is symmetric and rotates with the body.
-/// Linear laws use ξ in place of Y.
+/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ. Times Fᵀ,
+/// this stress is the Kirchhoff stress Σ T⊗Y Ṽ, which is symmetric and rotates with the body. Linear laws use
+/// ξ in place of Y.
 #[derive(Clone, Copy)]
 pub struct Stress {
     /// Law of point i.
@@ -252,8 +255,8 @@ impl<const D: usize> Kernel<D> for StressAcross {
     }
 }
 
-/// Kernel that sums the tensors of the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ, diagonal
-/// entries first, and Σ ω η⊗ξ Ṽ row by row.
+/// Kernel that sums two tensors over the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ (diagonal
+/// entries, then mixed entries), and Σ ω η⊗ξ Ṽ (row by row).
 #[derive(Clone, Copy)]
 pub struct FamilyTensors {
     /// Exclude thermal stretches.
@@ -285,8 +288,8 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
 }
 
 /// Kernel that sums the rate of change of the strain energy density, Σ T·(v_j − v_i) Ṽ over the intact bonds,
-/// if every point moves with its rate v. The first values of the points are v by component. The unit is J/m³
-/// times the unit of v divided by m.
+/// if every point moves with its rate v. The first point numbers are the components of v. The unit of the sum
+/// is J/m⁴ times the unit of v.
 #[derive(Clone, Copy)]
 pub struct EnergyRate {
     /// Law of point i.
@@ -320,8 +323,9 @@ impl<const D: usize> Kernel<D> for EnergyRate {
     }
 }
 
-/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of
-/// the whole family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
+/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ in d dimensions. ε is the extension of the
+/// bond, or ξ·η/|ξ| for linear laws. The first sum is the weighted volume m = Σ ω|ξ|²Ṽ of the whole family
+/// (m⁵). The second sum is Σ ω|ξ|εṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether ε is linear in η.

@@ -3,12 +3,12 @@
 //! A force evaluation is a list of passes, created once from the laws in use. Each pass is a sum over the
 //! bonds of every point. Later passes read the results of a pass at point i, or at both i and j. A pass
 //! begins with a halo exchange if it reads values that other ranks have changed: first displacements and
-//! thermal stretches, later thresholds and point numbers. Point numbers are values of a point that its law
-//! computes from sums over its bonds, such as the dilatation. Interior points are processed while messages
-//! are in flight.
+//! thermal stretches, later thresholds and point numbers. Point numbers are values of a point, such as the
+//! dilatation, that the law of the point computes from sums over the bonds of the point. Interior points are
+//! processed while messages are in flight.
 //!
-//! Bonds that meet their criterion break in the pass that sums the forces. Those point numbers that depend on
-//! broken bonds are then recomputed, see `broken.rs`.
+//! Bonds that meet their criterion break in the pass that sums the forces. Point numbers and forces that
+//! depend on broken bonds are then recomputed, see `broken.rs`.
 
 mod bond_inputs;
 mod broken;
@@ -65,15 +65,16 @@ const FAMILY_SUMS: usize = 1 << 16;
 /// A sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Pass {
-    /// Smallest stretch of each point; its threshold follows from it.
+    /// Smallest stretch of the intact bonds of each point; the threshold of the point follows from this
+    /// stretch.
     SmallestStretch,
-    /// The point sum with this index, for the laws that have one.
+    /// The point sum with this index, for the laws with such a point sum.
     PointSum(usize),
     /// The forces.
     Force,
 }
 
-/// Number of history values that the laws of an interaction store per bond and end.
+/// Number of history values that the laws of an interaction store per bond, for both ends together.
 fn history_width<const D: usize>(interaction: &Interaction) -> usize {
     let [i, j] = interaction.laws.laws();
     2 * i
@@ -85,7 +86,7 @@ fn history_width<const D: usize>(interaction: &Interaction) -> usize {
 /// Check that the bond history fits in memory.
 ///
 /// # Errors
-/// If it does not fit. The error names the pair of blocks with the largest bond history.
+/// If the bond history does not fit. The error names the pair of blocks with the largest bond history.
 pub fn history_fits<const D: usize>(
     interactions: &[Interaction],
 ) -> std::result::Result<(), Fault> {
@@ -100,7 +101,7 @@ pub fn history_fits<const D: usize>(
     })
 }
 
-/// Strengths of the owned points relative to their blocks; empty without scatter.
+/// Strength f of each owned point, a random factor on the threshold of the point; empty without scatter.
 fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64> {
     if blocks.iter().all(|block| block.weibull.is_none()) {
         return Vec::new();
@@ -124,7 +125,7 @@ pub struct Forces<const D: usize> {
     numbers: PointNumbers,
     /// Point data that failure criteria read.
     limits: LimitColumns,
-    /// Strengths of the owned points relative to their blocks; empty without scatter.
+    /// Strength f of each owned point, a random factor on the threshold of the point; empty without scatter.
     strength: Vec<f64>,
     /// The passes of a force evaluation.
     passes: Vec<Pass>,
@@ -197,9 +198,10 @@ impl<const D: usize> Forces<D> {
         })
     }
 
-    /// Compute the constants of the points from sums over their initial families. Also set the columns of
-    /// `limits` that are read: the truncation factors, and the thresholds unless one of them follows the
-    /// smallest stretch. Call after pre-cracks are cut and before other bonds break. Collective.
+    /// Compute the constants of the points ([`Law::CONSTANTS`]) from sums over their initial families. Also
+    /// set the truncation factors and the thresholds that criteria read. Thresholds are not set here if any
+    /// threshold follows the smallest stretch. Call after pre-cracks are cut and before other bonds break.
+    /// Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
         if read.thresholds && !self.passes.contains(&Pass::SmallestStretch) {
@@ -258,7 +260,8 @@ impl<const D: usize> Forces<D> {
         (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
     }
 
-    /// Set the thresholds of the points, if no threshold follows the smallest stretch. Collective.
+    /// Set the thresholds of the points. Called only if no threshold follows the smallest stretch.
+    /// Collective.
     fn set_thresholds(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let Self {
             limits,
@@ -317,15 +320,15 @@ impl<const D: usize> Forces<D> {
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))
     }
 
-    /// Memory of the bonds and of the point data that they read, bytes.
+    /// Memory of the bonds, of the nodes of list families, and of the grids, bytes.
     pub fn bytes(&self) -> usize {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
         let grids: usize = self.grids.iter().map(GridValues::bytes).sum();
         bonds + size_of_val(&self.nodes[..]) + grids
     }
 
-    /// Free the memory of the bonds and of the point data that they read. No evaluation is possible
-    /// afterwards.
+    /// Free the memory of the bonds, of the nodes of list families, and of the grids. No evaluation is
+    /// possible afterwards.
     pub fn release(&mut self) {
         self.interactions = Vec::new();
         self.nodes = Vec::new();
@@ -353,13 +356,13 @@ impl<const D: usize> Forces<D> {
         self.instructions
     }
 
-    /// Plan of the halo exchanges between force passes.
+    /// Plan of the halo exchanges of a force evaluation.
     pub fn halo(&self) -> &Halo {
         &self.halo
     }
 
-    /// Break the bonds for which `crosses(i, j)` is true; i and j are local indices. Only bonds of points for
-    /// which `concerned` is true are checked.
+    /// Break the bonds for which `crosses(i, j)` is true; i and j are local indices. Only bonds ij of points
+    /// i for which `concerned(i)` is true are checked.
     pub fn cut(
         &mut self,
         concerned: impl Fn(usize) -> bool,
@@ -398,7 +401,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Exchange the ghost values of a column. Collective.
+    /// Exchange the ghost values of a column over the local points. Collective.
     pub fn bring(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
         self.halo.update_ghosts(comm, &mut [values]);
     }

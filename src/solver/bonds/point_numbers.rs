@@ -1,5 +1,5 @@
-//! Point numbers: values of a point that its law declares and computes from sums over its bonds, such as the
-//! dilatation.
+//! Point numbers: values of a point, such as the dilatation, that the law of the point declares, and computes
+//! from sums over the bonds of the point.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
 /// Point numbers, one column per number. The first columns contain owned points and ghosts, because bonds
-/// read them. The other columns, which only laws read, contain owned points only.
+/// read these columns. The other columns, which only laws read, contain owned points only.
 pub struct PointNumbers {
     /// The point numbers by column; 0 for points whose law does not have that number.
     pub columns: Vec<Column>,
@@ -38,15 +38,15 @@ pub struct PointNumbers {
     pub first_changing: usize,
     /// Number of point sums before the force sum.
     pub passes: usize,
-    /// Whether any law has constants.
+    /// Whether any law has constants: point numbers that do not change, [`Law::CONSTANTS`].
     pub with_constants: bool,
     /// Sums of a pass over the bonds, by column.
     pub sums: Vec<Column>,
 }
 
 impl PointNumbers {
-    /// Allocate the point numbers for the laws of the blocks, which are the same on all ranks, and set them
-    /// to 0.
+    /// Allocate the point numbers that the laws of the blocks declare, with the value 0. The blocks and laws
+    /// are the same on all ranks.
     pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);
@@ -68,8 +68,9 @@ impl PointNumbers {
         }
     }
 
-    /// Compute the constants of some owned points from the columns of sums over their initial families. Also
-    /// compute their [truncation factors](Law::truncation_factor), unless that column is empty.
+    /// Compute the constants of a range of owned points from `sums`, the columns of sums over their initial
+    /// families. Also compute the [truncation factors](Law::truncation_factor) of these points, unless
+    /// `truncation_factors` is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         points: Range<usize>,
@@ -86,8 +87,8 @@ impl PointNumbers {
             Law::<D>::constants(&law, sums, &mut numbers);
             (numbers, Law::<D>::truncation_factor(&law, sums))
         };
-        // Neighbours on a lattice usually have equal families, so each thread reuses the constants of the
-        // last point.
+        // Consecutive points of a lattice usually have equal families, so each thread reuses the constants of
+        // the last point.
         let found = points.clone().into_par_iter().with_min_len(CHUNK);
         let found = found.map_init(
             || None,
@@ -118,14 +119,14 @@ impl PointNumbers {
         }
     }
 
-    /// The point numbers of an owned point.
+    /// Return the point numbers of an owned point; entries without a column are 0.
     pub fn of(&self, point: usize) -> [f64; NUMBERS] {
         let get = |k: usize| self.columns.get(k).and_then(|column| column.get(point));
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Compute the columns of rotations of some owned points from the sums of the first pass. Components with
-    /// empty columns are skipped.
+    /// Compute the rotations of a range of owned points, by column, from the sums of the first pass.
+    /// Components with empty columns are skipped.
     pub fn find_rotations<const D: usize>(
         &self,
         points: Range<usize>,
@@ -157,8 +158,8 @@ impl PointNumbers {
         });
     }
 
-    /// Compute the point numbers of some owned points from the sums of a pass. If `bond_update` stores changes,
-    /// store plastic flow in `plastic`.
+    /// Compute the point numbers of a range of owned points from the sums of a pass. If `bond_update` is
+    /// [`BondUpdate::Step`], store the plastic states after flow in `plastic`.
     pub fn finish<const D: usize>(
         &mut self,
         pass: usize,

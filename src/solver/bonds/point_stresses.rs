@@ -24,8 +24,8 @@ pub struct StressInputs<'a, 'b, const D: usize> {
 }
 
 impl PointNumbers {
-    /// Compute the stress measures of the owned points (Pa) from the sums of the first pass. Measures with
-    /// empty columns are skipped.
+    /// Compute the stress measures of the owned points (Pa) from the sums of the first pass; −∞ for points
+    /// that carry no stress. Measures with empty columns are skipped.
     pub fn find_stresses<const D: usize>(
         &self,
         read: &StressInputs<'_, '_, D>,
@@ -64,8 +64,8 @@ impl PointNumbers {
     }
 }
 
-/// Compute the 3-D Cauchy stress of a point (Pa) with the thermal stretch `thermal`; `None` if the family is
-/// inverted.
+/// Compute the 3-D Cauchy stress of a point (Pa) with the thermal stretch `thermal`; `None` if the deformed
+/// volume is not positive.
 fn cauchy<const D: usize>(
     block: &BlockLaws,
     found: &FamilyStress<D>,

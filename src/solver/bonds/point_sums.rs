@@ -1,4 +1,4 @@
-//! Kernels of the sums over bonds from which point numbers are computed.
+//! Kernels of the sums over bonds from which point numbers and thresholds are computed.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
@@ -7,7 +7,8 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Request x of the bonds, but neither their stretch nor their extension over the deformed length.
+/// Request x of [`crate::material::bond`], but neither the stretch of the bonds nor the extension over the
+/// deformed length.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -21,8 +22,8 @@ const fn extension_only(linear: bool) -> Wanted {
 pub struct PassSum<L, const N: usize> {
     /// The law of point i.
     pub law: L,
-    /// Bond update of the force sum that follows. If it advances the bond history, this sum reads the
-    /// advanced history.
+    /// Bond update of the force sum that follows. If this update advances the bond history, point sums with
+    /// [`Law::reads_advanced_history`] read the advanced history.
     pub bond_update: BondUpdate,
 }
 

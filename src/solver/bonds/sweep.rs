@@ -76,7 +76,7 @@ trait Part: Sized + Send {
 trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
-    /// Run the kernel over a part; `base` is the local index of the first entry of the results.
+    /// Run the kernel over a part; `base` is the local index of the point of the first entry of the results.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -184,7 +184,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
     }
 }
 
-/// Halve a part until tasks are small, and run them.
+/// Halve a part repeatedly until the tasks are small, and run the tasks.
 fn split<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
@@ -350,11 +350,13 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
 }
 
 /// Number of lane groups that skip the fast path after a failed attempt. The fast path is a loop without
-/// failure criterion; it fails if |x| of a bond exceeds the limit of the series. Large |x| occur in clusters.
+/// failure criterion. An attempt fails if |x| of a bond exceeds
+/// [`Criterion::limit`](crate::damage::Criterion::limit). Large |x| occur in clusters, so further attempts
+/// would probably fail.
 const FAST_PATH_BACKOFF: usize = 7;
 
-/// Choice of the loop for the next lane group. Lists have no fast path, because loading points j dominates
-/// their time.
+/// Choice of the loop for the next lane group. Lists have no fast path, because loading points j takes most
+/// of the time.
 struct FastPathGate {
     /// Whether the kernel may skip its criterion, and does not remove thermal stretches.
     is_allowed: bool,
@@ -409,8 +411,8 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sum over the bonds of a lane group; `None` if a bond is beyond the series limit. The arguments are copied
-/// so that they stay in registers.
+/// Sum over the bonds of a lane group; `None` if |x| of a bond exceeds the limit of the kernel's criterion.
+/// The arguments are copied so that they stay in registers.
 ///
 /// # Safety
 /// The lane group must belong to the grid of `points`.
@@ -435,13 +437,13 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over all bonds of a lane group. It returns the sums, and a bit for each point (lane) with a
-/// breaking bond.
+/// Task that sums over all bonds of a lane group. The task returns the sums, and a bit for each point (lane)
+/// with a breaking bond.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.
     points: GridPoints<'p, K, D>,
-    /// The bits of all bonds, including broken bonds, if the kernel reads them.
+    /// The bits of all bonds, including broken bonds; `None` if the kernel does not read these bits.
     whole: Option<&'t [u8]>,
     vector: &'t mut VectorBonds<'v>,
 }
@@ -590,7 +592,7 @@ struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
     /// The bits of all bonds of all lane groups, including broken bonds; empty if the kernel does not need
-    /// them.
+    /// these bits.
     whole: Vec<u8>,
 }
 

@@ -9,10 +9,11 @@ use crate::problem::{Calibration, DamageRule, Problem};
 
 pub use separation::separation_energy_ratio;
 
-/// Return the problem with the separation energy ratios of all bodies with `calibration = "opening"`.
+/// Compute the separation energy ratio of each body with `calibration = "opening"`. Return the problem with
+/// these ratios.
 ///
 /// # Errors
-/// If the ratio of a body cannot be computed.
+/// If the ratio of a body cannot be computed or is not above 0.
 pub fn calibrated(problem: &Problem) -> Result<Cow<'_, Problem>> {
     let mut calibrated = Cow::Borrowed(problem);
     for (index, body) in problem.bodies.iter().enumerate() {

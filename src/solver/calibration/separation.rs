@@ -1,5 +1,6 @@
-//! The separation energy of a body: a block of its lattice is pulled apart along a plane between two
-//! layers of points until no bond crosses the plane.
+//! The separation energy of a body. In this file, the block is a rectangular sample of the body's lattice. A
+//! plane between two layers of points divides the block into two halves. The upper half moves away from the
+//! lower half until no intact bond of the points in the middle crosses the plane.
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
@@ -9,12 +10,11 @@ use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::BondUpdate;
 
-/// Maximum number of bonds of the block that is pulled apart; the computation takes some seconds for this
-/// number.
+/// Maximum number of bonds of the block. With this number of bonds, the computation takes some seconds.
 const MAX_BONDS: f64 = 1e6;
 
 /// Relative growth of the separation per step. A small growth limits how far bonds exceed their criterion
-/// when they break. The overshoot energy is subtracted.
+/// when they break. The remaining overshoot energy is subtracted from the result.
 const GROWTH: f64 = 0.01;
 
 /// Ratio of the first separation to the separation at which the first bond is expected to break.
@@ -29,14 +29,18 @@ const SLACK: f64 = 1e-9;
 /// Steps between checks of the bonds across the plane.
 const CHECK_INTERVAL: u32 = 20;
 
-/// Compute the separation energy per area, divided by the fracture energy. The upper half moves at an angle
-/// (rad) to the normal of the plane.
+/// Compute the separation energy of a body per area, divided by the fracture energy. The upper half of the
+/// block moves at an angle (rad) to the normal of the plane.
 ///
 /// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
 ///
-/// The result is `None` if the body has no fracture energy, is on no lattice, has no possible law, has too
-/// large families, or does not separate.
+/// The result is `None` in these cases:
+///
+/// - the body has no fracture energy, or is on no lattice;
+/// - the law or the damage of the body is not possible, or bonds break by stress;
+/// - the families are too large;
+/// - the block does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;
@@ -90,7 +94,8 @@ fn unit(axis: usize) -> [f64; 3] {
     std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 })
 }
 
-/// Fracture energy of cracks with this normal in a body, J/m².
+/// Fracture energy of cracks with this normal in a body, J/m²; `None` if the body has no damage with a
+/// fracture energy.
 fn fracture_energy(problem: &Problem, body: usize, normal: [f64; 3]) -> Option<f64> {
     let body = &problem.bodies[body];
     let elastic = body.material.elastic;
@@ -109,7 +114,7 @@ fn fracture_energy(problem: &Problem, body: usize, normal: [f64; 3]) -> Option<f
     along.map(|along| along * cost)
 }
 
-/// The motion of the upper half.
+/// The motion of the upper half, and the size of the block.
 struct Separation {
     /// Angle to the normal, rad.
     angle: f64,
@@ -122,7 +127,8 @@ struct Separation {
 }
 
 impl Separation {
-    /// Separation energy per area in the middle of the plane, J/m².
+    /// Compute the separation energy per area in the middle of the plane, J/m²; `None` if the block does not
+    /// separate.
     fn energy<const D: usize>(&self, block: &Problem) -> Option<f64> {
         let comm = threads::alone();
         let mut simulation = Simulation::<D>::new(block, &comm).ok()?;

@@ -14,13 +14,13 @@ use super::members;
 /// Subjects of the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
-/// Check that every condition of the stage is finite at all of its points at a time (s). At time 0, also
-/// check every initial value. Also check that thermal stretches are above −1. Collective.
+/// Check that every condition that acts at a time (s) is finite at all of its points. At time 0, also check
+/// every initial value. Also check that thermal stretches are above −1. Collective.
 ///
 /// # Errors
 /// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
-/// deck that fails the check, and the point with the smallest id at which it fails. The error is the same on
-/// all ranks.
+/// deck that fails the check. Of the points at which this entry fails, the message names the point with the
+/// smallest id. The error is the same on all ranks.
 pub fn are_finite<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -91,8 +91,8 @@ struct FiniteCheck<'a, const D: usize> {
 }
 
 impl<const D: usize> FiniteCheck<'_, D> {
-    /// Return an error if the thermal stretch of a point of a set is -1 or less. The bonds of this point
-    /// would have no length. Collective.
+    /// Return an error if the thermal stretch of a point of a set is −1 or less. The point's cell would have
+    /// no volume at this stretch. Collective.
     fn look_at_stretches(
         &self,
         key: &str,

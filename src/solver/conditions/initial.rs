@@ -12,8 +12,8 @@ use super::{members, not_empty};
 /// Set the initial displacements and velocities. Collective.
 ///
 /// # Errors
-/// If a set is empty, or a file cannot be read, has an invalid row, or does not have exactly one row for each
-/// point of the set. The error is the same on all ranks.
+/// If a set is empty; or if a file cannot be read, has an invalid row, or does not have exactly one row for
+/// each point of its set. The error is the same on all ranks.
 pub fn apply_initials<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -48,7 +48,7 @@ pub fn apply_initials<const D: usize>(
     Ok(())
 }
 
-/// Set the displacements and velocities of some owned points from a file. Collective.
+/// Set the displacements and velocities of `points`, local indices of owned points, from a file. Collective.
 fn apply_file<const D: usize>(
     initial: &Initial,
     file: &InitialFile,
@@ -94,7 +94,7 @@ fn apply_file<const D: usize>(
 
 /// Read displacement and velocity of the owned points from a file, 2 D values per point; NaN for points
 /// without a row. Each rank reads a part of the rows, and sends each row to the rank whose range of ids
-/// contains its id. Collective.
+/// contains the id of the row. Collective.
 fn values_of_owned<const D: usize>(
     file: &InitialFile,
     comm: &dyn Communicator,

@@ -12,7 +12,7 @@ pub struct Load<const D: usize> {
     factors: [f64; D],
     /// Index of the load's condition.
     condition: usize,
-    /// Factor that an observer has set.
+    /// Factor that an observer has set, see `LoadFactors`.
     scale: f64,
     now: [At; D],
     /// Whether the force density must be computed: it may have changed, or the caller has requested all
@@ -31,14 +31,15 @@ pub struct Loaded<const D: usize> {
     shares: Option<Vec<f64>>,
     /// Force density in the current step, N/m³.
     force: Vec<[f64; D]>,
-    /// Force density (N/m³) and displacement (m) before the step.
+    /// Force density before the step, N/m³.
     before: Vec<[f64; D]>,
+    /// Displacement before the step, m.
     moved_from: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Load<D> {
-    /// Create the load of the condition with this index. Each component of the force density (N/m³) is its
-    /// expression times its factor.
+    /// Create the load of the condition with this index. Each component of the force density (N/m³) is the
+    /// expression times the factor of this component.
     pub fn new(condition: usize, values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
@@ -56,8 +57,8 @@ impl<const D: usize> Load<D> {
         self.condition
     }
 
-    /// Prepare the load for a time (s). `factors` has a factor per condition. With `all`, the force density
-    /// is computed even if it has not changed.
+    /// Prepare the load for a time (s). `factors` has a factor per condition. With `all`, the load is due
+    /// even if its force density has not changed.
     pub fn set_time(&mut self, time: f64, factors: &[f64], all: bool) {
         let scale = factors[self.condition];
         let is_rescaled = scale != self.scale;
@@ -114,13 +115,14 @@ impl<const D: usize> Loaded<D> {
         self.load
     }
 
-    /// Iterate over the points, by their index in the part, and the force density on them, N/m³.
+    /// Iterate over the points. Each item is the index of a point in the part, and the force density on this
+    /// point (N/m³).
     pub fn densities(&self) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
         let points = self.points.iter().map(|point| usize::from(*point));
         points.zip(self.force.iter().copied())
     }
 
-    /// Set the external forces of the loaded points to 0.
+    /// Set the external force densities of the loaded points to 0.
     pub fn clear(&self, part: &mut Part<'_, D>) {
         for component in part.external_force.iter_mut().flatten() {
             for point in &self.points {
@@ -129,7 +131,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the load to the external forces of the loaded points.
+    /// Add the load to the external force densities of the loaded points.
     pub fn add(&self, part: &mut Part<'_, D>) {
         let components = part.external_force.iter_mut().flatten();
         for (d, component) in components.enumerate() {
@@ -148,7 +150,8 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the work (J) of the load in this step to the external work of each point.
+    /// Add the work (J) of the load since [`Self::remember`] to the external work of each point; see
+    /// [`Work`].
     pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {
             return;

@@ -36,7 +36,7 @@ pub struct Conditions<const D: usize> {
     on_parts: Vec<OnPart<D>>,
 }
 
-/// Points of a [`Part`] on which conditions act, in the order of the deck.
+/// Points of a [`Part`] on which conditions act. Conditions are in the order of the deck.
 #[derive(Default)]
 pub struct OnPart<const D: usize> {
     loads: Vec<Loaded<D>>,
@@ -90,9 +90,9 @@ pub fn members<const D: usize>(problem: &Problem, model: &Model<D>, set: usize) 
         .collect()
 }
 
-/// Return the local indices of the owned points on which a load on a set acts. Also return the fraction of
-/// each point inside the set, if it can be below 1. With these fractions, refinement does not change the
-/// total load.
+/// Return the local indices of the owned points on which a load on a set acts. With refinement, also return
+/// the fraction of each of these points that belongs to the set; `None` without refinement. With these
+/// fractions, refinement does not change the total load.
 fn loaded<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -122,8 +122,8 @@ fn body_of<'p, const D: usize>(problem: &'p Problem, model: &Model<D>, point: u3
     problem.block(usize::from(model.block[point as usize])).body
 }
 
-/// Return an input error if a load acts on a layer whose thickness is the spacing, and a point of any rank has
-/// no single spacing. Collective.
+/// Check a load that acts on a layer whose thickness is the spacing: return an input error if a loaded point
+/// on any rank belongs to a body without a single spacing. Collective.
 fn have_depths<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -149,7 +149,7 @@ fn have_depths<const D: usize>(
     )
 }
 
-/// Return the loaded points for which `is_chosen` is true, with their fractions.
+/// Return the loaded points for which `is_chosen` is true, with their fractions as in [`loaded`].
 fn only(
     (points, shares): &(Vec<u32>, Option<Vec<f64>>),
     is_chosen: impl Fn(u32) -> bool,
@@ -163,7 +163,8 @@ fn only(
     )
 }
 
-/// Return the local indices of the owned points that the result contains; `None` for all points. Collective.
+/// Return the local indices of the owned points that the result `output` contains; `None` for all points.
+/// Collective.
 ///
 /// # Errors
 /// If the set of the result is empty; the error is the same on all ranks.
@@ -182,7 +183,8 @@ pub fn output_members<const D: usize>(
     Ok(Some(points))
 }
 
-/// Return an input error if the set of a condition or output has no points on any rank. Collective.
+/// Return an input error if the set of a condition or output has no points on any rank. `members` are the
+/// points of the set on this rank; `place` is the key and its span in the deck. Collective.
 pub fn not_empty(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -205,7 +207,11 @@ impl<const D: usize> Conditions<D> {
     /// component of a point, the later support applies. Collective.
     ///
     /// # Errors
-    /// If a set is empty; the error is the same on all ranks.
+    /// - If a set is empty.
+    /// - If a load acts on a layer whose thickness is the spacing, and a loaded point belongs to a body
+    ///   without a single spacing.
+    ///
+    /// The error is the same on all ranks.
     pub fn new(
         problem: &Problem,
         comm: &dyn Communicator,
@@ -244,7 +250,7 @@ impl<const D: usize> Conditions<D> {
                 Action::BodyForce(values, factors) => {
                     have_depths(problem, comm, model, condition, &points)?;
                     let points = loaded(problem, model, grids, condition.set);
-                    // All ranks add the same loads, also those without points.
+                    // All ranks, also ranks without points of the set, add the same loads.
                     let dimension = problem.dimension.count();
                     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);
                     for divisor in condition.divisors(bodies, dimension) {
@@ -323,8 +329,8 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Prepare the loads at `time` (s), with `factors` by condition. With `all`, also loads that have not
-    /// changed are applied again.
+    /// Prepare the loads at `time` (s), with `factors` by condition. With `all`, loads that have not changed
+    /// are also applied again.
     pub fn set_loads(&mut self, time: f64, factors: &[f64], all: bool) {
         for load in &mut self.loads {
             load.set_time(time, factors, all);
@@ -371,7 +377,7 @@ impl<const D: usize> Conditions<D> {
         free
     }
 
-    /// Sum the force of the supports on this rank's points of a set by component, N. `members` are the sorted
+    /// Sum the forces that supports exert on some owned points, by component (N). `members` are the sorted
     /// local indices of these points.
     pub fn reaction(&self, model: &Model<D>, fields: &Fields<D>, members: &[u32]) -> [ExactSum; D] {
         let mut sums = [const { ExactSum::ZERO }; D];
@@ -392,9 +398,10 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sum a weight over some owned points, for each condition with loads in this stage. `weight` is a function
-    /// of a point and of the force of the load on this point (N). `points` is sorted. Returns the indices of
-    /// the conditions, and the sums of this rank.
+    /// Sum a weight over some owned points, for each condition with loads in this stage. `weight` is a
+    /// function of the local index of a point and of the force of the load on this point (N). `points` are
+    /// the sorted local indices of the points. Returns the indices of the conditions, and the sums of this
+    /// rank.
     pub fn load_sums(
         &self,
         model: &Model<D>,
@@ -421,8 +428,8 @@ impl<const D: usize> Conditions<D> {
         (conditions, sums)
     }
 
-    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) without work in
-    /// the trapezoidal rule. It has two parts: loads that act for one step on points at rest, and supported
+    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) without work in the
+    /// trapezoidal rule. The sum has two parts: loads that act for one step on points at rest, and supported
     /// components with prescribed velocity and acceleration.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density f of a point
@@ -471,7 +478,7 @@ impl<'a, const D: usize> Here<'a, D> {
         Self { all, on }
     }
 
-    /// Set temperature and thermal stretch of the points, if temperatures have changed.
+    /// Set temperature and thermal stretch of the points, if temperatures may have changed.
     pub fn apply_temperatures(&self, part: &mut Part<'_, D>) {
         self.all.temperatures.apply(&self.on.heated, part);
     }
@@ -507,14 +514,14 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Compute the force densities of the loads that have changed.
+    /// Compute the force densities of the loads that may have changed.
     pub fn find_loads(&mut self) {
         for load in &mut self.on.loads {
             load.find(self.all.loads);
         }
     }
 
-    /// Update the external forces if any load has changed.
+    /// Update the external forces if any load may have changed.
     pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
         if !self.all.loads.iter().any(|load| load.is_due) {
             return;
@@ -528,8 +535,8 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Set the velocities of supported points, and compute the reactions. Returns whether all values are
-    /// finite.
+    /// Set the velocities of supported points, and compute the reactions. Returns whether these velocities
+    /// and reactions are finite.
     pub fn apply_velocities(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {

@@ -25,15 +25,15 @@ pub struct Support {
     guidance: Guidance,
 }
 
-/// Prescribed values for the displacements of the supported points.
+/// Values that prescribe the displacements of the supported points at the present time.
 struct Place {
     /// Length of the last step, s; 0 at the start.
     step: f64,
-    /// The prescribed values at the start and the end of this step.
+    /// The prescribed values (displacements or velocities) at the start and the end of this step.
     values: [At; 2],
 }
 
-/// Time and step for the velocities and accelerations of the supported points.
+/// Time (s) and step (s) for which the velocities and accelerations of the supported points are prescribed.
 struct Guidance {
     time: f64,
     step: f64,
@@ -43,13 +43,14 @@ struct Guidance {
 
 /// The points of a [`Part`] on which a support acts.
 pub struct Supported {
-    /// Index of the support.
+    /// Index of the support among the supports of the stage.
     support: usize,
     /// Indices of the points in the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
-    /// Reaction (N/m³) and displacement (m) before the step.
+    /// Reaction before the step, N/m³.
     before: Vec<f64>,
+    /// Displacement before the step, m.
     moved_from: Vec<f64>,
 }
 
@@ -96,8 +97,8 @@ impl Support {
     /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. The point is at a position
     /// (m), and the step (s) begins at a time (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
-        // The motion is extrapolated before the start, and where the expression has no value in the next
-        // step, such as √(1 − t).
+        // Before the start, a displacement continues linearly, and a velocity is constant. If the expression
+        // has no finite value in the next step, such as √(1 − t), the change of the last step is repeated.
         let change = |step: f64| self.values.expression.increment(position, time, step);
         let to_come = match change(step) {
             to_come if to_come.is_finite() || time < step => to_come,
@@ -171,7 +172,7 @@ impl Supported {
             let place = &mut moving.displacement[point];
             match support.motion {
                 Motion::Displacement => *place = value(&at[1], k),
-                // Trapezoidal rule for the velocity, from the displacement before the drift.
+                // Integrate the velocity by the trapezoidal rule, from the displacement before the drift.
                 Motion::Velocity if *step > 0.0 => {
                     *place = self.moved_from[k];
                     for at in at {
@@ -188,7 +189,8 @@ impl Supported {
     }
 
     /// Set the velocities of the points and compute the reactions. Together with the other forces, the
-    /// reactions give the prescribed motion in the Verlet scheme. Returns whether all values are finite.
+    /// reactions give the prescribed motion in the Verlet scheme. Returns whether these velocities and
+    /// reactions are finite.
     pub fn apply_velocities<const D: usize>(
         &self,
         supports: &[Support],
@@ -217,8 +219,9 @@ impl Supported {
     }
 
     /// Set the velocities of the points, and compute the reactions that give the required total force
-    /// density. For the index of a point in this support and in the part, `wanted` returns the velocity (m/s)
-    /// and the total force density (N/m³). Returns whether all values are finite.
+    /// density. `wanted` returns the velocity (m/s) and the total force density (N/m³) of a point, given its
+    /// index in this support and its index in the part. Returns whether the velocities and reactions are
+    /// finite.
     fn react<const D: usize>(
         &self,
         component: usize,
@@ -240,7 +243,8 @@ impl Supported {
         finite
     }
 
-    /// Add the work (J) of the support in this step to the external work of each point.
+    /// Add the work (J) of the support since [`Self::remember`] to the external work of each point; see
+    /// [`Work`].
     pub fn add_work<const D: usize>(
         &self,
         supports: &[Support],

@@ -41,8 +41,8 @@ impl Temperatures {
         self.each.len() - 1
     }
 
-    /// Prepare the temperatures at a time (s). [`Self::apply`] sets them after the first call and, if
-    /// temperatures change with time, after each call with a new time.
+    /// Prepare the temperatures at a time (s). [`Self::apply`] sets the temperatures of points after the
+    /// first call and, if temperatures change with time, after each call with a new time.
     pub fn set_time(&mut self, time: f64) {
         let is_new = self.time != Some(time);
         let changes = self.each.iter().any(|one| one.values.changes);
@@ -58,9 +58,9 @@ impl Temperatures {
         self.time = None;
     }
 
-    /// Set temperature and thermal stretch of the points of a part, if they have changed. If several
-    /// conditions apply to a point, the last one counts. A point without a condition has the reference
-    /// temperature of its material.
+    /// Set temperature and thermal stretch of the points of a part, if prescribed temperatures may have
+    /// changed. If several conditions apply to a point, the last of these conditions in the deck counts. A
+    /// point without a condition has the reference temperature of its material.
     pub fn apply<const D: usize>(&self, heated: &[Heated], part: &mut Part<'_, D>) {
         let (model, first) = (part.model, part.first);
         let (Some([temperature]), Some([stretch]), true) = (

@@ -14,7 +14,7 @@ pub struct ContactNow {
     pub friction: f64,
     /// Energy dissipated by contact damping so far, J.
     pub damping: f64,
-    /// Contacts of all pairs of points.
+    /// Contacts between points of all bodies.
     pub all: Touching,
     /// Contacts of each pair of bodies that has a separate contact rule.
     pub pairs: Vec<Touching>,
@@ -34,7 +34,7 @@ pub struct Touching {
     pub force: Vec<f64>,
 }
 
-/// Sums of a pair of bodies on one rank.
+/// Sums over the contacts of a pair of bodies on one rank.
 struct PairSum<const D: usize> {
     /// Number of contacts of owned points. A pair of points counts twice over all ranks.
     count: u64,

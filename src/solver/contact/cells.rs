@@ -34,7 +34,8 @@ pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item 
 pub(super) struct Cells {
     edge: f64,
     dimension: usize,
-    /// Index in `entries` of the first point of each bucket, followed by the number of points.
+    /// Index in `entries` of the first point of each bucket, followed by the number of points. A bucket
+    /// contains the points of all cells whose hashes have the same lowest bits.
     starts: Vec<u32>,
     /// Cell and index of each point.
     entries: Vec<(Cell, u32)>,
@@ -69,7 +70,7 @@ impl Cells {
     }
 
     /// Call `visit` with the index of every point in the cell of a position (m) and in the adjacent cells.
-    /// These include all points whose distance from the position is at most one edge of a cell.
+    /// The visited points include all points whose distance from the position is at most the edge of a cell.
     pub fn near(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
         let mask = self.starts.len() - 2;
         for cell in neighbourhood(cell_of(place, self.edge), self.dimension) {

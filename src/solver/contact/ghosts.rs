@@ -1,5 +1,5 @@
-//! The ghosts of contact: points of other ranks that may touch owned points. They differ from the ghosts of
-//! the bonds, because contact depends on present positions.
+//! The ghosts of contact: points of other ranks that may touch owned points. These ghosts differ from the
+//! ghosts of the bonds, because contact depends on present positions.
 //!
 //! Any two ranks can have contact. Each cell of present positions has a home rank, given by the hash of the
 //! cell. The home rank informs every rank with points in the cell about the other ranks with points in this
@@ -16,7 +16,8 @@ use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
 
-/// Edge of a cell divided by the search radius. Large cells have fewer points near their borders.
+/// Edge of a cell divided by the search radius. In large cells, a smaller fraction of the points lies near
+/// the borders of the cell.
 const CELL: f64 = 4.0;
 
 /// A point in messages to other ranks.
@@ -52,8 +53,8 @@ pub(super) struct Ghosts<const D: usize> {
 }
 
 impl<const D: usize> Ghosts<D> {
-    /// Find the points of other ranks within `reach` (m) of owned points. [`Self::update`] must be called
-    /// to exchange their motion. Collective.
+    /// Find the points of other ranks within `reach` (m) of owned points. Call [`Self::update`] afterwards to
+    /// exchange the motion of these points. Collective.
     pub fn within(
         comm: &dyn Communicator,
         dimension: Dimension,
@@ -104,8 +105,8 @@ struct Partner {
     rank: u64,
 }
 
-/// Find the points of other ranks within `reach` (m) of owned points in this dimension, sorted by owner, then
-/// by id. Also return the exchange plan of these points for `width` values per point. Collective.
+/// Find the points of other ranks within `reach` (m) of the owned points `own`. Return the found points,
+/// sorted by owner, then by id, and the plan to exchange `width` values per found point. Collective.
 fn find(
     comm: &dyn Communicator,
     own: &[Ghost],

@@ -2,15 +2,16 @@
 //!
 //! Every owned point has a list of the points that it may touch before the next search. The list is in
 //! ascending order of ids, so the order of the force sum does not depend on the ranks. The lists are rebuilt
-//! when a point has moved by half the skin since the last search. A pair touches if its distance is below its
-//! contact distance. The contact distance never exceeds the reference distance, so an undeformed body has no
-//! contact forces. Crack faces consist of points whose bonds have broken.
+//! when a point has moved by more than half the skin since the last search. The skin is the distance by which
+//! two points may approach between searches. A pair touches if its distance is below its contact distance.
+//! The contact distance never exceeds the reference distance, so an undeformed body has no contact forces.
+//! Crack faces consist of points whose bonds have broken.
 //!
-//! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so their states
-//! are identical.
+//! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so the states of
+//! the bodies are the same on all ranks.
 //!
 //! Repulsion follows from the new positions. Friction and damping follow from the velocities half a step
-//! earlier. Their work in a step is computed by the trapezoidal rule.
+//! earlier. The work of friction and damping in a step is computed by the trapezoidal rule.
 
 mod by_pair;
 mod cells;
@@ -50,15 +51,16 @@ pub use state::ContactState;
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Look-ahead, steps. The stable step includes pairs that will touch within this time, so the step is
+/// Look-ahead, in steps. The stable step includes pairs that will touch within this time, so the step is
 /// shortened before they touch.
 const LOOK_AHEAD: f64 = 2.0;
 
 /// Contact on one rank.
 pub struct Contact<const D: usize> {
     dimension: Dimension,
-    /// Rule of each pair of blocks, in both orders.
+    /// Rule of each pair of blocks in both orders, row-major; `None` for blocks without contact.
     rules: Vec<Option<PairRule>>,
+    /// Number of blocks.
     blocks: usize,
     /// Largest contact distance of any two points, m.
     largest: f64,
@@ -66,12 +68,13 @@ pub struct Contact<const D: usize> {
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
-    /// Owned points that touch a rigid body or will do so within the look-ahead, by the last evaluation and
-    /// the one before.
+    /// Owned points that touch a rigid body or will do so within the look-ahead, at the last evaluation and
+    /// at the evaluation before that.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
-    /// Owned points that may touch a point to which no bond joins them.
+    /// Owned points that may touch another point to which no intact bond joins them.
     open: Vec<u32>,
+    /// Whether `open` contains each owned point.
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
@@ -82,16 +85,17 @@ pub struct Contact<const D: usize> {
     /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N²; 0 if this
     /// evaluation was not quasi-static.
     rigid_forces: ExactSum,
-    /// Buffers of [`Self::add_forces`]: the points with contact forces, and the forces on each of them.
+    /// Buffer of [`Self::add_forces`]: the owned points that may have contact forces.
     active: Vec<u32>,
+    /// Buffer of [`Self::add_forces`]: the contact forces on each point of `active`.
     sums: Vec<PointSum<D>>,
 }
 
 /// Settings of a contact force evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactEvaluation {
-    /// Whether the evaluation is part of a relaxation or static solution: there are no velocities, and
-    /// contact adds to the fictitious density.
+    /// Whether the evaluation is part of a relaxation or static solution. Velocities are then 0, and in a
+    /// relaxation contact adds to the fictitious density.
     pub is_quasi_static: bool,
     /// Data of the step, if a step ends with this evaluation or a load step has reached equilibrium;
     /// otherwise `None`.
@@ -103,7 +107,8 @@ pub struct ContactEvaluation {
 pub struct StepEnd {
     /// Time, s.
     pub time: f64,
-    /// Length of this step, s; 0 at the start.
+    /// Length of this step, s; 0 at the start, and at further equilibria of a load step in which bonds have
+    /// broken.
     pub step: f64,
     /// Length of the next step, s.
     pub next: f64,
@@ -202,7 +207,8 @@ impl<const D: usize> Contact<D> {
         }))
     }
 
-    /// Index of the first rigid body whose motion is not finite; `None` if all are finite.
+    /// Index of the first rigid body whose motion is not finite; `None` if the motions of all rigid bodies
+    /// are finite.
     pub fn lost_rigid(&self) -> Option<usize> {
         self.rigid.iter().position(|rigid| !rigid.is_finite())
     }
@@ -228,9 +234,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
-    /// friction and damping from the present velocities, record their work, and apply the second half kick of
-    /// rigid bodies. Otherwise, friction and damping do not change. If a position is not finite, nothing is
-    /// added. Collective.
+    /// friction and damping from the velocities in the middle of the step, and record the energy that they
+    /// dissipate. Also apply the second half kick of rigid bodies. An evaluation that does not end a step
+    /// does not change friction and damping. If a position is not finite, nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
@@ -296,7 +302,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Find the owned points that may have contact forces now, or had some at the last evaluation.
+    /// Find the owned points that may have contact forces now or within the look-ahead, or had contact forces
+    /// at the last evaluation.
     fn find_active(
         &mut self,
         model: &Model<D>,
@@ -326,8 +333,8 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Sum the forces of points on rigid bodies, finish the step of the bodies, and compute the step limits
-    /// of contact. The third argument contains the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned
-    /// points. Collective.
+    /// of contact. `stiffness` and `damping` are the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned
+    /// points; see [`StepDemand`]. Collective.
     fn close_step(
         &mut self,
         comm: &dyn Communicator,
@@ -421,7 +428,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Call `visit` for each point that may touch an owned point, in ascending order of ids. The arguments
-    /// are the owned point, the other point, its block, and their rule.
+    /// are the owned point, the other point, the block of the other point, and the contact rule of both.
     fn for_each_candidate(
         &self,
         model: &Model<D>,
@@ -457,8 +464,8 @@ impl<const D: usize> Contact<D> {
         });
     }
 
-    /// Sum the contact forces on a point. The step limits also include contacts that will begin within a
-    /// time (s).
+    /// Sum the contact forces on a point. The step limits also include contacts that will begin within the
+    /// time `look_ahead` (s).
     fn point_sum(
         &self,
         model: &Model<D>,

@@ -22,7 +22,8 @@ const STICKING: f64 = 0.5;
 /// Contact rule for the points of two blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PairRule {
-    /// Contact distance, m. If `None`, it is `edge_share` times the mean of the edges of both points.
+    /// Contact distance, m. If `None`, the contact distance is `edge_share` times the mean of the edges of
+    /// both points.
     radius: Option<f64>,
     edge_share: f64,
     /// Upper limit of the contact distance as a fraction of the reference distance, so no force acts in the
@@ -32,7 +33,7 @@ pub(super) struct PairRule {
     response: Response,
 }
 
-/// Rule for forces that depend on overlap and velocities.
+/// Friction and damping of a contact, which depend on the overlap and the relative velocity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Response {
     static_friction: f64,
@@ -44,9 +45,10 @@ pub(super) struct Response {
 /// The stiffness of a pair of points, N/m.
 #[derive(Debug, Clone, Copy)]
 enum Stiffness {
-    /// Factor of ℓ^(D − 1) with the mean edge ℓ (m): a layer of material between the points.
+    /// Factor (N/m^D) of ℓ^(D − 1), where ℓ is the mean edge (m) of both points: the stiffness of a layer of
+    /// material between the points.
     OfLayer(f64),
-    /// Factor (N/m⁷) of the product of both volumes.
+    /// Factor (N/m⁷) of the product of the volumes of both points.
     OfVolumes(f64),
 }
 
@@ -87,14 +89,15 @@ pub(super) fn whole<const D: usize>(vector: [f64; D]) -> [f64; 3] {
 pub(super) struct Demand {
     /// Stiffness, N/m.
     pub stiffness: f64,
-    /// The larger of the coefficients of damping and of sticking, N s/m.
+    /// The larger of the coefficients of damping and of sticking friction, N s/m; for a point, the sum over
+    /// its contacts.
     pub damping: f64,
 }
 
 /// The contact force between two points, or of a rigid body on a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch<const D: usize> {
-    /// Repulsive force on the first point, N; it has the potential `energy`.
+    /// Repulsive force on the first point, N. The potential of this force is `energy`.
     pub repulsion: [f64; D],
     /// Force of normal damping on the first point, N.
     pub damping: [f64; D],
@@ -230,7 +233,7 @@ impl Response {
         self.static_friction > 0.0 || self.kinetic_friction > 0.0
     }
 
-    /// Contribution of a pair with this stiffness (N/m) and reduced mass (kg) to the step limits.
+    /// Contribution of a contact with this stiffness (N/m) and reduced mass (kg) to the step limits.
     pub fn demand(&self, stiffness: f64, mass: f64) -> Demand {
         let sticking = if self.is_rough() { STICKING } else { 0.0 };
         let ratio = sticking.max(self.damping_ratio);

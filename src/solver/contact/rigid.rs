@@ -23,24 +23,26 @@ type Wrench = [f64; WRENCH];
 pub struct RigidState {
     /// Position of the centre, m.
     pub position: [f64; 3],
-    /// Velocity, m/s; for a driven body, the mean velocity in the last step.
+    /// Velocity of the centre, m/s; for a driven body, the mean velocity in the last step (0 in load steps).
     pub velocity: [f64; 3],
     /// Rotation from the body's axes to the space axes: quaternion i, j, k, w.
     pub rotation: [f64; 4],
     /// Angular momentum, kg m²/s.
     pub angular_momentum: [f64; 3],
-    /// Contact force and torque that the points exert on the body.
+    /// Contact force (N) and torque (N m) that the points exert on the body.
     pub contact: Wrench,
-    /// The parts of `contact` from friction and from damping.
+    /// Part of `contact` that is friction.
     friction: Wrench,
+    /// Part of `contact` that is contact damping.
     damping: Wrench,
-    /// Displacement of a driven body in the present load step, m; 0 in explicit stages.
+    /// Displacement of a driven body in the present load step until its first equilibrium, m; otherwise 0.
     advance: [f64; 3],
     /// Prescribed force, N.
     load: [f64; 3],
     /// Work of the prescribed force or motion, J.
     pub work: f64,
-    /// Energy that friction has taken from the body, J; the rest is taken from the points.
+    /// Energy that friction has taken from the body, J. The energy that friction has taken from the points is
+    /// not included.
     pub friction_energy: f64,
     /// Same as `friction_energy`, for contact damping.
     pub damping_energy: f64,
@@ -66,7 +68,7 @@ pub(super) struct RigidBody {
 
 /// Exact sums of the forces and torques that the points exert on a rigid body.
 pub(super) struct WrenchSums {
-    /// Sums of contact, friction and damping.
+    /// Sums of all contact forces, of friction, and of contact damping.
     sums: [[ExactSum; WRENCH]; 3],
 }
 
@@ -160,7 +162,7 @@ impl RigidBody {
         0.5 * (self.mass * Vector3::from(self.state.velocity).norm_squared() + turning)
     }
 
-    /// Evaluate expressions of t at a time (s); the result is 0 if there are none.
+    /// Evaluate expressions of t at a time (s). The result is 0 for components without an expression.
     fn values(expressions: &[Expression], time: f64) -> [f64; 3] {
         std::array::from_fn(|d| {
             let value = expressions.get(d).map(|it| it.evaluate([0.0; 3], time));
@@ -216,8 +218,9 @@ impl RigidBody {
         }
     }
 
-    /// Finish a step (s) that ends at a time (s): store the forces that the points exert, record their work,
-    /// and apply the second half kick.
+    /// Finish a step (s) that ends at a time (s): store the forces that the points exert, record the work of
+    /// these forces, and apply the second half kick. `sums` are the values of [`WrenchSums::flat`] over all
+    /// ranks.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
@@ -282,7 +285,7 @@ impl RigidBody {
         distance(&self.problem.shape, seen, self.dimension.count()).0
     }
 
-    /// Contact force of the body on a point of a block; `None` if they do not touch.
+    /// Contact force of the body on a point of a block; `None` if the point does not touch the body.
     pub fn touch<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> Option<Touch<D>> {
         let (overlap, normal) = self.overlap(point);
         if overlap <= 0.0 {
@@ -307,7 +310,8 @@ impl RigidBody {
         (Vector3::from(place) - Vector3::from(self.state.position)).norm()
     }
 
-    /// Add the opposite of the contact force on a point at a position (m) to the sums.
+    /// Add to `sums` the force and torque that a point at a position (m) exerts on the body. `touch` is the
+    /// contact force of the body on the point.
     pub fn add_opposite<const D: usize>(
         &self,
         sums: &mut WrenchSums,
@@ -328,9 +332,9 @@ impl RigidBody {
         }
     }
 
-    /// Contribution of a point to the step limits; `None` if it does not touch the body and will not touch it
-    /// within a time (s) at its present approach speed. It is also `None` for a gap of more than an edge, at
-    /// any velocity.
+    /// Contribution of a point to the step limits; `None` if the point does not touch the body and will not
+    /// touch the body within a time (s) at its present approach speed. For a gap of more than the edge of the
+    /// point's cell, the result is `None` at any velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -402,7 +406,7 @@ impl RigidBody {
     }
 }
 
-/// Rotate `rotation` by an angular velocity (1/s) over a time (s).
+/// Return `rotation`, followed by a rotation with an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
     // (1 + ½ Δt ω) q needs no sine; the error of the angle is of third order in Δt.

@@ -12,8 +12,9 @@ pub(super) struct Rows {
     starts: Vec<usize>,
     /// Index of the other point of each pair: owned points first, then ghosts.
     others: Vec<u32>,
+    /// Id of the other point of each pair.
     ids: Vec<u64>,
-    /// Whether an intact bond joins the pair. Such a pair has no contact.
+    /// Whether an intact bond joins the two points of each pair. Such a pair has no contact.
     is_bonded: Vec<bool>,
 }
 
@@ -21,12 +22,13 @@ pub(super) struct Rows {
 pub(super) struct FoundPair {
     /// Id of the other point.
     pub id: u64,
-    /// Index of the other point.
+    /// Index of the other point: owned points first, then ghosts.
     pub other: u32,
 }
 
 impl Rows {
-    /// Create the rows of `points` points. `find` adds the pairs of a point. All pairs start unbonded.
+    /// Create the rows of the first `points` local points. `find` appends the pairs of a point to a row. All
+    /// pairs start unbonded.
     pub fn new(points: usize, find: impl Fn(usize, &mut Vec<FoundPair>) + Sync) -> Self {
         let chunks = points.div_ceil(CHUNK);
         let chunks: Vec<(Vec<usize>, Vec<FoundPair>)> = (0..chunks)
@@ -90,7 +92,8 @@ impl Rows {
         self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
     }
 
-    /// Copy the bonded flags from earlier rows of the same points. Return the points that have new pairs.
+    /// Copy the bonded flags of the pairs that earlier rows of the same points contain. Return the points
+    /// with pairs that the earlier rows do not contain.
     pub fn inherit(&mut self, earlier: &Self) -> Vec<usize> {
         let mut new = Vec::new();
         for point in 0..self.starts.len() - 1 {

@@ -18,8 +18,9 @@ use super::{CHUNK, Contact};
 const SKIN: f64 = 0.4;
 
 impl<const D: usize> Contact<D> {
-    /// Repeat the search if the lists are stale or if a point has moved by more than half the skin. Returns
-    /// whether all positions are finite on all ranks. Collective.
+    /// Repeat the search if the lists are stale or if a point has moved by more than half the skin since the
+    /// last search. Returns whether all positions on all ranks are finite; otherwise the search is not
+    /// repeated. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,
@@ -145,8 +146,8 @@ impl<const D: usize> Contact<D> {
         self.is_stale = false;
     }
 
-    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Their bonds have broken in
-    /// the last evaluation, or a rollback has restored these bonds.
+    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Bonds of these points have
+    /// broken in the last evaluation, or a rollback has restored these bonds.
     pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
         for broken in forces.broken() {
             let point = broken.point;

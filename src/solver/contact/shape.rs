@@ -25,7 +25,8 @@ pub(super) fn distance(
             let along = place.dot(&axis);
             let across = place - along * axis;
             let length = across.norm();
-            // As for a box, in the plane through the axis of the cylinder and the position.
+            // The distance is computed as for a box, in the plane through the axis of the cylinder and the
+            // position.
             let beyond = [along.abs() - half_length, length - radius];
             let normals = [along.signum() * axis, direction(across, length)];
             outside(&beyond, &normals)
@@ -99,8 +100,8 @@ pub(super) fn inertia(shape: &RigidShape, dimension: usize) -> Matrix3<f64> {
                 square(0) + square(2),
                 square(0) + square(1),
             );
-            // The moment about an axis is 0 if the box has no extent across this axis. It is replaced by 1,
-            // so the tensor is invertible.
+            // The moment about an axis is 0 if the box has no extent across this axis. Such a moment is
+            // replaced by 1, so the tensor is invertible.
             Matrix3::from_diagonal(&moments.map(|moment| if moment > 0.0 { moment } else { 1.0 }))
         }
         RigidShape::HalfSpace { .. } => Matrix3::identity(),
@@ -136,8 +137,8 @@ mod tests {
                 );
                 let (apart, normal) = distance(shape, place, 3);
                 assert!((normal.norm() - 1.0).abs() < 1e-12);
-                // `surface` is on the surface, and moving by `apart` along the normal changes the distance
-                // by `apart`.
+                // `surface` lies on the surface of the shape, and a move along the normal changes the
+                // distance by the length of the move.
                 let surface = place - apart * normal;
                 assert!(
                     distance(shape, surface, 3).0.abs() < 1e-12,

@@ -11,13 +11,15 @@ use super::rigid::RigidState;
 /// The step is lengthened after this number of consecutive steps that could have been longer.
 const CALM: u64 = 100;
 
-/// Limits that contact sets for the time step, over all ranks. They include contacts that will begin within
-/// two steps.
+/// Limits that contact sets for the time step, over all ranks. The limits include contacts that will begin
+/// within the look-ahead. k is the stiffness of a contact (N/m), and c is the damping coefficient of a
+/// contact (N s/m). 1/m is the inverse mass of a point, or the [mobility](super::rigid::RigidBody::mobility)
+/// of a rigid body (1/kg).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
     /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
-    /// squared angular frequencies.
+    /// squares of the angular frequencies.
     pub stiffness: f64,
     /// Largest 2 Σ c/m, 1/s.
     pub damping: f64,
@@ -35,8 +37,8 @@ pub struct ContactState {
 }
 
 impl ContactState {
-    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included; the next
-    /// evaluation finds them.
+    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included, because the next
+    /// evaluation finds these points.
     pub fn words(&self) -> Vec<u64> {
         let demand = bytemuck::cast_slice(std::slice::from_ref(&self.demand));
         [demand, bytemuck::cast_slice(&self.rigid)].concat()
@@ -97,14 +99,15 @@ impl<const D: usize> Contact<D> {
     /// Stable step (s) with contact; `step` is the stable step without contact.
     ///
     /// With damping from the velocities half a step earlier, Δt² ω² + 2 Δt C/m < 4 is stable. Here ω² is the
-    /// sum of 4/`step`² and the limit of stiffness, and C/m is the limit of damping.
+    /// sum of 4/`step`² and `StepDemand::stiffness`, and C/m is `StepDemand::damping`.
     pub fn stable_step(&self, step: f64) -> f64 {
         let square = 4.0 / (step * step) + self.demand.stiffness;
         let damping = self.demand.damping;
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Count the steps that could have been longer; reset the count if the present step could not.
+    /// Count the consecutive steps that could have been longer. Reset the count if the present step could not
+    /// have been longer.
     pub fn count_calm(&mut self, could_be_longer: bool) {
         self.demand.calm = if could_be_longer {
             self.demand.calm + 1

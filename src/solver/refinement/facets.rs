@@ -5,7 +5,8 @@ use crate::points::bins::Bins;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 
-/// Ratio of a facet's side to a cell's side, so that rounding opens no gap.
+/// Ratio of the side of a facet to the side of a cell. The ratio is above 1, so round-off opens no gap
+/// between facets.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
 /// The facets of all ranks. A facet lies between two adjacent points whose bond is broken, or was broken when
@@ -50,7 +51,7 @@ impl Facets {
         let mut all = all_gather_many(comm, &own);
         // The search above finds a facet only between points one spacing apart. Bonds on a refined grid can
         // be too short to join such points of a coarser grid. Facets of the coarser grid are therefore taken
-        // from the stored faces.
+        // from the suppressed nodes, which the grids store.
         let faces = simulation.grids.suppressed_faces().into_iter();
         all.extend(faces.map(|(centre, edges, axis)| Facet {
             centre,
@@ -86,8 +87,8 @@ impl Facets {
         any
     }
 
-    /// Whether a line between two positions (m) crosses a facet. `near` must contain the facets near one of
-    /// the positions.
+    /// Whether the line between two positions (m) crosses a facet of `near`. For the line of a bond, `near`
+    /// must be the result of [`Self::near`] for one of its ends.
     pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);
         facets.any(|facet| facet.is_crossed(from, to))
@@ -104,7 +105,7 @@ struct Facet {
 }
 
 impl Facet {
-    /// Whether a line crosses the facet. Adjacent facets leave no gap.
+    /// Whether the line between two positions (m) crosses the facet. Adjacent facets leave no gap.
     fn is_crossed(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let axis = self.axis as usize;
         let [before, after] = [from, to].map(|place| place[axis] - self.centre[axis]);

@@ -1,11 +1,11 @@
 //! Refinement during a run: which points are refined or removed, and the state of new points.
 //!
-//! Points with much strain energy, with damage, or at which a condition of the deck is true trigger
-//! refinement: all points within a horizon of them are refined (Dipasquale et al. 2014, §2.1). A new point
-//! gets the mean state of its parents. It takes its volume from the parents in equal parts, so mass and
-//! momentum are conserved. Bonds that exist before and after the refinement keep their state. A new bond
-//! starts broken if it crosses a pre-crack, or a face between points that a crack separates. No point is
-//! created between points that a crack separates.
+//! Three kinds of points trigger refinement: points with much strain energy, points with damage, and points
+//! at which a condition of the deck is true. All points within the horizon of such a point are refined
+//! (Dipasquale et al. 2014, §2.1). A new point gets the mean state of its parents. The new point takes its
+//! volume from the parents in equal parts, so mass and momentum are conserved. Bonds that exist before and
+//! after the refinement keep their state. A new bond starts broken if it crosses a pre-crack, or a face
+//! between points that a crack separates. No point is created between points that a crack separates.
 
 use std::cell::OnceCell;
 use std::time::Instant;
@@ -43,10 +43,10 @@ pub struct Regridded {
 /// Total changes by all refinements since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Refined {
-    /// Kinetic and strain energy that refinements have added, J; negative if they have removed energy.
+    /// Kinetic and strain energy that refinements have added, J; negative if refinements have removed energy.
     pub energy: f64,
-    /// Number of intact bonds that refinements have added, minus the number of removed bonds. Each bond
-    /// counts twice.
+    /// Number of intact bonds that refinements have added, minus the number of intact bonds that refinements
+    /// have removed. Each bond counts twice.
     pub bonds: i64,
 }
 
@@ -65,8 +65,8 @@ impl Refined {
     }
 }
 
-/// State of the points of new grids, from the state before the change of grids; distributed to ranks in the
-/// order of ids.
+/// State of the points of new grids, from the state before the change of grids. Each rank has the points in
+/// its range of ids.
 struct Kept {
     /// State of the points, one row per point. The last number of a row is the previous block.
     rows: Vec<f64>,
@@ -93,7 +93,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Whether the step is one at which points are checked for refinement.
+    /// Whether points are checked for refinement at the present step.
     pub fn is_refinement_due(&self) -> bool {
         self.trigger().is_some_and(|trigger| {
             // At the end of a stage, no check is made, because the first step of the next stage may have
@@ -102,13 +102,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Refine and coarsen as the trigger of the problem requests. A point is coarsened if neither a
-    /// triggering point nor a point with broken bonds has been near it for the time in the deck. Return the
-    /// numbers of created and removed points; `None` if the grids do not change. Collective.
+    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if it has been
+    /// outside the horizons of triggering points and of points with broken bonds for the time in the deck.
+    /// Return the numbers of created and removed points; `None` if the grids do not change. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -158,11 +159,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (energy, comm::total(self.comm, snapshot.intact()))
     }
 
-    /// Continue the run on other grids, with the state of all points and bonds. Collective.
+    /// Continue the run on other grids, with the state of all points and bonds. `left` are the nodes that the
+    /// other grids no longer have. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
+    /// are freed.
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -211,11 +214,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Restore the grids that an earlier part of the run had refined, at time 0. Collective.
+    /// Create the run on the grids of a checkpoint, at time 0. `state` contains the refined and the
+    /// suppressed nodes, as in [`Grids::state`]. Collective.
     ///
     /// # Errors
-    /// If METIS fails, or if a rank would get too many points or bonds; the error is the same on all ranks.
-    /// The run cannot continue, because its points are freed.
+    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
+    /// memory for its bonds. The error is the same on all ranks.
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
@@ -260,8 +264,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         broken
     }
 
-    /// Break the bonds that were broken before the refinement, and new bonds that cross facets. The last
-    /// number of a row is the previous block of the point. Collective.
+    /// Break the bonds that were broken before the refinement, and new bonds that cross facets. `rows` are
+    /// the rows of [`Kept`] of the owned points. `broken` contains the ids of the neighbours j of all broken
+    /// bonds, and `lengths` the number of these ids for each owned point. Collective.
     fn inherit(
         &mut self,
         rows: &[f64],
@@ -327,9 +332,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.forces.cut(|point| concerned[point], cut);
     }
 
-    /// Set the state of the owned points from rows. Fields of [`Birth::Shared`] are multiplied by the volume,
-    /// because rows contain their densities. The last number of a row is the previous block, which is not
-    /// part of the state.
+    /// Set the state of the owned points from the rows of [`Kept`]. Fields of [`Birth::Shared`] are
+    /// multiplied by the volume, because rows contain the densities of these fields. The last number of a row
+    /// is the previous block, which is not part of the state.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
         let volume = &self.model.volume;
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);

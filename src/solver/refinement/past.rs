@@ -16,8 +16,8 @@ pub struct Past {
     pub columns: Vec<Vec<f64>>,
     /// For each column, the rule by which new points get their values.
     births: Vec<Birth>,
-    /// Local index by body and grid index (in steps of the finest level). The map contains only points at
-    /// which the grid before or after the refinement is refined.
+    /// Local index by body and grid index (in steps of the finest level). The map contains only points in the
+    /// level-0 cells of [`Grids::changed`], before or after the refinement.
     at: FxHashMap<(usize, GridIndex), usize>,
     /// Whether each local point is removed.
     leaves: Vec<bool>,
@@ -54,7 +54,8 @@ impl Past {
             column.resize(local, 0.0);
             simulation.forces.bring(comm, column);
         }
-        // The parents of new and removed points lie where one of the grids is refined.
+        // The parents of new and removed points lie in cells that differ from an unrefined grid, before or
+        // after the refinement.
         let bodies = 0..problem.bodies.len();
         let changed =
             bodies.map(|body| [grids, &simulation.grids].map(|grids| grids.changed(body)));
@@ -141,7 +142,7 @@ impl Past {
         (0..owned).filter(|point| !self.leaves[*point])
     }
 
-    /// Local indices of a node and of its parents; `None` if this rank does not have all of them.
+    /// Local indices of a node and of its parents; `None` if this rank does not have all of these points.
     fn with_parents(
         &self,
         grids: &Grids<'_>,
@@ -153,7 +154,8 @@ impl Past {
         Some((at(place)?, parents.collect::<Option<_>>()?))
     }
 
-    /// Ids and rows of the owned points that are not removed, and of the new points in this rank's `pieces`.
+    /// Return ids and rows of the owned points that are not removed, and of the new points in `pieces`, which
+    /// this rank creates.
     pub fn rows<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
@@ -182,8 +184,9 @@ impl Past {
         (ids, rows)
     }
 
-    /// Index of the first number in the row of a new point. The row is the mean of the rows of its parents.
-    /// The entries for fields of [`Birth::FoundAnew`] are 0, and the entry for the block is [`NOWHERE`].
+    /// Return the index in `born.rows` of the first number in the row of a new point. If the row does not
+    /// exist yet, create it as the mean of the rows of the point's parents. The entries for fields of
+    /// [`Birth::FoundAnew`] are 0, and the entry for the block is [`NOWHERE`].
     fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
         if let Some(row) = born.at.get(&(body, place)) {
             return *row;

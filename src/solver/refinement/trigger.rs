@@ -9,8 +9,8 @@ use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
-/// A point that triggers refinement or has broken bonds, in messages to all ranks. Points within its horizon
-/// are refined or not coarsened.
+/// A point that triggers refinement or has broken bonds, in messages to all ranks. Points within the horizon
+/// of a triggering point are refined. Points within the horizon of any such point are not coarsened.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Source {
@@ -153,8 +153,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Wanted { finer, coarser }
     }
 
-    /// Return the nodes that `pick` selects for the blocks and positions of the marked points, over all
-    /// ranks. Collective.
+    /// Return the nodes that `pick` selects for the marked points of all ranks, given the block and the
+    /// position of a point. Collective.
     fn picks(
         &self,
         marked: &[bool],
