@@ -29,7 +29,7 @@ pub fn initials(
             let initial = table.get_ref();
             let key = format!("[initial.{name}]");
             let file = initial.file.as_ref();
-            let file = file.map(|file| initial_file(scope, deck, file, &key)).transpose()?;
+            let file = file.map(|file| initial_file(scope, file, &key)).transpose()?;
             if initial.displacement.is_none() && initial.velocity.is_none() && file.is_none() {
                 let message = format!("{key}: give `displacement`, `velocity` or both, or a `file`");
                 return Err(scope.error(table.span(), message));
@@ -74,16 +74,10 @@ pub fn initials(
 /// folder of the deck.
 fn initial_file(
     scope: &Scope,
-    deck: &Deck,
     file: &grammar::Text,
     key: &str,
 ) -> Result<problem::InitialFile> {
     let error = |message: String| scope.error(file.span(), format!("{key} file: {message}"));
-    if deck.refinement.is_some() {
-        let message =
-            "is not available with [refinement], whose points have other ids; use expressions";
-        return Err(error(message.to_owned()));
-    }
     let folder = scope.source.path.parent().unwrap_or("".as_ref());
     let path = folder.join(file.get_ref());
     let columns = value_file::columns(&path, scope.dimension).map_err(error)?;

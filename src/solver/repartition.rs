@@ -142,7 +142,7 @@ impl<const D: usize> Simulation<'_, D> {
         other.steps.clone_from(&self.steps);
         other.restore(&order, &saved)?;
         other.clock = self.clock;
-        other.times = self.times;
+        other.take_over(self);
         *self = other;
         let ids = &self.model.ids[..self.model.owned()];
         let came = ids.iter().filter(|id| before.binary_search(id).is_err());

@@ -118,7 +118,8 @@ struct BadPoint {
     step: u64,
     time: f64,
     id: u64,
-    index: usize,
+    block: u16,
+    position: [f64; 3],
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
@@ -490,6 +491,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
+    /// Take over what the saved state of `before` does not contain, after its points were distributed or
+    /// refined again.
+    pub(super) fn take_over(&mut self, before: &Self) {
+        self.times = before.times;
+        self.bad = before.bad;
+        // Unlike the saved factors, these contain the hash of the requests.
+        self.load_factors.clone_from(&before.load_factors);
+    }
+
     /// Record the owned point with the smallest id whose motion, force or reaction is not finite, with the
     /// step and time of a clock. If a point has been recorded before, nothing changes.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
@@ -519,7 +529,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 step: clock.number(),
                 time: clock.time(),
                 id: self.model.ids[index],
-                index,
+                block: self.model.block[index],
+                position: self.model.position(index),
             })
     }
 
@@ -550,11 +561,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })?;
         let own = self.bad.filter(|bad| bad.step as f64 == step);
         let own = own.map(|bad| {
-            let [x, y, z] = self.model.position(bad.index);
+            let [x, y, z] = bad.position;
             Found {
                 key: 0.0,
                 ids: [bad.id],
-                payload: [f64::from(self.model.block[bad.index]), x, y, z],
+                payload: [f64::from(bad.block), x, y, z],
             }
         });
         let Some(Found {

@@ -186,7 +186,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let steps = std::mem::take(&mut other.steps);
         other.continue_from(&self.progress());
         other.steps = steps;
-        other.times = self.times;
+        other.take_over(self);
         let (time, rule) = (other.clock.time(), other.time_rule());
         if let StepRule::Automatic(safety) = rule.step {
             let rest = rule.end - time;
@@ -224,6 +224,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
             let pieces = self.pieces_on(&grids);
+            self.release();
             *self = self.on(grids, pieces)?;
         } else {
             self.grids = grids;

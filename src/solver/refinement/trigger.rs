@@ -61,6 +61,15 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
             return Err(Error::input(message).at(&problem.places.horizon));
         }
     }
+    let of_files = problem.initials.iter();
+    let of_file = of_files.find_map(|initial| Some((initial, initial.file.as_ref()?)));
+    if let Some((initial, file)) = of_file {
+        let message = format!(
+            "[initial.{}] file: is not available with [refinement], whose points have other ids; use expressions",
+            initial.name
+        );
+        return Err(Error::input(message).at(&file.span));
+    }
     let mut scattered = (problem.bodies.iter())
         .filter(|body| (body.damage.as_ref()).is_some_and(|damage| damage.weibull.is_some()));
     if let (Some(_), Some(body)) = (&refinement.trigger, scattered.next()) {
