@@ -153,7 +153,7 @@ impl AnyLaw {
             })
         }
         with_law!(self, law => {
-            of::<_, D>(law.force(bond, &first(end), &first(history)), bond, factors, entries)
+            of::<_, D>(law.force_state(bond, &first(end), &first(history)), bond, factors, entries)
         })
     }
 
@@ -217,8 +217,8 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> [Lanes; D] {
-        with_law!(self, law => law.force(bond, &first(end), &first(history)).vector(bond))
+    fn force_state(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> [Lanes; D] {
+        with_law!(self, law => law.force_state(bond, &first(end), &first(history)).vector(bond))
     }
 
     #[inline(never)]

@@ -174,8 +174,8 @@ impl<const D: usize> Law<D> for FatiguePmb {
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 1]) -> Along {
-        self.elastic.force(bond, &[], &[])
+    fn force_state(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 1]) -> Along {
+        self.elastic.force_state(bond, &[], &[])
     }
 
     #[inline(always)]

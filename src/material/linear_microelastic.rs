@@ -101,7 +101,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, [factor]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
+    fn force_state(&self, bond: &Bond<D>, [factor]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
         Along(bond.stretch * *factor * (bond.inverse * (0.5 * self.micromodulus)))
     }
 

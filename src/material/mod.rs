@@ -121,7 +121,7 @@ pub trait Described {
 ///    damage criterion reads it.
 /// 2. Before each force evaluation, over the intact bonds, [`Self::PASSES`] times:
 ///    [`Self::pass_contribution`] → sums → [`Self::update_point`]. Then the numbers are sent to the ghosts.
-/// 3. In the force evaluation: [`Self::bond_history`] and [`Self::force`] of both ends.
+/// 3. In the force evaluation: [`Self::bond_history`] and [`Self::force_state`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
     /// The numbers of a point that bonds read at both ends. The constants come first; the others are
     /// recomputed before each force evaluation.
@@ -149,10 +149,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
-    /// Whether [`Self::force`] or [`Self::bond_history`] reads [`Bond::stretch`].
+    /// Whether [`Self::force_state`] or [`Self::bond_history`] reads [`Bond::stretch`].
     const FORCE_READS_STRETCH: bool = false;
 
-    /// Whether [`Self::force`] reads [`Bond::extension_over_deformed`].
+    /// Whether [`Self::force_state`] reads [`Bond::extension_over_deformed`].
     const FORCE_READS_EXTENSION: bool = true;
 
     /// Smallest dimension of space that the law supports.
@@ -180,7 +180,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether the law overrides [`Self::is_worn_out`].
     const WEARS_OUT: bool = false;
 
-    /// Whether [`Self::force`] or [`Self::bond_energy`] reads the bond history. Otherwise the history is
+    /// Whether [`Self::force_state`] or [`Self::bond_energy`] reads the bond history. Otherwise the history is
     /// computed only in evaluations that store it.
     const FORCE_READS_HISTORY: bool = true;
 
@@ -254,7 +254,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Return the force state T of one end, N/m⁶. A force along the bond is returned as T/|Y|, or T/|ξ| for
     /// linear laws, N/m⁷.
-    fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
+    fn force_state(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
     /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
     /// ends. The results of both ends are equal to the last bit, except for the sign. Laws may override
@@ -268,8 +268,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         history: &[Self::BondHistory; 2],
         weights: Weights,
     ) -> Self::Force {
-        let force_state_i = laws[0].force(bond, points[0], &history[0]);
-        let force_state_j = laws[1].force(bond, points[1], &history[1]);
+        let force_state_i = laws[0].force_state(bond, points[0], &history[0]);
+        let force_state_j = laws[1].force_state(bond, points[1], &history[1]);
         match weights {
             Weights::One => force_state_i.plus(force_state_j),
             Weights::Same(weight) => force_state_i.plus(force_state_j).times(weight),
@@ -288,7 +288,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         history: &Self::BondHistory,
         rotation: &<Self::Force as ForceState<D>>::Rotation,
     ) -> Lanes {
-        let force = self.force(bond, end, history);
+        let force = self.force_state(bond, end, history);
         force.work(simd, bond, Self::LINEAR, rotation)
     }
 

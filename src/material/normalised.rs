@@ -143,7 +143,7 @@ impl<const D: usize> Law<D> for Normalised {
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
+    fn force_state(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
         Along(bond.extension_over_deformed * *inverse * (bond.inverse * (2.0 * self.energy)))
     }
 

@@ -270,7 +270,7 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         [extension_factor, volume_factor]: &[Lanes; 2],

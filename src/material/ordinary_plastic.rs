@@ -222,7 +222,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         [extension_factor, volume_factor, ..]: &[Lanes; 4],

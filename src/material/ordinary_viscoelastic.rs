@@ -243,7 +243,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     }
 
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         [extension_factor, volume_factor, _]: &[Lanes; 3],

@@ -124,7 +124,7 @@ impl<const D: usize> Law<D> for Pmb {
     type Force = Along;
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 0]) -> Along {
+    fn force_state(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 0]) -> Along {
         Along(bond.extension_over_deformed * (bond.inverse * (0.5 * self.micromodulus)))
     }
 

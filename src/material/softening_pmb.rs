@@ -516,7 +516,7 @@ impl<const D: usize> Law<D> for SofteningPmb {
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], [largest]: &[Lanes; 1]) -> Along {
+    fn force_state(&self, bond: &Bond<D>, _: &[Lanes; 0], [largest]: &[Lanes; 1]) -> Along {
         let (zero, extension) = (Lanes::splat(0.0), bond.extension_over_deformed);
         let elastic = extension.max(zero) * self.secant(*largest) + extension.min(zero);
         Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))

@@ -166,7 +166,7 @@ impl<const D: usize> Law<D> for TensorPmb {
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
+    fn force_state(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
         let micromodulus = quadratic_form(bond, end) * self.micromodulus;
         Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
     }

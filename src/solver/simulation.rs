@@ -332,7 +332,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             self.set_second_half(&before);
         }
         self.clock.advance();
-        self.conditions.set_places(self.clock.time(), step);
+        self.conditions.set_displacements(self.clock.time(), step);
         self.conditions.set_temperatures(self.clock.time());
         if let Some(contact) = &mut self.contact {
             contact.drift(self.clock.time(), step);
@@ -364,7 +364,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (time, step) = (clock.time(), clock.step());
         self.conditions
             .set_loads(time, self.load_factors.present(), false);
-        self.conditions.set_guidance(time, step);
+        self.conditions.set_velocities(time, step);
     }
 
     /// Call `work` on several threads, with each part of the owned points and the conditions that act on this
@@ -447,7 +447,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Set the displacements of supported points at `time` (s). `step` is the length of the last step (s), 0
     /// at the start.
     pub(super) fn apply_displacements(&mut self, time: f64, step: f64) {
-        self.conditions.set_places(time, step);
+        self.conditions.set_displacements(time, step);
         self.walk(|part, here| {
             here.apply_displacements(part);
             true
@@ -472,7 +472,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             return self.walk(|part, here| here.project_residual(part));
         }
         self.conditions
-            .set_guidance(self.clock.time(), self.clock.step());
+            .set_velocities(self.clock.time(), self.clock.step());
         self.walk(|part, here| here.apply_velocities(part))
     }
 

@@ -245,7 +245,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     }
 
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         ([.., weight], (gradient, direct)): &Point<D>,

@@ -414,7 +414,7 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, (_, end): &Point<D>, _: &[Lanes; 0]) -> [Lanes; D] {
+    fn force_state(&self, bond: &Bond<D>, (_, end): &Point<D>, _: &[Lanes; 0]) -> [Lanes; D] {
         let (direct, control) = end;
         let mut force = [Lanes::splat(0.0); D];
         for a in 0..D {
@@ -473,7 +473,7 @@ impl<const D: usize> Law<D> for Correspondence {
 
     #[inline(always)]
     fn bond_energy(&self, bond: &Bond<D>, end: &Point<D>, history: &[Lanes; 0]) -> Lanes {
-        let force = self.force(bond, end, history);
+        let force = self.force_state(bond, end, history);
         let mut work = force[0] * bond.eta[0];
         for d in 1..D {
             work += force[d] * bond.eta[d];

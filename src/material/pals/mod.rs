@@ -210,7 +210,7 @@ impl<const D: usize> Law<D> for Pals {
 
     /// Return t/|Y|, with |ξ|/|Y| = 1 − P and e/|Y| = P.
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         ((omega, sigma), [_, pressure, mean]): &Self::Point,

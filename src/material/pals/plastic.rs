@@ -168,14 +168,14 @@ impl<const D: usize> Law<D> for PalsPlastic {
     }
 
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         (functions, [stiffness, pressure, even, ..]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> Along {
         let point = (*functions, [*stiffness, *pressure, *even + *plastic]);
-        self.elastic.force(bond, &point, &[])
+        self.elastic.force_state(bond, &point, &[])
     }
 
     #[inline(always)]

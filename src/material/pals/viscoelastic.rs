@@ -121,14 +121,14 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
     }
 
     #[inline(always)]
-    fn force(
+    fn force_state(
         &self,
         bond: &Bond<D>,
         (functions, [stiffness, pressure, even]): &Self::Point,
         [back, ..]: &[Lanes; 3],
     ) -> Along {
         let eased = *even + *back * self.relaxation.share();
-        (self.elastic).force(bond, &(*functions, [*stiffness, *pressure, eased]), &[])
+        (self.elastic).force_state(bond, &(*functions, [*stiffness, *pressure, eased]), &[])
     }
 
     #[inline(always)]

@@ -72,7 +72,7 @@ impl<const D: usize> Forces<D> {
 
     /// Merge the entries of [`Self::broken`] that belong to the same point, and recompute the point numbers
     /// and forces that depend on the broken bonds. Called after the force sums. Collective.
-    pub(super) fn settle(
+    pub(super) fn recompute_after_breaking(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
@@ -122,14 +122,14 @@ impl<const D: usize> Forces<D> {
         let before = self.held(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
             if pass != Pass::PointSum(0) {
-                self.update(HaloContent::OwnedOnly, Which::Owned);
+                self.update(HaloContent::OwnNumbers, Which::Owned);
             }
             self.clear(pass, points.clone());
             self.run(pass, points.clone(), force, BondUpdate::None);
             self.finish(pass, points.clone(), model, bond_update, plastic);
         }
         // Lattice bonds read copies of the point numbers in the grids, so update these copies.
-        self.update(HaloContent::OwnedOnly, Which::Owned);
+        self.update(HaloContent::OwnNumbers, Which::Owned);
         let after = self.held(model, points.clone(), plastic);
         for broken in &mut self.broken {
             if points.contains(&broken.point) {

@@ -30,11 +30,11 @@ const CHUNK: usize = 4096;
 const PIECE: usize = 4096;
 
 /// Maximum number of columns of [`Forces::changing_columns`].
-const MOST_CHANGING: usize = MOST.point + 4 + StressMeasure::ALL.len();
+const MAX_HALO_COLUMNS: usize = MOST.point + 4 + StressMeasure::ALL.len();
 
 /// The columns that [`Forces::halo_columns`] returns, and the number of these columns. Further entries of the
 /// array are empty.
-type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
+type HaloColumns<'a> = ([&'a mut [f64]; MAX_HALO_COLUMNS], usize);
 
 /// Point data that a pass receives from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub(super) enum HaloContent {
     PointNumbers,
     /// Nothing is sent. The point numbers, rotations and stress measures of owned points are copied to the
     /// grids.
-    OwnedOnly,
+    OwnNumbers,
     /// No data are sent or copied.
     None,
 }
@@ -170,7 +170,7 @@ impl<const D: usize> Forces<D> {
                 force,
                 plastic,
             };
-            self.settle(comm, model, acting, times);
+            self.recompute_after_breaking(comm, model, acting, times);
         }
     }
 
@@ -206,7 +206,7 @@ impl<const D: usize> Forces<D> {
         displacement: &'a mut [Vec<f64>; D],
         thermal_stretch: Option<&'a mut [f64]>,
     ) -> HaloColumns<'a> {
-        let mut all: [&mut [f64]; MOST_CHANGING] = std::array::from_fn(|_| &mut [][..]);
+        let mut all: [&mut [f64]; MAX_HALO_COLUMNS] = std::array::from_fn(|_| &mut [][..]);
         let mut count = 0;
         let mut add = |column: &'a mut [f64]| {
             all[count] = column;
@@ -219,7 +219,7 @@ impl<const D: usize> Forces<D> {
             }
             HaloContent::Thresholds => add(&mut self.limits.thresholds),
             HaloContent::PointNumbers => return self.changing_columns(),
-            HaloContent::OwnedOnly | HaloContent::None => {}
+            HaloContent::OwnNumbers | HaloContent::None => {}
         }
         (all, count)
     }
@@ -235,7 +235,7 @@ impl<const D: usize> Forces<D> {
                 HaloContent::Motion => "displacements",
                 HaloContent::Thresholds => "thresholds",
                 HaloContent::PointNumbers => "point numbers, rotations and stresses",
-                HaloContent::OwnedOnly | HaloContent::None => continue,
+                HaloContent::OwnNumbers | HaloContent::None => continue,
             };
             let mut displacement = [const { Vec::new() }; D];
             let thermal_stretch = is_thermal.then_some(&mut thermal_stretch[..]);
@@ -255,7 +255,7 @@ impl<const D: usize> Forces<D> {
             (None, _) => HaloContent::Motion,
             (Some(Pass::SmallestStretch), _) => HaloContent::Thresholds,
             (Some(Pass::PointSum(_)), Pass::Force) => HaloContent::PointNumbers,
-            (Some(Pass::PointSum(_)), _) => HaloContent::OwnedOnly,
+            (Some(Pass::PointSum(_)), _) => HaloContent::OwnNumbers,
             _ => HaloContent::None,
         }
     }
@@ -266,8 +266,8 @@ impl<const D: usize> Forces<D> {
         for grid in &mut self.grids {
             match content {
                 HaloContent::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
-                HaloContent::OwnedOnly if which == Which::Ghosts => {}
-                HaloContent::PointNumbers | HaloContent::OwnedOnly => {
+                HaloContent::OwnNumbers if which == Which::Ghosts => {}
+                HaloContent::PointNumbers | HaloContent::OwnNumbers => {
                     let first = self.numbers.first_changing;
                     grid.update_numbers(which, first, &self.numbers.columns);
                     grid.update_rotations(which, &self.limits.rotations);

@@ -61,20 +61,20 @@ impl LoadFactors {
 
     /// Record the factors of the current step as the factors at the last equilibrium, at the end of a load
     /// step.
-    pub fn settle(&mut self) {
+    pub fn record_equilibrium(&mut self) {
         self.at_equilibrium.copy_from_slice(&self.present);
     }
 
     /// Apply the requested factors at the end of an explicit step.
     pub fn end_step(&mut self) {
         self.begin_load_step();
-        self.settle();
+        self.record_equilibrium();
     }
 
     /// Restore the factors that applied before a step that is rolled back.
     pub fn undo(&mut self, present: &[f64]) {
         self.present.copy_from_slice(present);
-        self.settle();
+        self.record_equilibrium();
     }
 
     /// A whole number below 2⁵² that differs for different sequences of requests, up to rare coincidences of
@@ -133,7 +133,7 @@ mod tests {
         factors.begin_load_step();
         assert_eq!(factors.present(), [1.0, 0.5]);
         assert_eq!(factors.at_equilibrium(), [1.0, 1.0]);
-        factors.settle();
+        factors.record_equilibrium();
         assert_eq!(factors.at_equilibrium(), [1.0, 0.5]);
         assert_ne!(factors.fingerprint(), LoadFactors::new(2).fingerprint());
         // The hash differs for ranks that have set different factors, even if their last factors are equal.

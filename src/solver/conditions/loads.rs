@@ -28,7 +28,7 @@ pub struct Loaded<const D: usize> {
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
     /// Fraction of each point on which the load acts; `None` if the fraction is 1 for all points.
-    shares: Option<Vec<f64>>,
+    fractions: Option<Vec<f64>>,
     /// Force density in the current step, N/m³.
     force: Vec<[f64; D]>,
     /// Force density before the step, N/m³.
@@ -83,7 +83,7 @@ impl<const D: usize> Loaded<D> {
         load: usize,
         points: Vec<u16>,
         positions: Vec<[f64; 3]>,
-        shares: Option<Vec<f64>>,
+        fractions: Option<Vec<f64>>,
     ) -> Self {
         let none = || vec![[0.0; D]; points.len()];
         Self {
@@ -93,7 +93,7 @@ impl<const D: usize> Loaded<D> {
             moved_from: none(),
             points,
             positions,
-            shares,
+            fractions,
         }
     }
 
@@ -105,8 +105,8 @@ impl<const D: usize> Loaded<D> {
         }
         for (k, force) in self.force.iter_mut().enumerate() {
             let whole = load.on(self.positions[k]);
-            let share = self.shares.as_ref().map(|shares| shares[k]);
-            *force = whole.map(|component| share.map_or(component, |share| share * component));
+            let fraction = self.fractions.as_ref().map(|fractions| fractions[k]);
+            *force = whole.map(|component| fraction.map_or(component, |fraction| fraction * component));
         }
     }
 

@@ -102,7 +102,7 @@ fn loaded<const D: usize>(
     if problem.refinement.is_none() {
         return (members(problem, model, set), None);
     }
-    let mut shares = SetFractions::new(grids);
+    let mut fractions = SetFractions::new(grids);
     // Sets of loads in runs with refinement never contain ids, so the id 0 that is passed here is not read;
     // see `refinement::trigger::is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
@@ -110,11 +110,11 @@ fn loaded<const D: usize>(
     };
     let found = (0..model.owned()).map(|point| {
         let body = problem.body_of(usize::from(model.block[point]));
-        let share = shares.of((body, model.ids[point], model.position(point)), &chosen);
-        (point as u32, share)
+        let fraction = fractions.of((body, model.ids[point], model.position(point)), &chosen);
+        (point as u32, fraction)
     });
-    let (points, shares) = found.filter(|(_, share)| *share > 0.0).unzip();
-    (points, Some(shares))
+    let (points, fractions) = found.filter(|(_, fraction)| *fraction > 0.0).unzip();
+    (points, Some(fractions))
 }
 
 /// The body of an owned point.
@@ -151,15 +151,15 @@ fn have_depths<const D: usize>(
 
 /// Return the loaded points for which `is_chosen` is true, with their fractions as in [`loaded`].
 fn only(
-    (points, shares): &(Vec<u32>, Option<Vec<f64>>),
+    (points, fractions): &(Vec<u32>, Option<Vec<f64>>),
     is_chosen: impl Fn(u32) -> bool,
 ) -> (Vec<u32>, Option<Vec<f64>>) {
     let chosen = |k: &usize| is_chosen(points[*k]);
     let chosen: Vec<usize> = (0..points.len()).filter(chosen).collect();
-    let shares = shares.as_ref();
+    let fractions = fractions.as_ref();
     (
         chosen.iter().map(|k| points[*k]).collect(),
-        shares.map(|shares| chosen.iter().map(|k| shares[*k]).collect()),
+        fractions.map(|fractions| chosen.iter().map(|k| fractions[*k]).collect()),
     )
 }
 
@@ -267,8 +267,8 @@ impl<const D: usize> Conditions<D> {
                     let mut volume = [ExactSum::default()];
                     let points = loaded(problem, model, grids, condition.set);
                     for (k, point) in points.0.iter().enumerate() {
-                        let share = points.1.as_ref().map_or(1.0, |shares| shares[k]);
-                        volume[0].add(share * model.volume[*point as usize]);
+                        let fraction = points.1.as_ref().map_or(1.0, |fractions| fractions[k]);
+                        volume[0].add(fraction * model.volume[*point as usize]);
                     }
                     let volume = reduce(comm, &mut volume)[0];
                     let load = Load::new(index, values, [1.0 / volume; D]);
@@ -296,21 +296,21 @@ impl<const D: usize> Conditions<D> {
         Ok(conditions)
     }
 
-    /// Add a load on some of the owned points, in ascending order. `shares` are the fractions of the points
+    /// Add a load on some of the owned points, in ascending order. `fractions` are the fractions of the points
     /// on which the load acts; `None` if all are 1.
     fn add_load(
         &mut self,
         model: &Model<D>,
         load: Load<D>,
-        (points, shares): (Vec<u32>, Option<Vec<f64>>),
+        (points, fractions): (Vec<u32>, Option<Vec<f64>>),
     ) {
         let mut first = 0;
         for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
             let own = first..first + points.len();
             first = own.end;
-            let shares = shares.as_ref().map(|shares| shares[own].to_vec());
+            let fractions = fractions.as_ref().map(|fractions| fractions[own].to_vec());
             let (numbers, positions) = numbers_in_part(model, points);
-            let loaded = Loaded::new(self.loads.len(), numbers, positions, shares);
+            let loaded = Loaded::new(self.loads.len(), numbers, positions, fractions);
             self.on_parts[part_of(points[0])].loads.push(loaded);
         }
         self.loads.push(load);
@@ -323,7 +323,7 @@ impl<const D: usize> Conditions<D> {
 
     /// Prepare the displacements of supported points at `time` (s). `step` is the length of the last step
     /// (s), 0 at the start.
-    pub fn set_places(&mut self, time: f64, step: f64) {
+    pub fn set_displacements(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
             support.set_place(time, step);
         }
@@ -338,9 +338,9 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Prepare the velocities of supported points at `time` (s). `step` is the time step (s).
-    pub fn set_guidance(&mut self, time: f64, step: f64) {
+    pub fn set_velocities(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
-            support.set_guidance(time, step);
+            support.set_velocities(time, step);
         }
     }
 

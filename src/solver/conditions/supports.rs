@@ -85,7 +85,7 @@ impl Support {
     }
 
     /// Prepare the velocities of points at `time` (s); `step` is the time step (s).
-    pub fn set_guidance(&mut self, time: f64, step: f64) {
+    pub fn set_velocities(&mut self, time: f64, step: f64) {
         let same = || self.moving([0.0; 3], time, step);
         self.guidance = Guidance {
             time,

@@ -274,7 +274,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.load_step.has_broken = true;
             self.load_step.since_breaking = 0;
         } else {
-            self.load_factors.settle();
+            self.load_factors.record_equilibrium();
         }
         self.load_step.is_settled = !breaks;
         breaks

@@ -67,7 +67,7 @@ impl Refined {
 
 /// State of the points of new grids, from the state before the change of grids. Each rank has the points in
 /// its range of ids.
-struct Kept {
+struct GridState {
     /// State of the points, one row per point. The last number of a row is the previous block.
     rows: Vec<f64>,
     /// Length of a row.
@@ -169,12 +169,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
-        let Kept {
+        let GridState {
             rows,
             width,
             lengths,
             broken,
-        } = self.kept(&grids, left, &pieces);
+        } = self.state_on(&grids, left, &pieces);
         self.release();
         let mut other = self.on(grids, pieces)?;
         let order = other.id_order();
@@ -234,7 +234,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Collect the state of the points of other grids. `pieces` are the points of these grids that this rank
     /// creates, and `left` are the nodes that are removed. Collective.
-    fn kept(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> Kept {
+    fn state_on(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> GridState {
         let comm = self.comm;
         let past = Past::new(self, grids, left);
         let (ids, rows) = past.rows(self, grids, pieces);
@@ -248,7 +248,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let order = IdOrder::new(comm, &ids, self.model.coarsest);
         let width = past.columns.len();
         let lengths = order.collect(comm, &own_lengths, 1);
-        Kept {
+        GridState {
             rows: order.collect(comm, &rows, width),
             width,
             broken: order.collect_ragged(comm, &own, &own_lengths, &lengths),
@@ -266,7 +266,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Break the bonds that were broken before the refinement, and new bonds that cross facets. `rows` are
-    /// the rows of [`Kept`] of the owned points. `broken` contains the ids of the neighbours j of all broken
+    /// the rows of [`GridState`] of the owned points. `broken` contains the ids of the neighbours j of all broken
     /// bonds, and `lengths` the number of these ids for each owned point. Collective.
     fn inherit(
         &mut self,
@@ -333,7 +333,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.forces.cut(|point| concerned[point], cut);
     }
 
-    /// Set the state of the owned points from the rows of [`Kept`]. Fields of [`Birth::Shared`] are
+    /// Set the state of the owned points from the rows of [`GridState`]. Fields of [`Birth::Shared`] are
     /// multiplied by the volume, because rows contain the densities of these fields. The last number of a row
     /// is the previous block, which is not part of the state.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
