@@ -54,7 +54,10 @@ pub fn simulated(
     report.append(&mut times(problem, run.stable_step, &run.steps));
     if let Some(seconds) = &run.seconds {
         let mut add = |name: &str, value: Value| report.insert(name.to_owned(), value);
-        add("seconds_per_step_on_one_rank", json!(seconds.step));
+        add(
+            "seconds_per_evaluation_on_one_rank",
+            json!(seconds.evaluation),
+        );
         add("seconds_per_row_on_one_rank", json!(seconds.row));
         add("seconds_per_output_on_one_rank", json!(seconds.outputs));
     }

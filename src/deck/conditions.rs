@@ -72,11 +72,7 @@ pub fn initials(
 
 /// Read the header of a file of initial values to find the columns. The path in the deck is relative to the
 /// folder of the deck.
-fn initial_file(
-    scope: &Scope,
-    file: &grammar::Text,
-    key: &str,
-) -> Result<problem::InitialFile> {
+fn initial_file(scope: &Scope, file: &grammar::Text, key: &str) -> Result<problem::InitialFile> {
     let error = |message: String| scope.error(file.span(), format!("{key} file: {message}"));
     let folder = scope.source.path.parent().unwrap_or("".as_ref());
     let path = folder.join(file.get_ref());

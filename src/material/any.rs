@@ -217,7 +217,12 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn force_state(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> [Lanes; D] {
+    fn force_state(
+        &self,
+        bond: &Bond<D>,
+        end: &Self::Point,
+        history: &Self::BondHistory,
+    ) -> [Lanes; D] {
         with_law!(self, law => law.force_state(bond, &first(end), &first(history)).vector(bond))
     }
 

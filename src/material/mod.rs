@@ -254,7 +254,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Return the force state T of one end, N/m⁶. A force along the bond is returned as T/|Y|, or T/|ξ| for
     /// linear laws, N/m⁷.
-    fn force_state(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
+    fn force_state(
+        &self,
+        bond: &Bond<D>,
+        end: &Self::Point,
+        history: &Self::BondHistory,
+    ) -> Self::Force;
 
     /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
     /// ends. The results of both ends are equal to the last bit, except for the sign. Laws may override

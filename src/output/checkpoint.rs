@@ -345,7 +345,7 @@ fn write_file<const D: usize>(
     let words = bytemuck::cast_slice(std::slice::from_ref(&numbers));
     file.set_attribute("/", "numbers", Attribute::Integers(words))?;
     let progress: Vec<i64> = simulation
-        .progress()
+        .progress_words()
         .iter()
         .map(|word| *word as i64)
         .collect();

@@ -58,7 +58,7 @@ impl EnergyWatch {
             let material = &problem.block(usize::from(*block)).body.material;
             stiffness[0].add(material.elastic.youngs_modulus * volume);
         }
-        let (step, stable) = (simulation.clock.step(), simulation.stable_step);
+        let (step, stable) = (simulation.clock.step(), simulation.undeformed.stable_step);
         Self {
             floor: ROUNDOFF_STRAIN * ROUNDOFF_STRAIN * reduce(comm, &mut stiffness)[0],
             input: 0.0,

@@ -99,7 +99,7 @@ impl Summary {
         Self {
             points: simulation.model.total,
             bonds: comm::total(simulation.comm, simulation.forces.directed_bonds()) / 2,
-            is_refined: simulation.refined != Refined::default(),
+            is_refined: simulation.progress.refined != Refined::default(),
             steps,
             step: simulation.clock.step(),
             evaluations: times.evaluations,

@@ -129,7 +129,7 @@ impl<'a> Job<'a> {
         simulation: &Simulation<'a, D>,
     ) -> Result<()> {
         let (clock, problem) = (&simulation.clock, self.problem);
-        let steps = choose_steps(problem, simulation.stable_step)?;
+        let steps = choose_steps(problem, simulation.undeformed.stable_step)?;
         let &[(fresh, _)] = &steps[..] else {
             return Ok(());
         };

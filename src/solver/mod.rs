@@ -11,6 +11,7 @@ pub mod model;
 pub mod motion;
 pub mod observers;
 pub mod palette_column;
+pub mod progress;
 pub mod refinement;
 pub mod repartition;
 pub mod simulation;

@@ -139,7 +139,7 @@ impl<const D: usize> Simulation<'_, D> {
             &mut || Ok(()),
         )?;
         let order = other.id_order();
-        other.steps.clone_from(&self.steps);
+        other.stages.steps.clone_from(&self.stages.steps);
         other.restore(&order, &saved)?;
         other.clock = self.clock;
         other.take_over(self);

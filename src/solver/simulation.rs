@@ -7,27 +7,27 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Damage, Initial, Problem, Stage, Time};
+use crate::problem::{Action, Condition, Damage, Initial, Problem, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
-use super::conditions::{Conditions, Here, LoadFactors, Work, apply_initials, are_finite, members};
+use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
 use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
-use super::motion::adaptive::StepControl;
 use super::motion::fields::{Needs, plastic_columns};
 use super::motion::integrator::{Integrator, integrator};
-use super::motion::load_step::{LoadStep, fictitious_density};
-use super::motion::newton::NewtonState;
+use super::motion::load_step::fictitious_density;
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
 use super::palette_column::PaletteColumn;
-use super::refinement::{self, Refined};
+use super::progress::Progress;
+use super::refinement;
 use super::size;
+use super::stages::Stages;
 use super::steps::choose_steps;
 
 /// Extra reach, as a fraction of the longest bond, in the search for ghosts and for points near pre-cracks.
@@ -36,7 +36,7 @@ const SLACK: f64 = 1e-5;
 
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
-    /// The validated deck.
+    /// The validated problem.
     pub problem: &'a Problem,
     /// Communication with the other ranks.
     pub comm: &'a dyn Communicator,
@@ -51,47 +51,38 @@ pub struct Simulation<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// Conditions of the present stage.
     pub conditions: Conditions<D>,
-    /// Factors on the loads, which an observer may change.
-    pub load_factors: LoadFactors,
-    /// Conditions of the other stages; `None` for the present stage.
-    pub(super) waiting: Vec<Option<Conditions<D>>>,
-    /// The stages of the run.
-    pub stages: Vec<Stage>,
-    /// Index of the present stage.
-    pub stage: usize,
-    /// First step (s) of each stage, and the number of steps of the stage if no bond breaks.
-    pub(super) steps: Vec<(f64, f64)>,
+    /// Rules of all stages.
+    pub stages: Stages<D>,
+    /// Quantities of the undeformed bodies.
+    pub undeformed: Undeformed,
+    /// Time and step of the present stage.
+    pub clock: Clock,
+    /// Integrator of the present stage; `None` while it advances the simulation.
+    pub(super) integrator: Option<Box<dyn Integrator<D>>>,
+    /// Progress of the run, without point data and clock.
+    pub progress: Progress,
+    /// Copy of the state before the present step; empty if steps are not rolled back.
+    pub(super) kept: Kept,
+    /// The refined grids of the bodies.
+    pub grids: Grids<'a>,
+    /// Wall-clock time by phase.
+    pub times: Times,
+    bad: Option<BadPoint>,
+}
+
+/// Quantities of the undeformed bodies.
+#[derive(Debug)]
+pub struct Undeformed {
     /// Volume of each owned point's whole family, including broken bonds, m³.
     pub family_volume: PaletteColumn,
     /// Number of bonds of the owned points that each pre-crack cuts. A bond between two owned points counts
     /// twice.
     pub cut: Vec<u64>,
-    /// Number of bonds of the owned points that are intact after pre-cracks were cut and before the forces at
-    /// time 0. A bond between two owned points counts twice. `None` if no bond can break at time 0.
-    pub intact_at_start: Option<u64>,
+    /// Number of bonds of the owned points that were intact before any bond could break. A bond between two
+    /// owned points counts twice. `None` if no bond can break at the start.
+    pub intact: Option<u64>,
     /// Stable step with the density of the materials, s.
     pub stable_step: f64,
-    /// Time and step of the present stage.
-    pub clock: Clock,
-    /// Integrator of the present stage; `None` while the integrator advances the simulation.
-    pub(super) integrator: Option<Box<dyn Integrator<D>>>,
-    /// Progress of the load step; `is_settled` is true in explicit stages.
-    pub load_step: LoadStep,
-    /// State of Newton's method.
-    pub newton: NewtonState,
-    /// State of the adaptive step.
-    pub step_control: StepControl,
-    /// Copy of the state before the present step; empty if steps are not rolled back.
-    pub(super) kept: Kept,
-    /// The refined grids of the bodies.
-    pub grids: Grids<'a>,
-    /// Totals of the refinements during the run.
-    pub refined: Refined,
-    /// Kinetic energy that changes of the density scale between stages have added, J.
-    pub density_scale_energy: f64,
-    /// Wall-clock time by phase.
-    pub times: Times,
-    bad: Option<BadPoint>,
 }
 
 /// Wall-clock time by phase on this rank.
@@ -234,24 +225,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
             forces,
             contact,
             conditions: waiting[0].take().unwrap_or_default(),
-            load_factors: LoadFactors::new(problem.conditions.len()),
-            waiting,
             integrator: Some(integrator(&stages[0].time)),
-            stages,
-            stage: 0,
-            steps,
-            family_volume,
-            cut,
-            intact_at_start,
-            stable_step: stable,
+            stages: Stages {
+                all: stages,
+                steps,
+                waiting,
+            },
+            undeformed: Undeformed {
+                family_volume,
+                cut,
+                intact: intact_at_start,
+                stable_step: stable,
+            },
             clock,
-            load_step: LoadStep::default(),
-            newton: NewtonState::default(),
-            step_control: StepControl::default(),
+            progress: Progress::new(problem.conditions.len()),
             kept: Kept::default(),
             grids: refined,
-            refined: Refined::default(),
-            density_scale_energy: 0.0,
             times: Times::default(),
             bad: None,
         };
@@ -279,7 +268,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Method and time settings of the present stage.
     pub fn time_rule(&self) -> Time {
-        self.stages[self.stage].time
+        self.stages.all[self.progress.stage].time
     }
 
     /// Make one step, or one iteration of a load step. A sequence of steps is faster with a
@@ -298,15 +287,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
-        if self.load_step.is_settled {
-            self.newton.evaluations = 0;
+        if self.progress.load_step.is_settled {
+            self.progress.newton.evaluations = 0;
         }
         let evaluations = self.times.evaluations;
         // The integrator is taken out while it advances the simulation.
         let mut integrator = (self.integrator.take()).expect("each stage has an integrator");
         let is_pending = integrator.advance(self, half_kick_pending);
         self.integrator = Some(integrator);
-        self.newton.evaluations += self.times.evaluations - evaluations;
+        self.progress.newton.evaluations += self.times.evaluations - evaluations;
         is_pending
     }
 
@@ -351,7 +340,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             part.write_bond_inputs();
             finite
         });
-        self.load_factors.end_step();
+        self.progress.load_factors.end_step();
         if !finite {
             self.note_bad(&before);
         }
@@ -363,7 +352,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     fn set_second_half(&mut self, clock: &Clock) {
         let (time, step) = (clock.time(), clock.step());
         self.conditions
-            .set_loads(time, self.load_factors.present(), false);
+            .set_loads(time, self.progress.load_factors.present(), false);
         self.conditions.set_velocities(time, step);
     }
 
@@ -458,7 +447,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// computed.
     pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
         self.conditions
-            .set_loads(time, self.load_factors.present(), all);
+            .set_loads(time, self.progress.load_factors.present(), all);
         self.walk(|part, mut here| {
             here.apply_loads(part);
             true
@@ -497,7 +486,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times = before.times;
         self.bad = before.bad;
         // Unlike the saved factors, these contain the hash of the requests.
-        self.load_factors.clone_from(&before.load_factors);
+        self.progress
+            .load_factors
+            .clone_from(&before.progress.load_factors);
     }
 
     /// Record the owned point with the smallest id whose motion, force or reaction is not finite, with the

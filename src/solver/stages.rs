@@ -1,48 +1,60 @@
 //! Stages of a run; each has a method, an end and conditions.
 
 use crate::comm::sum::{ExactSum, reduce};
+use crate::problem::Stage;
 
 use super::Simulation;
+use super::conditions::Conditions;
 use super::motion::Clock;
 use super::motion::fields::Fields;
 use super::motion::integrator::integrator;
 use super::steps::even_clock;
 
+/// Rules of the stages of a run.
+pub struct Stages<const D: usize> {
+    /// The stages of the run.
+    pub all: Vec<Stage>,
+    /// First step (s) of each stage, and the number of steps of the stage if no bond breaks.
+    pub(super) steps: Vec<(f64, f64)>,
+    /// Conditions of the other stages; `None` for the present stage.
+    pub(super) waiting: Vec<Option<Conditions<D>>>,
+}
+
 impl<const D: usize> Simulation<'_, D> {
     /// Whether the present stage has reached its end.
     pub fn is_stage_over(&self) -> bool {
-        self.clock.is_over() && self.load_step.is_settled
+        self.clock.is_over() && self.progress.load_step.is_settled
     }
 
     /// Whether the run has reached its end.
     pub fn is_over(&self) -> bool {
-        self.is_stage_over() && self.stage + 1 == self.stages.len()
+        self.is_stage_over() && self.progress.stage + 1 == self.stages.all.len()
     }
 
     /// Index of the stage that begins with the next step; `None` if the present stage continues.
     pub(super) fn next_stage(&self) -> Option<usize> {
-        let next = self.stage + 1;
-        (self.is_stage_over() && next < self.stages.len()).then_some(next)
+        let next = self.progress.stage + 1;
+        (self.is_stage_over() && next < self.stages.all.len()).then_some(next)
     }
 
     /// Return the expected number of the last step of the run. The present step length is assumed to stay the
     /// same up to the end of the stage. Each later stage is assumed to take its expected number of steps.
     pub fn last_step(&self) -> u64 {
-        let later = self.steps[self.stage + 1..].iter();
+        let later = self.stages.steps[self.progress.stage + 1..].iter();
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
     }
 
     /// A clock with the expected number of steps of the whole run, if no bond breaks.
     pub fn expected_clock(&self) -> Clock {
-        match &self.stages[..] {
+        match &self.stages.all[..] {
             [stage] if stage.time.adaptive.is_none() => self.clock,
-            _ => even_clock(self.problem, &self.steps),
+            _ => even_clock(self.problem, &self.stages.steps),
         }
     }
 
     /// Stable step with the scaled density of the present stage, s.
     pub fn scaled_stable_step(&self) -> f64 {
-        self.stable_step * self.time_rule().density_scale.sqrt()
+        self.undeformed.stable_step * self.time_rule().density_scale.sqrt()
     }
 
     /// Begin another stage at the present positions. Velocities are set to 0 at the beginning of a stage with
@@ -50,7 +62,7 @@ impl<const D: usize> Simulation<'_, D> {
     pub(super) fn begin_stage(&mut self, stage: usize) {
         let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);
-        let (step, _) = self.steps[stage];
+        let (step, _) = self.stages.steps[stage];
         self.clock.set_stage(step, self.time_rule().end);
         self.begin_adapting();
         if was_static || self.is_quasi_static() {
@@ -93,7 +105,7 @@ impl<const D: usize> Simulation<'_, D> {
             .for_each(|velocity| *velocity /= factor);
         let finite = self.apply_velocities();
         self.update_damping_power();
-        self.density_scale_energy += self.kinetic_energy() - before;
+        self.progress.density_scale_energy += self.kinetic_energy() - before;
         finite
     }
 
@@ -112,14 +124,14 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// Activate the conditions, the integrator and the density of a stage.
     pub(super) fn enter(&mut self, stage: usize) {
-        if stage != self.stage
-            && let Some(conditions) = self.waiting[stage].take()
+        if stage != self.progress.stage
+            && let Some(conditions) = self.stages.waiting[stage].take()
         {
             let others = std::mem::replace(&mut self.conditions, conditions);
-            self.waiting[self.stage] = Some(others);
+            self.stages.waiting[self.progress.stage] = Some(others);
             self.conditions.reset_temperatures();
         }
-        self.stage = stage;
+        self.progress.stage = stage;
         self.integrator = Some(integrator(&self.time_rule()));
         self.scale_density();
     }
@@ -127,7 +139,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// If the present stage has an adaptive step, start the adaptive rule with the step of the clock.
     pub(super) fn begin_adapting(&mut self) {
         if let Some(rule) = self.time_rule().adaptive {
-            self.step_control.begin(&rule, self.clock.step());
+            self.progress.step_control.begin(&rule, self.clock.step());
         }
     }
 

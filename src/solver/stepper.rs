@@ -103,7 +103,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
 
     /// Progress of the load step.
     pub fn load_step(&self) -> &LoadStep {
-        &self.simulation.load_step
+        &self.simulation.progress.load_step
     }
 
     /// Wall-clock time by phase.
@@ -128,7 +128,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
 
     /// The factors on the loads.
     pub fn load_factors(&self) -> &LoadFactors {
-        &self.simulation.load_factors
+        &self.simulation.progress.load_factors
     }
 
     /// Return the index of the load with this name, among all conditions of the problem.
@@ -164,7 +164,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
             Err(Error::input(message))
         });
         match checked {
-            Ok(load) => self.simulation.load_factors.set(load, factor),
+            Ok(load) => self.simulation.progress.load_factors.set(load, factor),
             Err(error) => self.requests.error = Some(error),
         }
     }

@@ -93,7 +93,7 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
         ghosts: ghost_share(&edges(&simulation), problem.horizon, ranks),
         cost: Cost::of(&simulation, columns, &output_points, measured),
         stable_step: simulation.scaled_stable_step(),
-        steps: choose_steps(problem, simulation.stable_step)?,
+        steps: choose_steps(problem, simulation.undeformed.stable_step)?,
         seconds: measure
             .then(|| measured_times(problem, simulation))
             .transpose()?,

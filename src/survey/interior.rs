@@ -73,7 +73,7 @@ fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
         return None;
     };
     let middle = nearest(&simulation, upper.map(|x| 0.5 * x)).own?;
-    let stable_step = simulation.stable_step;
+    let stable_step = simulation.undeformed.stable_step;
     let neighbours = energy_and_bonds(&mut simulation, middle, [[0.0; D]; D]).1;
     // The mean over both signs of the strain cancels odd terms.
     let mut energy = |gradient: [[f64; D]; D]| {

@@ -76,7 +76,7 @@ fn twice_prescribed<const D: usize>(
                 continue;
             };
             let both = |stage: &Stage| stage.acting[earlier] && stage.acting[later];
-            if !simulation.stages.iter().any(both) {
+            if !simulation.stages.all.iter().any(both) {
                 continue;
             }
             let differs = |d: &usize| {

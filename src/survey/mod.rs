@@ -80,7 +80,7 @@ impl Survey {
         stretches(problem, &mut warnings);
         let joints = joints(simulation);
         touching_joints(problem, &joints, &mut warnings);
-        let mut cuts = simulation.cut.clone();
+        let mut cuts = simulation.undeformed.cut.clone();
         comm.sum(&mut cuts);
         cuts.iter_mut().for_each(|ends| *ends /= 2);
         for (crack, _) in problem

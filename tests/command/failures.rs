@@ -386,7 +386,8 @@ fn a_run_that_blows_up_is_an_error_while_its_numbers_are_still_finite() {
     let folder = Folder::new("blow-up");
     let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
     let block = |time: &str| bar(time).replace("pmb = { density = 2, youngs_modulus = 5 }", law);
-    let stable = crate::support::simulate::<2, _>(&block("end = 1"), |it| it.stable_step);
+    let stable =
+        crate::support::simulate::<2, _>(&block("end = 1"), |it| it.undeformed.stable_step);
     let run = |share: f64, steps: u32, ranks: usize| {
         let step = share * stable;
         let time = format!("end = {}, step = {step}", step * f64::from(steps));
@@ -489,8 +490,9 @@ fn a_load_that_sets_in_is_no_blow_up() {
 #[test]
 fn a_load_that_sets_in_hides_no_blow_up() {
     let folder = Folder::new("sets-in-unstable");
-    let stable =
-        crate::support::simulate::<2, _>(&pulled(PULLS[0], "time.end = 1"), |it| it.stable_step);
+    let stable = crate::support::simulate::<2, _>(&pulled(PULLS[0], "time.end = 1"), |it| {
+        it.undeformed.stable_step
+    });
     for pull in [PULLS[0], PULLS[1], PULLS[4]] {
         let step = 3.0 * stable;
         let time = format!("time = {{ end = {}, step = {step} }}", 60.0 * step);

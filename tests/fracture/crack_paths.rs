@@ -79,7 +79,7 @@ fn a_band_is_as_long_as_a_cut_and_its_points_are_apart() {
             let place = simulation.model.position(point);
             let along = ((place[0] + 25.0) * 35.0 - (place[1] - 2.0) * 10.0) / whole;
             let within = beside(place, cut) < 0.5 * width && (0.0..whole).contains(&along);
-            let damage = snapshot.damage(&simulation.family_volume, point);
+            let damage = snapshot.damage(&simulation.undeformed.family_volume, point);
             assert_eq!(damage == 1.0, within, "{place:?}: {damage}");
         }
         crack(&mut simulation)

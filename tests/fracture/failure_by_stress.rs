@@ -400,7 +400,7 @@ fn a_pulled_bar_carries_the_strength() {
             while !simulation.is_over() {
                 simulation.advance();
                 simulation.check().unwrap_or_else(|error| panic!("{error}"));
-                if !simulation.load_step.is_settled {
+                if !simulation.progress.load_step.is_settled {
                     continue;
                 }
                 last = row(&mut history, &mut simulation).values[place].abs();

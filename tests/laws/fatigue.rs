@@ -316,7 +316,7 @@ fn growth(exponent: f64, strain: f64) -> [f64; 2] {
         loop {
             simulation.advance();
             simulation.check().unwrap_or_else(|error| panic!("{error}"));
-            if !simulation.load_step.is_settled {
+            if !simulation.progress.load_step.is_settled {
                 continue;
             }
             let values = row(&mut observer, &mut simulation).values;

@@ -169,7 +169,7 @@ fn damage_counts_the_stiffness_that_is_lost() {
                 Snapshot::new(&mut simulation),
                 Snapshot::without_energies(&mut simulation),
             ] {
-                let found = snapshot.damage(&simulation.family_volume, 0);
+                let found = snapshot.damage(&simulation.undeformed.family_volume, 0);
                 assert!((found - lost).abs() < 1e-14, "{stretch}: {found}");
                 assert_eq!(snapshot.intact(), if lost < 1.0 { 2 } else { 0 });
             }
@@ -254,7 +254,7 @@ fn pull_in_two(curve: &str, method: &str) -> [f64; 2] {
         while !simulation.is_over() {
             simulation.advance();
             simulation.check().unwrap_or_else(|error| panic!("{error}"));
-            if !simulation.load_step.is_settled {
+            if !simulation.progress.load_step.is_settled {
                 continue;
             }
             let row = row(&mut observer, &mut simulation);

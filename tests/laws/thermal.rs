@@ -269,7 +269,7 @@ fn temperatures_follow_conditions_and_stages() {
             (0..5).for_each(|_| simulation.advance());
             let time = simulation.clock.time();
             look(&simulation, &|x| 100.0 + x * time);
-            while simulation.stage == 0 {
+            while simulation.progress.stage == 0 {
                 simulation.advance();
             }
             look(&simulation, &|_| 20.0);

@@ -26,7 +26,7 @@ fn ends(mut simulation: Simulation<'_, 3>, names: &[&str]) -> [Vec<f64>; 2] {
         simulation.advance();
         simulation.check().unwrap_or_else(|error| panic!("{error}"));
         let is_half = simulation.clock.time() >= 0.5 * simulation.clock.end();
-        if is_half && simulation.load_step.is_settled && middle.is_none() {
+        if is_half && simulation.progress.load_step.is_settled && middle.is_none() {
             middle = Some(look(&mut simulation));
         }
     }
@@ -48,7 +48,7 @@ fn series<const D: usize>(
         simulation.advance();
         simulation.check().unwrap_or_else(|error| panic!("{error}"));
         let is_due = simulation.clock.number().is_multiple_of(every) || simulation.is_over();
-        if simulation.load_step.is_settled && is_due {
+        if simulation.progress.load_step.is_settled && is_due {
             let values = row(&mut observer, &mut simulation).values;
             rows.push(places.iter().map(|place| values[*place]).collect());
         }

@@ -31,7 +31,7 @@ fn look(observer: &mut HistoryObserver, simulation: &mut Simulation<2>, notch: &
     let snapshot = Snapshot::new(simulation);
     let row = observer.row(simulation, &snapshot).values;
     let of = |name: &str| row[column(observer, name)];
-    let damage = |point: usize| snapshot.damage(&simulation.family_volume, point);
+    let damage = |point: usize| snapshot.damage(&simulation.undeformed.family_volume, point);
     let damaged = (0..simulation.model.owned())
         .filter(|point| damage(*point) > 0.35 && !notch.contains(point))
         .map(|point| simulation.model.position(point))
@@ -57,7 +57,7 @@ fn a_coarse_plate_cracks_from_the_tip_of_its_notch() {
     simulate_input::<2, _>("pmma_mixed_mode", &parameters, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let snapshot = Snapshot::new(&mut simulation);
-        let damage = |point: usize| snapshot.damage(&simulation.family_volume, point);
+        let damage = |point: usize| snapshot.damage(&simulation.undeformed.family_volume, point);
         let points = 0..simulation.model.owned();
         let notch: Vec<usize> = points.filter(|point| damage(*point) > 0.35).collect();
         assert!(notch.len() > 10);

@@ -302,7 +302,7 @@ fn rattled(dimension: &str, step: f64) -> String {
 #[test]
 fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
     fn check<const D: usize>(dimension: &str) {
-        let stable = simulate::<D, _>(&rattled(dimension, 0.01), |s| s.stable_step);
+        let stable = simulate::<D, _>(&rattled(dimension, 0.01), |s| s.undeformed.stable_step);
         let (usual, growth) =
             simulate::<D, _>(&rattled(dimension, 0.98 * stable), |mut simulation| {
                 let stiffness = simulation.forces.stiffness(&simulation.model);

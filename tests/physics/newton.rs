@@ -211,7 +211,7 @@ fn goes_on_between_load_steps_and_within_them_to_the_same_bits() {
             while !simulation.is_over() {
                 simulation.advance();
                 simulation.check().unwrap_or_else(|error| panic!("{error}"));
-                settled.push(simulation.load_step.is_settled);
+                settled.push(simulation.progress.load_step.is_settled);
                 if settled.len() == stop {
                     let (order, saved) = state(&simulation);
                     simulation = Simulation::new(&problem, comm).unwrap();
@@ -356,7 +356,7 @@ fn a_torn_plate_breaks_as_in_a_relaxation() {
             while !simulation.is_over() {
                 simulation.advance();
                 simulation.check().unwrap_or_else(|error| panic!("{error}"));
-                if simulation.load_step.is_settled {
+                if simulation.progress.load_step.is_settled {
                     rows.push(row(&mut observer, &mut simulation).values);
                 }
             }

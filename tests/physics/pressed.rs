@@ -16,7 +16,7 @@ fn load_steps<const D: usize>(deck: &str, names: &[&str]) -> Vec<Vec<f64>> {
         while !simulation.is_over() {
             simulation.advance();
             simulation.check().unwrap_or_else(|error| panic!("{error}"));
-            if simulation.load_step.is_settled {
+            if simulation.progress.load_step.is_settled {
                 let values = row(&mut observer, &mut simulation).values;
                 rows.push(places.iter().map(|place| values[*place]).collect());
             }

@@ -321,10 +321,10 @@ fn are_the_same(text: &str, least: [u64; 2]) {
                     fields.velocity[1][k],
                     freed[k],
                     snapshot.stored.energy[k],
-                    snapshot.damage(&simulation.family_volume, k),
+                    snapshot.damage(&simulation.undeformed.family_volume, k),
                     model.volume[k],
                     simulation.clock.time(),
-                    simulation.refined.energy,
+                    simulation.progress.refined.energy,
                 ];
                 (model.ids[k], numbers.map(f64::to_bits))
             };

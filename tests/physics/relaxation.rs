@@ -16,7 +16,7 @@ use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
 /// Advance by one complete load step.
 fn load_step<const D: usize>(simulation: &mut Simulation<D>) {
     simulation.advance();
-    while !simulation.load_step.is_settled {
+    while !simulation.progress.load_step.is_settled {
         simulation.advance();
         simulation.check().unwrap_or_else(|error| panic!("{error}"));
     }
@@ -661,7 +661,7 @@ fn goes_on_from_within_a_load_step_to_the_same_bits() {
             for _ in 0..stop {
                 simulation.advance();
             }
-            let settled = simulation.load_step.is_settled;
+            let settled = simulation.progress.load_step.is_settled;
             if stop > 0 {
                 let (order, saved) = state(&simulation);
                 simulation = Simulation::new(&problem, comm).unwrap();

@@ -107,7 +107,7 @@ fn largest_frequency<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
 fn steps<const D: usize>(system: &System) -> (f64, f64) {
     simulate::<D, _>(&system.at_rest(), |mut simulation| {
         let limit = 2.0 / largest_frequency(&mut simulation);
-        (simulation.stable_step, limit)
+        (simulation.undeformed.stable_step, limit)
     })
 }
 

@@ -52,7 +52,10 @@ fn see(deck: &str) -> Seen {
         while !(simulation.is_stage_over() && simulation.clock.number() > 0) {
             simulation.advance();
         }
-        assert_eq!((simulation.stage, simulation.clock.time()), (0, 1.0));
+        assert_eq!(
+            (simulation.progress.stage, simulation.clock.time()),
+            (0, 1.0)
+        );
         let displacement = simulation.fields.displacement[0][last];
         let mut seen = Seen {
             preload: energies(&mut simulation),

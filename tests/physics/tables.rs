@@ -109,7 +109,7 @@ fn load_steps_follow_a_table() {
             let mut settled = 0;
             while !simulation.is_over() {
                 simulation.advance();
-                if !simulation.load_step.is_settled {
+                if !simulation.progress.load_step.is_settled {
                     continue;
                 }
                 settled += 1;

@@ -313,7 +313,9 @@ impl<const D: usize> Kernel<D> for EnergyRate {
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
         let ((rate_i, numbers), rate_j) = (group.own, &group.far);
-        let force: [Lanes; D] = self.law.force_state(&group.bond, numbers, &group.history[0]);
+        let force: [Lanes; D] = self
+            .law
+            .force_state(&group.bond, numbers, &group.history[0]);
         let mut power = Lanes::splat(0.0);
         for d in 0..D {
             power += force[d] * (rate_j[d] - rate_i[d]);

@@ -106,7 +106,8 @@ impl<const D: usize> Loaded<D> {
         for (k, force) in self.force.iter_mut().enumerate() {
             let whole = load.on(self.positions[k]);
             let fraction = self.fractions.as_ref().map(|fractions| fractions[k]);
-            *force = whole.map(|component| fraction.map_or(component, |fraction| fraction * component));
+            *force =
+                whole.map(|component| fraction.map_or(component, |fraction| fraction * component));
         }
     }
 

@@ -110,7 +110,7 @@ impl<const D: usize> Simulation<'_, D> {
             let felt = self.contact.as_ref().filter(|contact| contact.is_felt());
             let limit = felt.and_then(|_| self.contact_limit());
             let limit = limit.unwrap_or(f64::INFINITY);
-            let wanted = self.step_control.step.min(limit);
+            let wanted = self.progress.step_control.step.min(limit);
             let is_last = left > 0.0 && left < (1.0 + UP_TO_ROUNDING) * wanted;
             let size = if is_last { left } else { wanted };
             if size != self.clock.step() {
@@ -121,7 +121,11 @@ impl<const D: usize> Simulation<'_, D> {
             let broken = self.forces.broken().iter().map(|broken| broken.count);
             let mut most = [broken.max().unwrap_or(0) as f64];
             self.comm.max(&mut most);
-            if !self.step_control.undoes(rule, size, most[0] as u64) {
+            if !self
+                .progress
+                .step_control
+                .undoes(rule, size, most[0] as u64)
+            {
                 break;
             }
             self.undo(&kept);

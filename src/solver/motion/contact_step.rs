@@ -19,7 +19,9 @@ impl<const D: usize> Simulation<'_, D> {
             return None;
         }
         let (contact, limit) = (self.contact.as_ref()?, self.contact_limit()?);
-        let most = self.steps[self.stage].0.min(CONTACT_RESERVE * limit);
+        let most = self.stages.steps[self.progress.stage]
+            .0
+            .min(CONTACT_RESERVE * limit);
         let step = self.clock.step();
         let is_too_long = contact.is_felt() && step > limit;
         let is_too_short = contact.is_calm() && step < most;
@@ -46,7 +48,8 @@ impl<const D: usize> Simulation<'_, D> {
         let Some(limit) = self.contact_limit() else {
             return;
         };
-        let could_be_longer = self.clock.step() < CALM_SHARE * limit.min(self.steps[self.stage].0);
+        let could_be_longer =
+            self.clock.step() < CALM_SHARE * limit.min(self.stages.steps[self.progress.stage].0);
         if let Some(contact) = &mut self.contact {
             contact.count_calm(could_be_longer);
         }

@@ -44,7 +44,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// If a piece is loaded along an axis in which no support holds it. Of several such pieces, the message
     /// names the one with the smallest point id.
     pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
-        for stage in 0..self.stages.len() {
+        for stage in 0..self.stages.all.len() {
             let found = self.at_load_steps(stage, |simulation, pieces, time| {
                 let unheld = simulation.unheld_load(pieces)?;
                 let component = unheld.component;
@@ -86,11 +86,11 @@ impl<const D: usize> Simulation<'_, D> {
         stage: usize,
         mut look: impl FnMut(&Self, &Pieces<D>, f64) -> Option<T>,
     ) -> Option<T> {
-        let Time { end, method, .. } = self.stages[stage].time;
+        let Time { end, method, .. } = self.stages.all[stage].time;
         let load_steps = method.load_steps().filter(|_| self.contact.is_none())?;
         let begin = stage
             .checked_sub(1)
-            .map_or(0.0, |before| self.stages[before].time.end);
+            .map_or(0.0, |before| self.stages.all[before].time.end);
         let first = begin + (end - begin) / load_steps as f64;
         self.set_stage_loads(stage, first);
         let mut result = None;
@@ -135,7 +135,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// such a piece are below the round-off limit, so its positions would count as an equilibrium.
     /// Collective.
     pub(super) fn is_drifting(&mut self) -> bool {
-        self.load_step.residual == 0.0
+        self.progress.load_step.residual == 0.0
             && self.contact.is_none()
             && self.conditions.have_loads()
             && self.check_pieces_are_held("").is_err()

@@ -181,13 +181,13 @@ impl<const D: usize> Simulation<'_, D> {
         self.clock.advance();
         let (time, step) = (self.clock.time(), self.clock.step());
         self.apply_displacements(time, step);
-        self.load_factors.begin_load_step();
+        self.progress.load_factors.begin_load_step();
         self.apply_loads(time, false);
         if let Some(contact) = &mut self.contact {
             contact.place_rigid(time);
         }
-        self.load_step = LoadStep {
-            scale: self.load_step.scale,
+        self.progress.load_step = LoadStep {
+            scale: self.progress.load_step.scale,
             is_settled: false,
             ..LoadStep::default()
         };
@@ -232,14 +232,14 @@ impl<const D: usize> Simulation<'_, D> {
         });
         let squares = reduce(self.comm, &mut squares);
         let squares = std::array::from_fn(|k| squares[k]);
-        self.load_step.set_residual(squares);
+        self.progress.load_step.set_residual(squares);
         f64::sqrt(squares[0])
     }
 
     /// Time increment of the bond history at the next equilibrium (s). The history advances once per load
     /// step, even if the load step has several equilibria.
     fn time_to_advance(&self) -> f64 {
-        if self.load_step.has_broken {
+        if self.progress.load_step.has_broken {
             0.0
         } else {
             self.clock.step()
@@ -249,7 +249,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Bond update for a force evaluation that does not change the state. During a load step, bonds have the
     /// history for an equilibrium at the present positions.
     pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
-        if self.load_step.is_settled {
+        if self.progress.load_step.is_settled {
             BondUpdate::None
         } else {
             BondUpdate::Trial(self.time_to_advance())
@@ -261,7 +261,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// and the reactions must be recomputed. Collective.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
-        let is_first = !self.load_step.has_broken;
+        let is_first = !self.progress.load_step.has_broken;
         self.evaluate(BondUpdate::Step(self.time_to_advance()));
         let breaks = total(self.comm, self.forces.broken().len() as u64) > 0;
         match (is_first, breaks) {
@@ -271,12 +271,12 @@ impl<const D: usize> Simulation<'_, D> {
             (false, false) => self.add_work_since_equilibrium(Work::LastEquilibrium),
         }
         if breaks {
-            self.load_step.has_broken = true;
-            self.load_step.since_breaking = 0;
+            self.progress.load_step.has_broken = true;
+            self.progress.load_step.since_breaking = 0;
         } else {
-            self.load_factors.record_equilibrium();
+            self.progress.load_factors.record_equilibrium();
         }
-        self.load_step.is_settled = !breaks;
+        self.progress.load_step.is_settled = !breaks;
         breaks
     }
 
@@ -300,7 +300,7 @@ impl<const D: usize> Simulation<'_, D> {
         reactions.merge(&self.rigid_forces());
         let norms = reduce(self.comm, &mut [loads, reactions]);
         let scale = norms.into_iter().map(f64::sqrt).sum();
-        self.load_step.scale = self.load_step.scale.max(scale);
+        self.progress.load_step.scale = self.progress.load_step.scale.max(scale);
     }
 
     /// Check that the load step has not failed. Collective.
@@ -309,18 +309,21 @@ impl<const D: usize> Simulation<'_, D> {
     /// If the load step has failed. The message names a piece that has loads but no supports, or the residual
     /// if there is no such piece.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
-        if !self.load_step.has_failed {
+        if !self.progress.load_step.has_failed {
             return Ok(());
         }
-        let mut failure = self.load_step.failure(self.clock.time());
-        if self.newton.halvings > 0 {
-            failure += &format!(", the load step halved {} times", self.newton.halvings);
+        let mut failure = self.progress.load_step.failure(self.clock.time());
+        if self.progress.newton.halvings > 0 {
+            failure += &format!(
+                ", the load step halved {} times",
+                self.progress.newton.halvings
+            );
         }
         // Contact can also support pieces.
         if self.contact.is_none() {
             self.check_pieces_are_held(&failure)?;
         }
-        let residual = self.load_step.residual;
+        let residual = self.progress.load_step.residual;
         let remedy = self.time_rule().method.remedy();
         let cause = if residual.is_finite() {
             format!(
@@ -384,7 +387,7 @@ impl<const D: usize> Simulation<'_, D> {
         let displacement = self.fields.equilibrium_displacement.take();
         let reaction = self.fields.equilibrium_reaction.take();
         if let Some(displacement) = &displacement {
-            let factors = self.load_factors.at_equilibrium();
+            let factors = self.progress.load_factors.at_equilibrium();
             self.conditions.set_loads(then, factors, true);
             self.walk(|part, mut here| {
                 let reaction = reaction.as_ref().map(|field| part.of(field));
@@ -392,7 +395,7 @@ impl<const D: usize> Simulation<'_, D> {
                 here.remember(part.of(displacement), reaction);
                 true
             });
-            let factors = self.load_factors.present();
+            let factors = self.progress.load_factors.present();
             self.conditions.set_loads(now, factors, true);
         }
         self.walk(|part, mut here| {

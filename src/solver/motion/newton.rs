@@ -142,14 +142,14 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
         let (start, forces) = (Instant::now(), simulation.times.forces.whole());
         let rule = self.rule;
         let vectors = (self.vectors).get_or_insert_with(|| Vectors::new(simulation));
-        if simulation.load_step.is_settled {
+        if simulation.progress.load_step.is_settled {
             vectors.begin_load_step(simulation, &rule);
         } else {
             vectors.iterate(simulation, &rule);
         }
         if simulation.is_drifting() {
             vectors.bisect_or_fail(simulation, &rule);
-        } else if simulation.load_step.residual <= rule.tolerance {
+        } else if simulation.progress.load_step.residual <= rule.tolerance {
             if simulation.break_or_settle() {
                 vectors.is_stale = true;
                 simulation.evaluate_at_rest();
@@ -157,8 +157,8 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
             } else {
                 simulation.end_halves();
             }
-        } else if simulation.load_step.residual.is_nan()
-            || simulation.load_step.since_breaking >= rule.max_iterations
+        } else if simulation.progress.load_step.residual.is_nan()
+            || simulation.progress.load_step.since_breaking >= rule.max_iterations
         {
             vectors.bisect_or_fail(simulation, &rule);
         }
@@ -216,7 +216,8 @@ impl<const D: usize> Vectors<D> {
 
     /// Begin a load step, and compute the residual at the predicted positions. Collective.
     fn begin_load_step(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
-        let follows_the_last = !simulation.clock.is_new_size() && !simulation.load_step.has_broken;
+        let follows_the_last =
+            !simulation.clock.is_new_size() && !simulation.progress.load_step.has_broken;
         self.refresh(simulation);
         simulation.begin_load_step(follows_the_last);
         if follows_the_last {
@@ -244,21 +245,21 @@ impl<const D: usize> Vectors<D> {
         self.note_force(simulation);
         self.multiply(simulation);
         add(&mut self.residual, -1.0, &self.product);
-        let scale = simulation.load_step.scale;
+        let scale = simulation.progress.load_step.scale;
         let linear = self.solve(simulation, rule.tolerance * scale);
         move_from(simulation, &self.base, 1.0, &self.correction);
         let (time, step) = (simulation.clock.time(), simulation.clock.step());
         simulation.apply_displacements(time, step);
         simulation.evaluate_at_rest();
         let force = simulation.find_residual();
-        simulation.newton.adapt(linear, force);
+        simulation.progress.newton.adapt(linear, force);
     }
 
     /// Make one Newton iteration: solve K x = f, move the points along x by the line search, and adapt η.
     /// Collective.
     fn iterate(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
-        simulation.load_step.iterations += 1;
-        simulation.load_step.since_breaking += 1;
+        simulation.progress.load_step.iterations += 1;
+        simulation.progress.load_step.since_breaking += 1;
         self.refresh(simulation);
         let owned = simulation.model.owned();
         for d in 0..D {
@@ -266,10 +267,10 @@ impl<const D: usize> Vectors<D> {
             self.correction[d].fill(0.0);
         }
         self.note_force(simulation);
-        let scale = self.residual_norm(simulation) / simulation.load_step.residual;
+        let scale = self.residual_norm(simulation) / simulation.progress.load_step.residual;
         let linear = self.solve(simulation, rule.tolerance * scale);
         let force = self.search(simulation, rule);
-        simulation.newton.adapt(linear, force);
+        simulation.progress.newton.adapt(linear, force);
     }
 
     /// Store the total forces at the base u. Set the residual of the linear problem to these forces, and to 0
@@ -294,7 +295,7 @@ impl<const D: usize> Vectors<D> {
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
-        let wanted = simulation.newton.forcing * first;
+        let wanted = simulation.progress.newton.forcing * first;
         let wanted = wanted.max(LINEAR_TOLERANCE_SHARE * allowed);
         // Inner product of the residual and the preconditioned residual at the last direction, and the step
         // length along this direction.
@@ -405,7 +406,7 @@ impl<const D: usize> Vectors<D> {
             let force = simulation.find_residual();
             let power = self.power(simulation);
             let is_good = power.abs() <= LINE_SEARCH_TOLERANCE * at_base
-                || simulation.load_step.residual <= rule.tolerance;
+                || simulation.progress.load_step.residual <= rule.tolerance;
             if is_good || place == MAX_LINE_SEARCH_STEPS || at_base <= 0.0 {
                 return force;
             }
@@ -448,7 +449,7 @@ impl<const D: usize> Vectors<D> {
         }
         let (model, forces) = (&simulation.model, &mut simulation.forces);
         let owned = model.owned();
-        let family = &simulation.family_volume;
+        let family = &simulation.undeformed.family_volume;
         let mut intact = forces.intact_families(model).volume;
         let shares = intact.par_iter_mut().with_min_len(CHUNK).enumerate();
         shares.for_each(|(point, share)| {
@@ -473,10 +474,10 @@ impl<const D: usize> Vectors<D> {
                 };
             });
         }
-        if simulation.newton.diagonal.is_nan() {
+        if simulation.progress.newton.diagonal.is_nan() {
             self.measure_diagonal(simulation);
         }
-        let diagonal = simulation.newton.diagonal;
+        let diagonal = simulation.progress.newton.diagonal;
         let columns = self.inverse_diagonal.iter_mut().flatten();
         columns.for_each(|inverse| *inverse /= diagonal);
         let problem = simulation.problem;
@@ -533,7 +534,7 @@ impl<const D: usize> Vectors<D> {
         });
         let both = reduce(simulation.comm, &mut { both });
         let diagonal = both[0] / both[1];
-        simulation.newton.diagonal = if diagonal > 0.0 && diagonal.is_finite() {
+        simulation.progress.newton.diagonal = if diagonal > 0.0 && diagonal.is_finite() {
             diagonal
         } else {
             1.0
@@ -544,16 +545,16 @@ impl<const D: usize> Vectors<D> {
 
     /// Repeat the load step with half its size if this is allowed, otherwise mark it as failed. Collective.
     fn bisect_or_fail(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
-        let can_be_halved = !simulation.load_step.has_broken
-            && simulation.newton.halvings < rule.max_halvings
+        let can_be_halved = !simulation.progress.load_step.has_broken
+            && simulation.progress.newton.halvings < rule.max_halvings
             && simulation.check_pieces_are_held("").is_ok();
         if can_be_halved {
             simulation.return_to_equilibrium();
             self.begin_load_step(simulation, rule);
             return;
         }
-        simulation.load_step.has_failed = true;
-        if simulation.load_step.residual.is_nan() {
+        simulation.progress.load_step.has_failed = true;
+        if simulation.progress.load_step.residual.is_nan() {
             let clock = simulation.clock;
             simulation.note_bad(&clock);
         }
@@ -589,18 +590,18 @@ impl<const D: usize> Simulation<'_, D> {
             reaction.clone_from(equilibrium);
         }
         self.clock.retreat(0.5 * self.clock.step());
-        self.newton.halvings += 1;
-        self.newton.left *= 2;
+        self.progress.newton.halvings += 1;
+        self.progress.newton.left *= 2;
     }
 
     /// Count a finished load step. At the end of the original load step, restore the original size.
     fn end_halves(&mut self) {
-        self.newton.left -= 1;
-        if self.newton.left > 0 {
+        self.progress.newton.left -= 1;
+        if self.progress.newton.left > 0 {
             return;
         }
-        self.newton.left = 1;
-        let halvings = std::mem::take(&mut self.newton.halvings);
+        self.progress.newton.left = 1;
+        let halvings = std::mem::take(&mut self.progress.newton.halvings);
         if halvings > 0 && !self.clock.is_over() {
             let whole = libm::scalbn(self.clock.step(), halvings as i32);
             self.clock.set_step(whole);

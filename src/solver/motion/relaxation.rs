@@ -58,7 +58,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// the next one. Collective.
     fn relax(&mut self, rule: &Relaxation) {
         let (start, forces) = (Instant::now(), self.times.forces.whole());
-        let before = if self.load_step.is_settled {
+        let before = if self.progress.load_step.is_settled {
             self.begin_load_step(true);
             self.stop();
             None
@@ -70,34 +70,34 @@ impl<const D: usize> Simulation<'_, D> {
         let forces = self.times.forces.whole() - forces;
         self.times.motion += start.elapsed().saturating_sub(forces);
         if self.is_drifting() {
-            self.load_step.has_failed = true;
-        } else if self.load_step.residual <= rule.tolerance {
+            self.progress.load_step.has_failed = true;
+        } else if self.progress.load_step.residual <= rule.tolerance {
             if self.break_or_settle() {
                 self.stop();
                 self.evaluate_at_rest();
                 self.look(None);
             }
-        } else if self.load_step.residual.is_nan() {
-            self.load_step.has_failed = true;
+        } else if self.progress.load_step.residual.is_nan() {
+            self.progress.load_step.has_failed = true;
             let clock = self.clock;
             self.note_bad(&clock);
-        } else if self.load_step.since_breaking >= rule.iterations {
-            self.load_step.has_failed = true;
+        } else if self.progress.load_step.since_breaking >= rule.iterations {
+            self.progress.load_step.has_failed = true;
         }
     }
 
     /// Restart the motion from rest.
     fn stop(&mut self) {
-        self.load_step.damping = f64::NAN;
+        self.progress.load_step.damping = f64::NAN;
         let velocity = self.fields.relaxation_velocity.iter_mut().flatten();
         velocity.for_each(|component| component.fill(0.0));
     }
 
     /// Move the points by one iteration. Returns the sums of the new velocities and the old forces.
     fn drift(&mut self) -> Before {
-        self.load_step.iterations += 1;
-        self.load_step.since_breaking += 1;
-        let damping = self.load_step.damping;
+        self.progress.load_step.iterations += 1;
+        self.progress.load_step.since_breaking += 1;
+        let damping = self.progress.load_step.damping;
         let (model, fields) = (&self.model, &mut self.fields);
         // The velocity is taken out of `fields` while it is written.
         let mut velocity = fields.relaxation_velocity.take();
@@ -166,11 +166,12 @@ impl<const D: usize> Simulation<'_, D> {
         let mut all = [power, old, inertia, free, loads, reactions, stiffness];
         let all = reduce(self.comm, &mut all);
         let [power, old, inertia] = [all[0], all[1], all[2]];
-        self.load_step
+        self.progress
+            .load_step
             .set_residual([all[3], all[4], all[5], all[6]]);
         if inertia > 0.0 {
             let quotient = ((old - power) / inertia).max(0.0);
-            self.load_step.damping = (2.0 * quotient.sqrt()).min(MOST_DAMPING);
+            self.progress.load_step.damping = (2.0 * quotient.sqrt()).min(MOST_DAMPING);
         }
     }
 }

@@ -5,15 +5,8 @@
 use crate::comm::{IdOrder, agree};
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
-use crate::solver::conditions::LoadFactors;
-use crate::solver::contact::ContactState;
-use crate::solver::refinement::Refined;
 
-use super::Clock;
-use super::adaptive::StepControl;
 use super::fields::{Description, NEWLY_BROKEN_OF_FURTHER};
-use super::load_step::LoadStep;
-use super::newton::NewtonState;
 
 /// The state of the points in this rank's range of ids.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,75 +42,7 @@ pub struct SavedBonds {
 /// missing in a checkpoint, because a restart may change the further results.
 const NEWLY_BROKEN_OF: &str = "newly_broken_of_";
 
-/// Words of the progress that remain to be decoded.
-struct Words<'a>(&'a [u64]);
-
-impl<'a> Words<'a> {
-    /// Take the next `N` words.
-    fn next<const N: usize>(&mut self) -> [u64; N] {
-        let (words, rest) = self.0.split_first_chunk().expect("enough words");
-        self.0 = rest;
-        *words
-    }
-
-    /// Take the next `count` words.
-    fn split(&mut self, count: usize) -> &'a [u64] {
-        let (words, rest) = self.0.split_at(count);
-        self.0 = rest;
-        words
-    }
-}
-
 impl<const D: usize> Simulation<'_, D> {
-    /// Encode the progress of the run, which does not include point data.
-    pub fn progress(&self) -> Vec<u64> {
-        let mut words = self.progress_without_factors();
-        words.extend(self.load_factors.words());
-        words
-    }
-
-    /// Encode the progress except the load factors, whose number of words depends on their values.
-    fn progress_without_factors(&self) -> Vec<u64> {
-        let mut words = vec![self.stage as u64];
-        words.extend(self.clock.words());
-        words.extend(self.step_control.words());
-        words.extend(self.refined.words());
-        if self.problem.changes_density_scale() {
-            words.push(self.density_scale_energy.to_bits());
-        }
-        words.extend(self.load_step.words());
-        if self.problem.has_newton() {
-            words.extend(self.newton.words());
-        }
-        if let Some(contact) = &self.contact {
-            words.extend(contact.state().words());
-        }
-        words
-    }
-
-    /// Restore the progress from the words of [`Self::progress`].
-    pub(in crate::solver) fn continue_from(&mut self, progress: &[u64]) {
-        let mut words = Words(progress);
-        let [stage] = words.next();
-        self.enter(stage as usize);
-        self.clock = Clock::of_words(words.next(), self.time_rule().end);
-        self.step_control = StepControl::of_words(words.next());
-        self.refined = Refined::of_words(words.next());
-        if self.problem.changes_density_scale() {
-            let [energy] = words.next();
-            self.density_scale_energy = f64::from_bits(energy);
-        }
-        self.load_step = LoadStep::of_words(words.next());
-        if self.problem.has_newton() {
-            self.newton = NewtonState::of_words(words.next());
-        }
-        if let Some(contact) = &mut self.contact {
-            let count = contact.state().words().len();
-            contact.restore(&ContactState::of_words(words.split(count)));
-        }
-        self.load_factors = LoadFactors::of_words(words.0, self.problem.conditions.len());
-    }
-
     /// Name of a column of the state in checkpoints.
     fn column_name(&self, field: Description, component: usize) -> String {
         if field.name == NEWLY_BROKEN_OF_FURTHER {
@@ -140,7 +65,7 @@ impl<const D: usize> Simulation<'_, D> {
         Saved {
             columns: self.saved_columns(order).collect(),
             bonds: self.saved_bonds(order),
-            progress: self.progress(),
+            progress: self.progress_words(),
         }
     }
 
@@ -222,7 +147,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
         let expected = self.progress_without_factors().len();
         let factors = saved.progress.len().checked_sub(expected);
-        if factors != Some(0) && factors != Some(self.load_factors.word_count()) {
+        if factors != Some(0) && factors != Some(self.progress.load_factors.word_count()) {
             return error("has another number of words for the progress of the run".to_owned());
         }
         Ok(())

@@ -34,7 +34,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.forces.keep(&mut kept.bonds);
         kept.load_factors.clear();
         kept.load_factors
-            .extend_from_slice(self.load_factors.present());
+            .extend_from_slice(self.progress.load_factors.present());
         kept.contact = self.contact.as_ref().map(Contact::state);
     }
 
@@ -52,7 +52,7 @@ impl<const D: usize> Simulation<'_, D> {
         if let (Some(contact), Some(state)) = (&mut self.contact, &kept.contact) {
             contact.undo(state, &self.model, &self.forces);
         }
-        self.load_factors.undo(&kept.load_factors);
+        self.progress.load_factors.undo(&kept.load_factors);
         // External forces are not part of the copy, so evaluate them at the restored time.
         self.apply_loads(clock.time(), true);
     }

@@ -206,7 +206,7 @@ impl CrackSurface {
         // Points outside the set have NaN.
         let mut damage = vec![f64::NAN; simulation.model.volume.len()];
         for point in self.points.iter().map(|point| *point as usize) {
-            damage[point] = snapshot.damage(&simulation.family_volume, point);
+            damage[point] = snapshot.damage(&simulation.undeformed.family_volume, point);
         }
         simulation.forces.bring(simulation.comm, &mut damage);
         let in_set = |damage: f64| (!damage.is_nan()).then_some(damage);

@@ -24,7 +24,7 @@ impl Cracked {
         };
         let threshold = simulation.problem.history.damage_threshold;
         for point in 0..simulation.model.owned() {
-            if snapshot.damage(&simulation.family_volume, point) > threshold {
+            if snapshot.damage(&simulation.undeformed.family_volume, point) > threshold {
                 let position = simulation.model.position(point);
                 cracked.points += 1;
                 for d in 0..3 {

@@ -257,7 +257,7 @@ impl HistoryObserver {
         simulation: &Simulation<'_, D>,
         snapshot: &Snapshot,
     ) -> Vec<(&str, Vec<Branch>)> {
-        let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        let damage = |point| snapshot.damage(&simulation.undeformed.family_volume, point);
         self.cracks
             .iter()
             .map(|crack| (crack.name(), crack.branches(simulation, damage)))
@@ -324,7 +324,7 @@ impl HistoryObserver {
             let all = simulation.forces.singular(model);
             all.iter().filter(|value| **value > 0.0).count() as u64
         });
-        let at_start = simulation.intact_at_start.unwrap_or(intact);
+        let at_start = simulation.undeformed.intact.unwrap_or(intact);
         let mut counts = [intact, cracked.points, at_start, singular.unwrap_or(0)];
         comm.sum(&mut counts);
         let [intact, cracked_points, at_start, singular_points] = counts;
@@ -352,13 +352,13 @@ impl HistoryObserver {
             dissipated,
             error: energy
                 - first_energy
-                - simulation.refined.energy
-                - simulation.density_scale_energy,
+                - simulation.progress.refined.energy
+                - simulation.progress.density_scale_energy,
         };
         // Refinements add intact bonds, and remove some if horizons become shorter.
-        let there_were = first_intact as i64 + simulation.refined.bonds;
+        let there_were = first_intact as i64 + simulation.progress.refined.bonds;
         let broken = (there_were - intact as i64) as u64 / 2;
-        let most_broken = std::mem::take(&mut simulation.step_control.most_broken);
+        let most_broken = std::mem::take(&mut simulation.progress.step_control.most_broken);
         let support_forces = sums[directed].chunks_exact(D).zip(&self.support_forces);
         let support_forces = support_forces.map(|(force, (_, direction))| {
             let products = force.iter().zip(direction).map(|(f, d)| f * d);
@@ -376,7 +376,7 @@ impl HistoryObserver {
             [surface.area, surface.reach]
         });
         let surfaces: Vec<[f64; 2]> = surfaces.collect();
-        let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        let damage = |point| snapshot.damage(&simulation.undeformed.family_volume, point);
         let cracks = self.cracks.iter().map(|crack| {
             let branches = crack.branches(simulation, damage);
             [centre_line::length(&branches), branches.len() as f64]
@@ -394,13 +394,13 @@ impl HistoryObserver {
             cracked_points,
             cracked_extent: [lower, upper],
             singular_points,
-            load_step: simulation.load_step,
-            force_evaluations: simulation.newton.evaluations,
-            undone_steps: simulation.step_control.undone,
+            load_step: simulation.progress.load_step,
+            force_evaluations: simulation.progress.newton.evaluations,
+            undone_steps: simulation.progress.step_control.undone,
             most_broken,
-            density_scale_energy: simulation.density_scale_energy,
+            density_scale_energy: simulation.progress.density_scale_energy,
             points: simulation.model.total,
-            refinement_energy: simulation.refined.energy,
+            refinement_energy: simulation.progress.refined.energy,
             reactions: sums[reactions]
                 .chunks_exact(D)
                 .map(<[f64]>::to_vec)

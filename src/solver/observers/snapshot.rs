@@ -96,7 +96,7 @@ impl Snapshot {
                 rows(&columns, count, 3)
             }
             Field::Damage => (0..count)
-                .map(|point| self.damage(&simulation.family_volume, point))
+                .map(|point| self.damage(&simulation.undeformed.family_volume, point))
                 .collect(),
             Field::StrainEnergyDensity => self.stored.energy.clone(),
             Field::Neighbours => self.stored.neighbours.clone(),

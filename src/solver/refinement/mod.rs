@@ -138,8 +138,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.regrid(grids, &left, &facets)?;
         let snapshot = Snapshot::new(self);
         let (new_energy, new_bonds) = self.held(&snapshot);
-        self.refined.energy += new_energy - energy;
-        self.refined.bonds += new_bonds as i64 - bonds as i64;
+        self.progress.refined.energy += new_energy - energy;
+        self.progress.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
         let left = left.len() as u64;
         Ok(Some(Regridded {
@@ -183,14 +183,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let broken = order.spread_ragged(comm, &broken, &own_lengths, &lengths);
         other.inherit(&rows, width, (&own_lengths, &broken), facets);
         other.take_rows(&rows, width);
-        let steps = std::mem::take(&mut other.steps);
-        other.continue_from(&self.progress());
-        other.steps = steps;
+        let steps = std::mem::take(&mut other.stages.steps);
+        other.continue_from(&self.progress_words());
+        other.stages.steps = steps;
         other.take_over(self);
         let (time, rule) = (other.clock.time(), other.time_rule());
         if let StepRule::Automatic(safety) = rule.step {
             let rest = rule.end - time;
-            let most = automatic_step(other.problem, &rule, safety, other.stable_step);
+            let most = automatic_step(other.problem, &rule, safety, other.undeformed.stable_step);
             other.clock.set_step(rest / (rest / most).ceil());
         }
         other.apply_displacements(time, 0.0);

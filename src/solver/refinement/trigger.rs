@@ -61,8 +61,8 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
             return Err(Error::input(message).at(&problem.places.horizon));
         }
     }
-    let of_files = problem.initials.iter();
-    let of_file = of_files.find_map(|initial| Some((initial, initial.file.as_ref()?)));
+    let mut initials = problem.initials.iter();
+    let of_file = initials.find_map(|initial| Some((initial, initial.file.as_ref()?)));
     if let Some((initial, file)) = of_file {
         let message = format!(
             "[initial.{}] file: is not available with [refinement], whose points have other ids; use expressions",
@@ -142,7 +142,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let finer = self.picks(&seen, pick);
         let mut coarser = Vec::new();
         if let Some(limit) = trigger.coarsen_after {
-            let is_torn = |point| snapshot.damage(&self.family_volume, point) > LEAST_DAMAGE;
+            let is_torn =
+                |point| snapshot.damage(&self.undeformed.family_volume, point) > LEAST_DAMAGE;
             let at_torn = self.seen(&self.sources(is_torn), |_, _| true);
             let now = self.clock.time();
             let last = self.fields.last_seen.iter_mut().flatten();
@@ -197,7 +198,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 return false;
             }
             let energy = snapshot.stored.energy[point];
-            let damage = || snapshot.damage(&self.family_volume, point);
+            let damage = || snapshot.damage(&self.undeformed.family_volume, point);
             energy >= least && energy > 0.0
                 || trigger.damage.is_some_and(|least| damage() >= least)
                 || (trigger.condition.as_ref()).is_some_and(|condition| holds(condition, point))
