@@ -69,8 +69,8 @@ impl Lanes {
         self.map(libm::exp)
     }
 
-    /// Power with the same exponent in all lanes. Each lane is a call of a function that gives the same result
-    /// on every processor.
+    /// Power with the same exponent in all lanes. Each lane is a call of a function that gives the same
+    /// result on every processor.
     #[inline(always)]
     pub fn pow(self, exponent: f64) -> Self {
         self.map(|base| libm::pow(base, exponent))

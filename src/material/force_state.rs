@@ -25,8 +25,9 @@ pub trait ForceState<const D: usize>: Copy {
     /// Return the component ab of the symmetric part of T⊗Y, J/m⁶.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
-    /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. Both
-    /// ends compute the same bits. A central force works on the extension, so R does not matter.
+    /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. The
+    /// bits of the result are the same whether point i or point j computes it. A central force works on the
+    /// extension, so R does not matter.
     fn work<S: Simd>(
         self,
         simd: S,

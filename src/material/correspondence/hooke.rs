@@ -249,8 +249,8 @@ fn indefinite(
     )
 }
 
-/// Return the smallest eigenvalue (Pa) of the matrix in the deck's notation, and a text with the strain that is the
-/// eigenvector.
+/// Return the smallest eigenvalue (Pa) of the matrix in the deck's notation, and a text with the strain that
+/// is the eigenvector.
 fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     let used = used(dimension);
     let written = DMatrix::from_fn(used.len(), used.len(), |a, b| matrix[(used[a], used[b])]);

@@ -4,21 +4,21 @@
 //!
 //! σ = (A + B ε̄ⁿ)(1 + C ln max(ε̄̇/ε̇₀, 1))(1 − T*ᵐ), T* = (T − T₀)/(T_m − T₀).
 //!
-//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at its point: T − T₀ = β w/(ρ c), where w is the energy
-//! that the point has dissipated. The temperature of a step is that at its start.
+//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at its point: T − T₀ = β w/(ρ c), where w is the
+//! energy that the point has dissipated. The temperature of a step is that at its start.
 //!
-//! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of time
-//! has this factor, so that a stress that has been returned to the yield surface does not flow again.
+//! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of
+//! time has this factor, so that a stress that has been returned to the yield surface does not flow again.
 //!
-//! The increment of plastic strain is ΔE_p = x S_d with the final deviator S_d, and Δε̄ = ⅔ x q. x divides the
-//! parts of the equivalent trial stress by 1 + x c ([`Modes`]). The equation
+//! The increment of plastic strain is ΔE_p = x S_d with the final deviator S_d, and Δε̄ = ⅔ x q. x divides
+//! the parts of the equivalent trial stress by 1 + x c ([`Modes`]). The equation
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!
-//! is solved by Newton's method in ln u, with u = x/(1 + x c) for the largest c. In 3-D and plane strain there
-//! is one part, and u is proportional to Δε̄. Then σ is convex in ln u, also at ε̄ = 0, where the slope of ε̄ⁿ is
-//! infinite for n < 1. Newton's method therefore converges from above. In plane stress, a bracket safeguards
-//! the method.
+//! is solved by Newton's method in ln u, with u = x/(1 + x c) for the largest c. In 3-D and plane strain
+//! there is one part, and u is proportional to Δε̄. Then σ is convex in ln u, also at ε̄ = 0, where the slope
+//! of ε̄ⁿ is infinite for n < 1. Newton's method therefore converges from above. In plane stress, a bracket
+//! safeguards the method.
 
 use super::super::{Key, Kind, LawFault, PlasticState, Property, Values};
 use super::plastic::{HARDENING, YIELD_STRESS};
@@ -220,12 +220,13 @@ impl Modes {
 pub struct Surface {
     /// A + B ε̄ⁿ at the start of the step, Pa.
     pub by_strain: f64,
-    /// Yield stress at the start of the step, below the reference strain rate, Pa. If no time passes, it contains
-    /// the factor of the strain rate of the last step.
+    /// Yield stress at the start of the step, below the reference strain rate, Pa. If no time passes, it
+    /// contains the factor of the strain rate of the last step.
     pub limit: f64,
     /// Ratio of `limit` to `by_strain`.
     factor: f64,
-    /// Increment of ε̄ at the reference strain rate. Infinite if the yield stress does not depend on the rate.
+    /// Increment of ε̄ at the reference strain rate. Infinite if the yield stress does not depend on the
+    /// rate.
     threshold: f64,
 }
 
@@ -499,8 +500,9 @@ mod tests {
         }
     }
 
-    /// Integrate the rate equations of a bar by the method of Runge and Kutta. Above the yield stress the rate
-    /// of flow follows from the stress: ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns stress (Pa), ε̄ and work (J/m³).
+    /// Integrate the rate equations of a bar by the method of Runge and Kutta. Above the yield stress the
+    /// rate of flow follows from the stress: ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns stress (Pa), ε̄ and work
+    /// (J/m³).
     fn integrated(strain: f64, rate: f64) -> [f64; 3] {
         let steps = 400_000;
         let step = strain / rate / f64::from(steps);

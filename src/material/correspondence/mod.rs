@@ -244,8 +244,8 @@ struct Family<const D: usize> {
 
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state in a step of this length (s). `sums`
-    /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if K is nearly singular,
-    /// the intact part of the family is too stiff, or the law has no stress at H.
+    /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None`
+    /// if K is nearly singular, the intact part of the family is too stiff, or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],

@@ -14,7 +14,8 @@
 //! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the final stress, where x
 //! solves a scalar equation (§3.4).
 //!
-//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain, by rate and temperature.
+//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain, by rate and
+//! temperature.
 //!
 //! The whole plastic work ∫ q dε̄ is dissipated.
 
@@ -85,9 +86,9 @@ pub const STRAIN_MEASURE: Key = Key {
 /// been returned to the yield surface could flow again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. After a return
-/// to the yield surface, the round-off of b_e is larger, because it scales with the square of the stretches.
-/// Heating can make the yield stress small compared with the round-off of the stress.
+/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. After a
+/// return to the yield surface, the round-off of b_e is larger, because it scales with the square of the
+/// stretches. Heating can make the yield stress small compared with the round-off of the stress.
 const WIDE_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys; `None` if there is no error.
@@ -264,9 +265,9 @@ impl Plastic {
         }
     }
 
-    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄, the plastic work and the
-    /// factor of rate and temperature. `step` is the length of the step (s), 0 if no time passes. `None` if
-    /// the stress is inside the yield surface or not finite.
+    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄, the plastic work and
+    /// the factor of rate and temperature. `step` is the length of the step (s), 0 if no time passes. `None`
+    /// if the stress is inside the yield surface or not finite.
     pub fn flow(
         &self,
         trial: &Matrix3<f64>,
@@ -415,8 +416,8 @@ mod tests {
         }
     }
 
-    /// Keys of hardening by strain, strain rate and heating. The temperature rises by about half of the melting
-    /// range.
+    /// Keys of hardening by strain, strain rate and heating. The temperature rises by about half of the
+    /// melting range.
     const JOHNSON_COOK: [(&str, f64); 8] = [
         ("hardening_modulus", 0.02),
         ("hardening_exponent", 0.3),
