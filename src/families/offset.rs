@@ -15,7 +15,7 @@ pub struct Offset {
     pub inverse: f64,
     /// 1/|ξ|², 1/m².
     pub inverse_square: f64,
-    /// Volume weights of the ends i and j.
+    /// [Weights](crate::material::bond::Weights) of the ends i and j.
     pub weights: [f64; 2],
     /// Steps along x.
     pub(super) x: i32,
@@ -42,7 +42,7 @@ pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimensio
     within.min(widths.product())
 }
 
-/// The offsets up to the length `cutoff` (m), sorted by z, y and x. Also return the line offsets that occur
+/// Return the offsets up to the length `cutoff` (m), sorted by z, y and x, and the line offsets that occur
 /// in these offsets. `extent` is the extent of the points per direction, m.
 pub(super) fn offsets(
     spacing: [f64; 3],

@@ -138,8 +138,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
     Ok(lists)
 }
 
-/// Return an error if the lists will not fit in memory. Their memory is extrapolated from the fraction `done`
-/// of the points.
+/// Return an error if the lists will not fit in memory. The memory of the complete lists is extrapolated from
+/// the fraction `done` of the points.
 fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
     let remaining = bytes as f64 * (1.0 / done - 1.0);
