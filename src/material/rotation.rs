@@ -28,7 +28,7 @@ const MOST_ITERATIONS: usize = 40;
 const CONVERGED: f64 = 1e-9;
 
 /// Return R of a deformation gradient in the plane or in space. In space, the result is the identity if
-/// det F ≤ 0 or if the iteration does not converge. In the plane, see [`in_plane`].
+/// det F ≤ 0 or if the iteration does not converge. In the plane, see `in_plane`.
 pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     let mut f = Matrix3::identity();
     f.view_mut((0, 0), (D, D)).copy_from(gradient);

@@ -53,7 +53,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Return the spacing relative to that of level 0: 2^−level.
+    /// Return the spacing of the level, divided by the spacing of level 0: 2^−level.
     fn scale(&self) -> f64 {
         0.5_f64.powi(self.level as i32)
     }

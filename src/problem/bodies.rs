@@ -63,7 +63,8 @@ impl Body {
         }
     }
 
-    /// Return the positions of the points in a cell. Points from a file or a mesh count as centres.
+    /// Return the rule for the positions of the points in a cell. Points from a file or a mesh count as
+    /// centres.
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
             PointSource::Lattice { quadrature, .. } => quadrature,
@@ -193,8 +194,8 @@ impl Interface {
         })
     }
 
-    /// Return the rule of the bonds between two bodies, which does not depend on their order. Within a body,
-    /// each end uses its own constants.
+    /// Return the rule of the bonds between two bodies. The rule does not depend on the order of the bodies.
+    /// Within a body, each end uses its own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
@@ -203,8 +204,8 @@ impl Interface {
         own.map_or(self.rule, |pair| pair.rule)
     }
 
-    /// Return how the bonds between two bodies break, which does not depend on their order. Within a body,
-    /// the damage law of the body decides.
+    /// Return how the bonds between two bodies break. The result does not depend on the order of the bodies.
+    /// Within a body, the damage law of the body decides.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
@@ -248,7 +249,7 @@ pub struct Damage {
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
     /// Dependence of the fracture energy on the direction of the crack; `None` if all directions are equal.
-    /// `toughness` is the fracture energy of cracks along the axis.
+    /// Otherwise, `toughness` is the fracture energy of cracks along the axis.
     pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
@@ -418,8 +419,8 @@ pub struct IdFile {
     pub first: u64,
 }
 
-/// The points of a group of elements or nodes in the meshes, given by name or number. Their ids are known
-/// once the points have been generated.
+/// The points of a group of elements or nodes in the meshes. The deck gives the name or number of the group.
+/// The ids of the points are known once the points have been generated.
 #[derive(Clone)]
 pub struct MeshSet {
     /// Name or number of the group.

@@ -66,7 +66,7 @@ pub struct Problem {
     pub rigid: Vec<Rigid>,
     /// Bodies in the order of the deck.
     pub bodies: Vec<Body>,
-    /// Finer grids in parts of the bodies; `None` without refinement.
+    /// Settings of finer grids in parts of the bodies; `None` without refinement.
     pub refinement: Option<Refinement>,
     /// Sets: `all`, then one per body, then the sets of the deck.
     pub sets: Vec<Set>,
@@ -79,8 +79,8 @@ pub struct Problem {
     pub conditions: Vec<Condition>,
     /// End, time step and solution method of the run.
     pub time: Time,
-    /// Stages of the run in order. If empty, the run is a single stage in which all conditions act.
-    /// Otherwise, the last stage ends with [`Self::time`], of which only the end is used.
+    /// Stages of the run in order. If empty, the run is a single stage with [`Self::time`] in which all
+    /// conditions act. Otherwise, only the end of [`Self::time`] is used: the last stage ends at this time.
     pub stages: Vec<Stage>,
     /// The main result file.
     pub output: Output,

@@ -88,7 +88,7 @@ pub struct History {
     pub damage_threshold: f64,
     /// Sums, means and extremes of fields over sets.
     pub statistics: Vec<FieldStatistics>,
-    /// Probes: positions; the history contains values of the point nearest to each.
+    /// Probes: positions. The history contains values of the point nearest to each probe.
     pub probes: Vec<Probe>,
     /// Tracked fronts.
     pub fronts: Vec<Front>,
@@ -137,7 +137,7 @@ pub struct CrackPath {
     pub threshold: f64,
 }
 
-/// A probe: a position; the history contains values of the point nearest to it.
+/// A probe: a position. The history contains values of the point nearest to the probe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
     /// Name in the deck.
@@ -231,8 +231,9 @@ pub enum Field {
     Damage,
     /// Strain energy density W, J/m³.
     StrainEnergyDensity,
-    /// Dilatation θ, the trace of the three-dimensional strain. In plane stress, it is (1 − 2ν)/(1 − ν) times
-    /// the trace of the strain in the plane; under uniaxial stress, (1 − 2ν) times the strain along the bar.
+    /// Dilatation θ, the trace of the three-dimensional strain. In plane stress, θ is (1 − 2ν)/(1 − ν) times
+    /// the trace of the strain in the plane. Under uniaxial stress, θ is (1 − 2ν) times the strain along the
+    /// bar.
     Dilatation,
     /// Weighted volume m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,

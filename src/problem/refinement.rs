@@ -17,8 +17,8 @@ pub struct Refinement {
     pub rule: HorizonRule,
     /// Factor on the horizon of points that have points of a coarser level inside their horizon.
     pub interface_factor: f64,
-    /// Horizon of bonds between points of one body with different horizons: each end uses the horizon of its
-    /// point, or both use the mean.
+    /// Horizon of bonds between points of one body with different horizons: each end uses its own horizon, or
+    /// both ends use the mean of the two horizons.
     pub bonds: InterfaceRule,
     /// Regions that are refined from the start.
     pub regions: Vec<RefinedRegion>,

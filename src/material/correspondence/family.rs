@@ -75,7 +75,7 @@ impl<const D: usize> ShapeTensor<D> {
     }
 
     /// Return K⁻¹ (m⁻⁵) of the intact part of a family; `None` if K is nearly singular, or if this part is
-    /// stiffer than [`STIFFEST`] allows.
+    /// stiffer than `STIFFEST` allows.
     ///
     /// `modulus` is the largest modulus of the solid (Pa), and `whole` the spring constant of the initial
     /// family (N/m⁷).

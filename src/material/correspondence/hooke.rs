@@ -460,7 +460,7 @@ fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }
 
-/// Return the row [`Hooke::across`] for plane strain; `None` in other dimensions.
+/// Return the row `across` of [`Hooke`] for plane strain; `None` in other dimensions.
 fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
     let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
     is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))
