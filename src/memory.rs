@@ -52,8 +52,8 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory and swap left in this process's control group (version 2), bytes; `None` if the group
-/// has no limit. Limits of parent groups are not read.
+/// Return the memory and swap left in this process's control group, bytes. `None` if the group has no limit,
+/// or on systems without control groups of version 2. Limits of parent groups are not read.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::"))?;

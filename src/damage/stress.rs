@@ -87,7 +87,7 @@ pub struct StressLimit {
 
 /// Computation of the mean stress measure of each bond, Pa. An end counts in the mean if the bond is within
 /// the horizon of the end, and the point at this end carries stress. The result also has one bit per bond,
-/// set if at least one end counts. Points i and j compute the same bits.
+/// set if at least one end counts. The result is the same for points i and j.
 pub(super) struct MeanStress {
     stresses: [Lanes; 2],
     acting: [u8; 2],

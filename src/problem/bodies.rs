@@ -156,7 +156,7 @@ pub struct InterfacePair {
     pub name: String,
     /// Names of the two bodies, in any order.
     pub bodies: [String; 2],
-    /// Elastic constants of the bonds.
+    /// Rule for the elastic constants and the horizon of the bonds.
     pub rule: InterfaceRule,
     /// Breaking of the bonds.
     pub damage: InterfaceDamage,
@@ -229,9 +229,9 @@ impl InterfacePair {
 pub enum InterfaceRule {
     /// No bonds join the blocks.
     None,
-    /// Means of the moduli and of the horizons.
+    /// Mean of the moduli, and mean of the horizons, of the two blocks.
     Average,
-    /// The smaller of the moduli and of the horizons.
+    /// The smaller of the two moduli, and the smaller of the two horizons.
     Minimum,
     /// Each end uses the constants of its body, for its half of the bond force.
     Own,
