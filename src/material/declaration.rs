@@ -44,8 +44,8 @@ pub struct Declaration {
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
     /// `None` if a damage law breaks the bonds.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
-    /// Whether the law also breaks bonds by their history, beside a damage law. Bonds of such a law break
-    /// without a damage law too.
+    /// Whether the law breaks bonds because of their history, in addition to a damage law. Bonds of such a
+    /// law also break without a damage law.
     pub wears_out: bool,
     /// Check the horizon, and return an error message if it is wrong; `None` if every horizon is allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,

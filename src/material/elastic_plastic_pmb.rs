@@ -103,7 +103,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], [plastic, _]: &[Lanes; 2]) -> Along {
-        // s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
+        // With P = `extension_over_deformed`: s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
         let elastic = bond.extension_over_deformed
             - *plastic * (Lanes::splat(1.0) - bond.extension_over_deformed);
         Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))

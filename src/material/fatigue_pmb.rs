@@ -2,9 +2,9 @@
 //! bond is used up.
 //!
 //! Silling & Askari 2014, SAND2014-18590. In a cyclic load with the load ratio R, a bond has the stretch s at
-//! the largest load and R s at the smallest load. The cyclic strain of the bond is ε = (1 − R) |s| if s or R
-//! s is positive; otherwise ε is 0. The remaining life λ begins at 1 and decreases with the number N of
-//! cycles:
+//! the largest load and R s at the smallest load. If one of these two stretches is positive, the cyclic
+//! strain of the bond is ε = (1 − R) |s|; otherwise ε is 0. The remaining life λ begins at 1 and decreases
+//! with the number N of cycles:
 //!
 //! dλ/dN = −A (ε − ε∞)^m for ε > ε∞, otherwise 0.
 //!
@@ -14,8 +14,8 @@
 //! The law stores the used life 1 − λ. A time step is a block of cycles, all with the stretches at the end of
 //! the step. λ does not change the force of an intact bond.
 //!
-//! The report has separate constants A and m for the nucleation of cracks (phase I) and for their growth
-//! (phase II). This law has one pair of constants for both phases.
+//! The law of SAND2014-18590 has separate constants A and m for the nucleation of cracks (phase I) and for
+//! their growth (phase II). This law has one pair of constants for both phases.
 
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
@@ -33,9 +33,9 @@ pub struct FatiguePmb {
     pub cycles_per_second: f64,
     /// Load ratio R: smallest load divided by largest load of a cycle.
     pub load_ratio: f64,
-    /// Factor A.
+    /// Factor A in dλ/dN.
     pub coefficient: f64,
-    /// Exponent m.
+    /// Exponent m in dλ/dN.
     pub exponent: f64,
     /// Cyclic strain ε∞ up to which bonds have infinite life.
     pub limit: f64,

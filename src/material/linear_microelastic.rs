@@ -1,4 +1,4 @@
-//! Linear microelastic material: f = C η with C = λ(|ξ|) ξ⊗ξ.
+//! Linear microelastic material: the force density of a bond per volume is f = C η with C = λ(|ξ|) ξ⊗ξ.
 //!
 //! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ is the linearisation of the prototype microelastic
 //! material with the micromodulus c.

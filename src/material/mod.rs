@@ -210,9 +210,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the
-    /// values that only the law reads ([`Self::OWN_NUMBERS`]). A plastic state that plastic flow has changed
-    /// is stored only at the end of a step. `step` is the time since the plastic state (s); 0 if no time has
-    /// passed.
+    /// [`Self::OWN_NUMBERS`]. Also update `_plastic`, the plastic state of the point. The caller stores an
+    /// updated plastic state only at the end of a step. `_step` is the time since the stored plastic state
+    /// (s); 0 if no time has passed.
     fn update_point(
         &self,
         _pass: usize,
@@ -234,8 +234,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Test whether a pass reads the bond history after the step. Otherwise the pass reads the history before
-    /// the step.
+    /// Test whether a pass reads the bond history at the end of the step. Otherwise the pass reads the
+    /// history at the start of the step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
@@ -359,13 +359,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Test whether the law needs enough bonds in all directions. The intact bonds of a point are then
-    /// compared with its family before pre-cracks.
+    /// compared with all bonds of the point, including the bonds that pre-cracks cut.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Test whether a point carries no force, because its intact bonds are too few for the law, or because
-    /// the law has no stress at its deformation.
+    /// Test whether a point carries no force, because the law cannot use its intact bonds (too few or too
+    /// stiff), or because the law has no stress at the deformation of the point.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }

@@ -1,10 +1,10 @@
 //! Prototype microelastic material with one micromodulus per point, computed from the point's own family.
 //!
 //! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3. The micromodulus c_i scales the energy of
-//! the discrete family at unit isotropic stretch to the classical energy density W₁. With the bond energy w =
-//! c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch is
-//! therefore correct at surfaces and on any lattice. A bond has the mean of the micromoduli of points i and
-//! j, c_ij = (c_i + c_j)/2. A critical stretch s_c that follows from a fracture energy is scaled to s_c
+//! the discrete family at unit isotropic stretch to the classical energy density W₁. With the bond energy
+//! w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch
+//! is therefore correct at surfaces and on any lattice. A bond has the mean of the micromoduli of points i
+//! and j, c_ij = (c_i + c_j)/2. A critical stretch s_c that follows from a fracture energy is scaled to s_c
 //! √(c/c_ij), with the micromodulus c of an untruncated family. This keeps the energy of breaking the bond.
 //!
 //! With the influence function δ/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2 with
@@ -23,8 +23,8 @@ use crate::lanes::Lanes;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalised {
-    /// Energy density W₁ at unit isotropic stretch, J/m³: the classical one, or 9K/4 for `form =
-    /// "diehl2016"`.
+    /// Energy density W₁ at unit isotropic stretch, J/m³: the classical one, or 9K/4 for
+    /// `form = "diehl2016"`.
     pub energy: f64,
     /// Micromodulus c of an untruncated family, N/m⁶, for which the damage law has computed the critical
     /// stretch; `None` if the deck gives the critical stretch, which then holds for all bonds.

@@ -278,7 +278,7 @@ impl<const D: usize> Law<D> for Ordinary {
         [extension_factor, volume_factor]: &[Lanes; 2],
         _: &[Lanes; 0],
     ) -> Along {
-        // |ξ|/|Y| = 1 − P and |ξ| s/|Y| = P.
+        // With P = `extension_over_deformed`: |ξ|/|Y| = 1 − P and |ξ| s/|Y| = P.
         Along(*volume_factor + bond.extension_over_deformed * (*extension_factor - *volume_factor))
     }
 

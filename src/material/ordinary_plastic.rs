@@ -6,8 +6,8 @@
 //!
 //! W = ½ κθ² + ½ (A/m) Σ ω (ε − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (ε − e_p) Ṽ.
 //!
-//! The deviatoric force is t_d = (A/m) ω ε_d. Here ε_d is ε − e_p minus its mean over the intact bonds: ε_d =
-//! ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//! The deviatoric force is t_d = (A/m) ω ε_d. Here ε_d is ε − e_p minus its mean over the intact bonds:
+//! ε_d = ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ and the yield value ψ₀.
 //! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by (1 − r)

@@ -1,7 +1,7 @@
 //! Rotation of a family: the orthogonal factor R of its deformation gradient F = R U.
 //!
-//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ, |φ| ≤
-//! π. The formula
+//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ,
+//! |φ| ≤ π. The formula
 //!
 //! (R − I) ξ = q₀ t + q × t with t = 2 q × ξ
 //!

@@ -222,8 +222,8 @@ mod tests {
                 let found = of(dimension).matrix(&plane, 0.0);
                 assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
             }
-            // C_ijkl K⁻¹_jl for K = I is (λ + 4 G) I. This equals B of the control, (3 λ + 2 G) I, only if λ
-            // = G.
+            // C_ijkl K⁻¹_jl for K = I is (λ + 4 G) I. This equals B of the control, (3 λ + 2 G) I, only if
+            // λ = G.
             let other = lambda + 4.0 * shear;
             let found = of(Dimension::Space).matrix(&Matrix3::identity(), 0.0)[(0, 0)];
             let are_equal = (found / other - 1.0).abs() < 1e-14;

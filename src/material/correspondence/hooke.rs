@@ -227,7 +227,8 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// Return the error of a matrix that is not finite or not positive definite, at the key `first`.
+/// Return the error of a matrix that is not finite or not positive definite, at the key `first`; `None` for
+/// other matrices.
 fn indefinite(
     matrix: &Matrix6<f64>,
     dimension: Dimension,

@@ -2,8 +2,8 @@
 //!
 //! F = F_e F_p. The stored state of a point is C_p⁻¹ − I with C_p = F_pᵀ F_p, so that b_e = F_e F_eᵀ = F
 //! C_p⁻¹ Fᵀ.
-//! With the eigenvalues b_a and the eigenvectors n_a of b_e, the Kirchhoff stress τ and its eigenvalues τ_a
-//! are (Simo 1992):
+//! With the eigenvalues b_a and the eigenvectors n_a of b_e, the logarithmic strains ε_a, the Kirchhoff
+//! stress τ, P and the elastic energy density W are (Simo 1992):
 //!
 //! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ Σ ε + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
 //!

@@ -248,7 +248,7 @@ impl Plastic {
 
     /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))², where σ is the yield stress without
     /// the factor of rate and temperature. The result is the square of the ratio of the secant shear modulus
-    /// to G. It is 1 before any flow and never grows, because σ depends on ε̄ only.
+    /// to G. The result is 1 before any flow and never grows, because σ depends on ε̄ only.
     ///
     /// The motion z of the zero-energy modes grows with ε̄. With the ratio instead of its square, the energy
     /// of the control would grow with the plastic work, and limit loads would contain a part of this energy.

@@ -26,9 +26,9 @@ pub enum Stress {
 /// The constants of the compressible neo-Hookean solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeoHooke {
-    /// λ, Pa.
+    /// Lamé's first parameter λ, Pa.
     lambda: f64,
-    /// μ, Pa.
+    /// Shear modulus μ, Pa.
     shear: f64,
     plane_stress: bool,
     /// Largest eigenvalue of Hooke's matrix of the undeformed solid, Pa.

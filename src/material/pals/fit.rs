@@ -1,6 +1,5 @@
-//! The fits of ω and σ of [`Pals`](super::Pals) to the family of a point. All sums over the family have the
-//! weight
-//! |ξ|² Ṽ per bond, unless a formula gives the terms.
+//! The fits of ω and σ of [`Pals`](super::Pals) to the family of a point. A sum over the family has the
+//! weight |ξ|² Ṽ per bond, unless a formula gives the terms.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 

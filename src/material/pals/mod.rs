@@ -192,7 +192,7 @@ impl<const D: usize> Law<D> for Pals {
         changing[2] = dilatation;
     }
 
-    /// Return t/|Y|, with |ξ|/|Y| = 1 − P and e/|Y| = P.
+    /// Return t/|Y|. With P = `extension_over_deformed`: |ξ|/|Y| = 1 − P and e/|Y| = P.
     #[inline(always)]
     fn force(
         &self,
