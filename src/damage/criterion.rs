@@ -29,10 +29,10 @@ pub enum Criterion {
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
-    /// Bonds break when the work of the acting force states reaches the sum of the critical works (J/m⁶) of
-    /// the acting ends.
+    /// Bonds break when the work of the acting force states reaches the sum of the numbers of the acting
+    /// ends. The numbers are the shares of points i and j in the critical work, J/m⁶.
     Work([f64; 2], WorkRule),
-    /// Same as [`Self::Work`], with the work thresholds of points i and j.
+    /// Same as [`Self::Work`], with the numbers computed from the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
     /// stress measures of its acting ends.
@@ -261,7 +261,7 @@ impl Criterion {
     ) -> u8 {
         match *self {
             Self::Never => 0,
-            // Every bond that breaks has an |x| above the limit, so none of these bonds breaks.
+            // Only bonds with |x| above the limit break, and none of these eight bonds has such an |x|.
             Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(critical) if !L::SCALED => simd.at_least(
                 bond.relative_square_extension,
@@ -410,7 +410,7 @@ impl WorkRule {
         self.family_correction > 0.0
     }
 
-    /// Return the critical work of bonds (J/m⁶) from the critical works of both ends in untruncated families;
+    /// Return the critical work of bonds (J/m⁶) from the shares of points i and j in untruncated families;
     /// only acting ends count. The sum is written out, because array methods are not always inlined. Without
     /// inlining, all data of a bond stay in memory instead of registers.
     #[inline(always)]
@@ -426,7 +426,8 @@ impl WorkRule {
         critical_i + critical_j
     }
 
-    /// Return the critical work of an end (J/m⁶) from the critical work of this end in an untruncated family.
+    /// Return the share of an end in the critical work (J/m⁶), from the share of this end in an untruncated
+    /// family.
     #[inline(always)]
     fn corrected(self, critical: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {

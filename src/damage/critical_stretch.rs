@@ -107,8 +107,8 @@ impl CriticalStretch {
         }
     }
 
-    /// Return the threshold of a point with strength f and the smallest stretch s_min of its intact bonds: f
-    /// s0 − α s_min. Without scatter f = 1.
+    /// Return the threshold f s0 − α s_min of a point, from its strength f and the smallest stretch s_min of
+    /// its intact bonds. Without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         strength * self.critical - self.alpha * smallest

@@ -190,8 +190,8 @@ impl Grid {
         }
     }
 
-    /// Return the line in the band of line `index` that is displaced by these numbers of cells in y and z;
-    /// `None` if there is no such line.
+    /// Return the line in the same band that is displaced from line `index` by these numbers of cells in y
+    /// and z; `None` if there is no such line.
     ///
     /// The wanted line is close to line `index` in memory, so the search begins at line `index`.
     pub(super) fn line_beside(&self, index: usize, [y, z]: [i64; 2]) -> Option<&Line> {

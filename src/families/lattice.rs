@@ -353,7 +353,7 @@ impl BondLattice {
     }
 
     /// Call `visit(point, vector, lane)` for each point with bonds. The arguments are the local index, the
-    /// index of its lane group, and its lane.
+    /// index of the lane group, and the lane of the point.
     pub fn for_each_point(&self, mut visit: impl FnMut(usize, usize, usize)) {
         for (k, vector) in self.vectors.iter().enumerate() {
             for lane in (0..WIDTH).filter(|lane| vector.members >> lane & 1 == 1) {
@@ -408,7 +408,7 @@ impl BondLattice {
     }
 }
 
-/// The bits of eight slots, set for points of a block.
+/// One bit for each of the eight slots from `slot` on, set if the slot contains a point of a block.
 fn mask(grid: &Grid, slot: usize, block: usize) -> u8 {
     let blocks = &grid.blocks[slot..slot + WIDTH];
     let bit = |k: usize| u8::from(blocks[k] as usize == block) << k;

@@ -236,8 +236,8 @@ impl BondList {
         }
     }
 
-    /// Call `visit(row, point, bytes)` for each row. The arguments are the index of the row, its point, and
-    /// the length of its checkpoint row.
+    /// Call `visit(row, point, bytes)` for each row. The arguments are the index of the row, the local index
+    /// of its point, and the number of bytes that [`Self::save_row`] writes for the row.
     pub fn for_each_row(&self, mut visit: impl FnMut(usize, usize, usize)) {
         let bytes = 1 + WIDTH * self.store.history_bytes_per_bond();
         for (row, point) in self.points.iter().enumerate() {
@@ -246,7 +246,7 @@ impl BondList {
         }
     }
 
-    /// Write the checkpoint row: for each group the intact bits, then the history.
+    /// Write a row to a checkpoint: for each group the intact bits, then the history.
     pub fn save_row(&self, row: usize, bytes: &mut [u8]) {
         let width = self.store.history_bytes_per_bond();
         let groups = self.starts[row]..self.starts[row + 1];

@@ -5,8 +5,8 @@
 //!   points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). `LinearInside` is the form of
 //!   LAMMPS (Parks et al. 2008): the factor drops from 1/2 to 0 at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
-//!   Schweitzer 2016, eq. 2). It has a closed form in 1-D and 2-D, and is computed by quadrature over slices
-//!   in 3-D.
+//!   Schweitzer 2016, eq. 2). This fraction has a closed form in 1-D and 2-D, and is computed by quadrature
+//!   over slices in 3-D.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};

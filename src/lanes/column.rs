@@ -17,8 +17,8 @@ const LINE: usize = 8;
 /// The allocator requests large arrays from the system one by one (arrays of 1 MB and more in the `fissure`
 /// command). All these arrays start at the same offset within a page. Entries with the same index in many
 /// such columns would then lie in the same set of the cache, and a set holds only eight or twelve lines.
-/// Therefore, the first entry of each column lies some cache lines later in its array than that of the
-/// previous column.
+/// Therefore, the columns do not begin at the starts of their arrays, but at different numbers of cache lines
+/// after the starts.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,

@@ -264,7 +264,7 @@ mod x86 {
         unsafe { std::mem::transmute(a) }
     }
 
-    /// Masks of four lanes by their four bits. All 64 bits of a selected lane are set.
+    /// Masks of four lanes, indexed by one bit per lane. All 64 bits of a selected lane are set.
     static MASKS: [[u64; 4]; 16] = {
         let mut masks = [[0; 4]; 16];
         let mut bits = 0;

@@ -103,7 +103,7 @@ impl Columns {
 pub struct Layout {
     /// Index of the column of each quantity.
     pub columns: Columns,
-    /// Offset of the heading in bytes; `None` if the file has no heading.
+    /// Offset of the heading in the file, bytes; `None` if the file has no heading.
     pub heading: Option<u64>,
 }
 

@@ -84,7 +84,7 @@ impl<'a> LatticeBody<'a> {
         self.region.total()
     }
 
-    /// The centre (m) of a candidate cell, by index, if it belongs to the body.
+    /// The centre (m) of the candidate cell with this index; `None` if the cell does not belong to the body.
     pub fn centre(&self, index: u64) -> Option<[f64; 3]> {
         self.centre_of(self.region.cell(index))
     }

@@ -167,7 +167,8 @@ pub struct InterfacePair {
 /// Breaking of the bonds between two bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
-    /// By the damage laws of both bodies: a bond breaks at the smaller of their thresholds.
+    /// By the damage laws of both bodies. If the horizons are equal, a bond breaks at the smaller of the two
+    /// thresholds.
     OfBodies,
     /// Bonds never break.
     Unbreakable,

@@ -35,7 +35,8 @@ pub enum CheckpointRule {
 pub struct Balance {
     /// Number of steps between comparisons of rank times.
     pub every_steps: u64,
-    /// Ratio of the slowest rank's time to the mean, above which points are rebalanced.
+    /// Ratio of the time of the slowest rank to the mean time of all ranks, above which points are
+    /// rebalanced.
     pub imbalance: f64,
 }
 
@@ -262,8 +263,8 @@ pub enum Field {
     NewlyBrokenBonds,
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for correspondence laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 if the point carries no force because it has too few intact bonds for its law, or a bond for which
-    /// the law defines no stress; otherwise 0.
+    /// 1 if the point carries no force, otherwise 0. A point carries no force if its law cannot use its
+    /// intact bonds, or defines no stress at the deformation of the point or of one of its bonds.
     Singular,
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.

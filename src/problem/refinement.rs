@@ -42,8 +42,8 @@ pub struct Trigger {
     pub condition: Option<Expression>,
     /// A condition on reference position and time that every triggering point must fulfil.
     pub only: Option<Expression>,
-    /// Time (s) after which a refined point is coarsened, if no triggering point and no point with broken
-    /// bonds has been near it. `None` for no coarsening.
+    /// Time (s) after which the grid is coarsened at a refined point, if the point has been outside the
+    /// horizons of triggering points and of points with broken bonds for this time. `None` for no coarsening.
     pub coarsen_after: Option<f64>,
 }
 
