@@ -21,7 +21,7 @@ pub struct Body {
     pub span: Range<usize>,
     /// Name of the material.
     pub material_name: String,
-    /// Law, density and elastic constants.
+    /// Law, density, elastic constants, damping and thermal expansion.
     pub material: Material,
     /// The damage law; `None` if bonds never break, or break by the law of the material.
     pub damage: Option<Damage>,
@@ -288,7 +288,8 @@ pub enum Toughness {
 /// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// Points in those cells of a lattice whose centre lies within a shape.
+    /// Points in those cells of a lattice whose centres lie within a shape, and within the shape of no later
+    /// body.
     Lattice {
         /// The region that the cells fill.
         shape: Shape,

@@ -72,7 +72,8 @@ pub struct Problem {
     pub sets: Vec<Set>,
     /// Pre-cracks: bonds that cross their surfaces start broken.
     pub cracks: Vec<PreCrack>,
-    /// Initial values. If several apply to a point, the last one counts.
+    /// Initial values. If several entries give a displacement or a velocity for a point, the last entry
+    /// counts.
     pub initials: Vec<Initial>,
     /// Loads, supports and temperatures. If several supports or temperatures apply to a point, the last one
     /// counts.

@@ -230,7 +230,8 @@ mod tests {
                 0..100 => 3_f64.powf((f64::from(step) + 1.0) / 100.0),
                 _ => 3_f64.powf(2.0 - (f64::from(step) + 1.0) / 100.0),
             };
-            // Reference in one dimension: the stress as a function of the strain ln λ.
+            // Reference solution in one dimension: the stress as a function of the logarithm of the stretch
+            // `along`.
             let trial = YOUNG * (along.ln() - plastic);
             let limit = YIELD + HARDENING * flowed;
             let growth = ((trial.abs() - limit) / (YOUNG + HARDENING)).max(0.0);
