@@ -99,7 +99,8 @@ mod tests {
     use crate::damage::{Sense, WorkMeasure};
     use crate::dimension::Constraint;
 
-    /// Energy of all bonds across a unit area by the midpoint rule, divided by the fracture energy.
+    /// Return the energy of breaking all bonds across a unit area, by the midpoint rule, divided by the
+    /// fracture energy.
     fn taken(dimension: Dimension) -> f64 {
         let (horizon, energy, cells) = (3e-3, 135.0, 1500_u32);
         let critical = BondEnergy::from_energy(dimension, energy, horizon);

@@ -546,7 +546,7 @@ mod tests {
         let law = copper(MODULUS, &[&BY_STRAIN, &BY_RATE, &BY_HEAT]);
         let (strain, rate) = (0.5, 1e4);
         let [stress, flowed, work] = integrated(strain, rate);
-        // The temperature matters.
+        // The temperature changes the yield stress noticeably.
         assert!(work / TO_MELT > 0.02, "{work}");
         let error = |steps| {
             let (stresses, state) = pull(&law, strain, rate, steps);
