@@ -8,8 +8,8 @@
 //! - the extension over the deformed length, P(x) = 1 − (1 + x)^(−½). With the micromodulus c and the stretch
 //!   s, a force c s Y/|Y| is (c/|ξ|) P(x) Y.
 //!
-//! For |x| ≤ [`NEAR`] both functions are Taylor series. The first omitted term is below 6·10⁻¹⁸ of the
-//! result.
+//! For |x| ≤ [`NEAR`] both functions are computed as Taylor series. The first omitted term is below 6·10⁻¹⁸
+//! of the result.
 //! Larger |x| use the closed forms P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)), which avoid
 //! cancellation.
 //! Both ends of a bond compute the same bits of x, and therefore of P and Q.

@@ -14,7 +14,7 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
         damage.no_failure.clear();
         damage.weibull = None;
     }
-    // These problems make no time steps, so damping must not limit the step.
+    // These problems make no time steps. With damping, the fixed step below could be rejected as too long.
     body.material.damping = 0.0;
     let mut single = Problem {
         volume_correction: problem.volume_correction,
