@@ -127,7 +127,7 @@ impl<'a> LatticeBody<'a> {
         })
     }
 
-    /// Test whether a position (m) is within the shape and in no later body.
+    /// Test whether a position (m) is within the shape, and within the shape of no later body.
     fn contains(&self, position: [f64; 3]) -> bool {
         let within = |shape: &Shape| shape::contains(shape, position, self.tolerance);
         within(self.shape) && !self.later.iter().any(|shape| within(shape))

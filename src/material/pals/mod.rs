@@ -123,7 +123,7 @@ impl<const D: usize> Law<D> for Pals {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// θ.
+    /// The only such number is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const SCALED: bool = true;
