@@ -40,7 +40,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Create the error message, with the deck key that causes the error.
+    /// Create the error. The message names the body or the deck key that causes the fault, except for
+    /// [`Self::TooManyHoles`].
     pub fn error(&self, problem: &Problem) -> Error {
         match self {
             Self::SamePlace(points) => same_place(problem, points),

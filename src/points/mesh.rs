@@ -393,6 +393,9 @@ fn points(
 
 /// Return volume and centroid of an element. `nodes` are the positions of its nodes, m. The volume is
 /// negative if the nodes of a solid element have the order of a mirrored element.
+///
+/// # Errors
+/// If det J changes sign within the element.
 fn solid(
     mesh: &Mesh,
     element: usize,

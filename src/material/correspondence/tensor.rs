@@ -8,7 +8,7 @@ use crate::lanes::Lanes;
 
 /// A number, or eight numbers.
 pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Mul<f64, Output = Self> {
-    /// Convert a number; eight numbers are all equal to it.
+    /// Convert a number to this type. If the type holds eight numbers, all of them are `value`.
     fn of(value: f64) -> Self;
 }
 
