@@ -10,8 +10,8 @@
 //!
 //! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²) and the equivalent plastic strain ε̄,
 //! the yield surface is q = σ_y + H ε̄.
-//! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H
-//! ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
+//! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3):
+//! Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
 //! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the deviator of the final
 //! stress, where x solves a scalar equation (§3.4).
 //!
