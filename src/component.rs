@@ -22,13 +22,14 @@ pub enum Component {
     VonMises,
     /// Eigenvalue of a symmetric tensor; index 0 is the largest.
     Principal(usize),
-    /// Sum of the diagonal entries.
+    /// Sum of the diagonal entries of a tensor.
     Trace,
     /// Determinant of a tensor.
     Determinant,
 }
 
-/// Return the names of the components of a field with this number of values per point; empty for a scalar.
+/// Return the names of the components of a field with this number of values per point. The result is empty
+/// for a scalar, and for all numbers except 2, 3, 6 and 9.
 pub fn names(components: usize) -> &'static [&'static str] {
     match components {
         2 => &AXES[..2],
@@ -57,7 +58,7 @@ pub fn entries(
     all.iter().copied().enumerate().filter(is_there)
 }
 
-/// Return the names of the invariants of a field with this number of values per point.
+/// Return the name and the [`Component`] of each invariant of a field with this number of values per point.
 pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
     match components {
         2 | 3 => &[("magnitude", Component::Magnitude)],
@@ -79,7 +80,8 @@ pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
 }
 
 impl Component {
-    /// Compute this component or invariant from the values of a point.
+    /// Compute this component or invariant from the values of a point. A [`Self::Principal`] is NaN if a
+    /// value is not finite.
     pub fn of(self, values: &[f64]) -> f64 {
         match self {
             Self::Entry(entry) => values[entry],

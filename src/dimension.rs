@@ -53,7 +53,8 @@ impl Dimension {
         }
     }
 
-    /// Return the edge (m) of the line, square or cube with this volume (m³).
+    /// Return the edge (m) of the line segment, square or cube with this volume (m³). The volume is the
+    /// length, area or volume of this shape times [`Self::out_of_plane_measure`].
     pub fn edge(self, volume: f64) -> f64 {
         let extent = volume / self.out_of_plane_measure();
         libm::pow(extent, 1.0 / self.count() as f64)
@@ -68,8 +69,8 @@ impl Dimension {
         }
     }
 
-    /// Test whether bond-based laws allow any Poisson's ratio. This is true for a bar in uniaxial stress,
-    /// whose stiffness is E.
+    /// Test whether bond-based laws allow any Poisson's ratio. This is true only for a bar in uniaxial
+    /// stress: its stiffness E does not depend on Poisson's ratio.
     pub fn allows_any_poisson_ratio(self) -> bool {
         matches!(
             self,
@@ -92,7 +93,7 @@ impl Dimension {
         )
     }
 
-    /// Return the name of the dimension and its condition, for messages.
+    /// Return the name of the dimension and of the condition perpendicular to the plane or bar, for messages.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};
         match self {

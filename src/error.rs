@@ -44,8 +44,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// Format a user's text for a message: in backticks, with escaped control characters, at most `EXCERPT`
-/// characters of the text.
+/// Format a user's text for a message: in backticks, with escaped control characters. A text longer than
+/// `EXCERPT` characters is cut off there, and followed by `…`.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {
@@ -93,13 +93,13 @@ impl Error {
         }
     }
 
-    /// Test whether a signal has stopped the run, which is not a failure.
+    /// Test whether a signal has stopped the run or sweep. Such a stop is not a failure.
     pub fn is_stop(&self) -> bool {
         self.kind == ErrorKind::Stopped
     }
 
     /// Return the process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments, 75 for a
-    /// run that can be started again.
+    /// run or sweep that a signal has stopped.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Run => 1,

@@ -9,8 +9,8 @@ fn main() -> ExitCode {
     cli::main()
 }
 
-/// Make the allocator return large arrays to the system as soon as they are freed. Otherwise, the memory of the
-/// set-up, which is as large as that of the run, would stay allocated.
+/// Make the allocator return large arrays to the system as soon as the program frees them. Otherwise, the
+/// memory of the set-up would stay allocated; its size is similar to that of the memory of the run.
 fn give_memory_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: only sets a parameter of the allocator, before there is another thread.

@@ -2,8 +2,8 @@
 
 use std::fs;
 
-/// Allocations below this size (bytes) are not checked, to save system calls. A check leaves this much memory
-/// for other allocations.
+/// [`check_room`] does not check allocations below this size (bytes), to save system calls. A checked
+/// allocation must leave this number of bytes free for other allocations.
 const LARGE: u64 = 64 << 20;
 
 /// Insufficient memory.
@@ -30,8 +30,9 @@ pub fn check_room(needed: u64) -> Result<(), Shortage> {
     Ok(())
 }
 
-/// Return the available memory, bytes: the minimum over address-space limit (`ulimit -v`), control group and
-/// machine; `u64::MAX` on systems that report none of them.
+/// Return the memory that this process can still allocate, bytes: the smallest of the amounts that the limit
+/// of the address space (`ulimit -v`), the control group and the machine leave. `u64::MAX` on systems that
+/// report none of the three.
 fn available() -> u64 {
     let limits = [address_space(), control_group(), machine()];
     limits.into_iter().flatten().min().unwrap_or(u64::MAX)
@@ -51,7 +52,8 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory left in the control group (version 2), bytes.
+/// Return the memory and swap left in this process's control group, bytes. `None` if the group has no limit,
+/// or on systems without control groups of version 2. Limits of parent groups are not read.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::"))?;
@@ -75,7 +77,7 @@ fn free_swap() -> Option<u64> {
     kibibytes("/proc/meminfo", "SwapFree:")
 }
 
-/// Read an entry in KiB from a file, as bytes.
+/// Read an entry of a file that gives the entry in KiB, and return it in bytes.
 fn kibibytes(path: &str, name: &str) -> Option<u64> {
     entry(&fs::read_to_string(path).ok()?, name).map(|kibibytes| 1024 * kibibytes)
 }

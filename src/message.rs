@@ -1,6 +1,6 @@
 //! Parts of messages: numbers in short form, and suggestions for misspelled names.
 
-/// Longest name for which [`nearest`] searches similar names, bytes.
+/// Longest name that [`nearest`] compares with other names, bytes.
 const LONGEST_NAME: usize = 64;
 
 /// Format a number for a message. Very large and very small numbers have an exponent.
@@ -26,7 +26,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Return the suggestion for an error on an unknown name: `; did you mean …? (known: …)`.
+/// Return the suggestion for an error on an unknown name: `; did you mean …? (known: …)`. Without a similar
+/// name, the result is only the part in parentheses.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let mean = nearest(name, known.iter().copied())

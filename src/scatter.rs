@@ -8,7 +8,7 @@ pub enum Scattered {
     Position(usize),
     /// The strength of a point.
     Strength,
-    /// A component of a vector that probes a matrix.
+    /// A component of a vector of random signs, from which a solver estimates the trace of a matrix.
     Probe(usize),
 }
 
@@ -22,15 +22,16 @@ pub struct Weibull {
 }
 
 impl Weibull {
-    /// Return the strength of a point divided by the characteristic strength: (−ln u)^(1/m), with the uniform
-    /// random number u. The probability that this quotient is below x is 1 − exp(−x^m).
+    /// Return the strength of the point with this id, divided by the characteristic strength: (−ln u)^(1/m),
+    /// with the uniform random number u. The probability that this quotient is below x is 1 − exp(−x^m).
     pub fn strength(self, id: u64) -> f64 {
         let survival = uniform(self.seed, Scattered::Strength, id);
         libm::pow(-libm::log(survival), 1.0 / self.modulus)
     }
 }
 
-/// Return a random number with a uniform distribution between 0 and 1, both excluded.
+/// Return the random number of the point with this id, with a uniform distribution between 0 and 1, both
+/// excluded.
 pub fn uniform(seed: u64, what: Scattered, id: u64) -> f64 {
     let stream = match what {
         Scattered::Position(component) => component as u64,
@@ -58,14 +59,14 @@ mod tests {
     const COUNT: u64 = 20_000;
 
     /// Return the bound on the largest difference between the empirical distribution function of `count`
-    /// values and the true one. One in a million samples exceeds the bound (Dvoretzky, Kiefer & Wolfowitz,
-    /// with Massart's constant).
+    /// values and the true distribution function. One in a million samples exceeds the bound (Dvoretzky,
+    /// Kiefer & Wolfowitz, with Massart's constant).
     fn bound(count: u64) -> f64 {
         (libm::log(2e6) / (2.0 * count as f64)).sqrt()
     }
 
-    /// Compute the largest difference between the empirical distribution function of values and a given
-    /// distribution.
+    /// Compute the largest difference between the empirical distribution function of `values` and the
+    /// distribution function `distribution`.
     fn difference(mut values: Vec<f64>, distribution: impl Fn(f64) -> f64) -> f64 {
         values.sort_by(f64::total_cmp);
         let count = values.len() as f64;

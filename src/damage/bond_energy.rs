@@ -1,9 +1,9 @@
 //! Energy criterion: a bond breaks irreversibly when the work of its force states reaches w_c. By default
 //! only stretched bonds break.
 //!
-//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work on a linear bond is w =
-//! ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the plane G0 = 2h ∫₀^δ
-//! ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
+//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work on a linear bond is
+//! w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the plane, with the
+//! thickness h, G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
 
 use std::f64::consts::PI;
 
@@ -19,13 +19,14 @@ pub enum Calibration {
     /// energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None`
     /// until then.
     Opening(Option<f64>),
-    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no ½, and in the plane w_c is 3G0/(πδ³h). This
-    /// w is the work on η, so the criterion holds for small rotations only.
+    /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no factor ½, and in the plane w_c is
+    /// 3G0/(πδ³h). This w is the work on η, so the criterion holds for small rotations only.
     Willberg2022,
-    /// PeriLab's formula: a bond breaks at ¼ |(T_i − T_j)·η| = 3G0/(πδ³h) in the plane and 4G0/(πδ⁴) in
+    /// PeriLab's formula: a bond breaks when ¼ |(T_i − T_j)·η| is 3G0/(πδ³h) in the plane, or 4G0/(πδ⁴) in
     /// space.
     PeriLab,
-    /// Peridigm's formula of 2021 for the plane, which lacks π: ¼ (|T_i·η| + |T_j·η|) = 3G0/(δ³h).
+    /// Peridigm's formula of 2021 for the plane: a bond breaks when ¼ (|T_i·η| + |T_j·η|) is 3G0/(δ³h). This
+    /// value lacks the factor 1/π of PeriLab's value.
     Peridigm2021,
 }
 
@@ -34,7 +35,7 @@ pub enum Calibration {
 pub struct BondEnergy {
     /// Critical work w_c, J/m⁶.
     pub critical: f64,
-    /// α: effect of the smallest stretch of a point on its threshold.
+    /// α: effect of the smallest stretch of a point on the threshold of this point.
     pub alpha: f64,
     /// Critical stretch s0 for the same fracture energy; the threshold depends on α s_min/s0.
     pub stretch: f64,
@@ -52,7 +53,7 @@ impl Calibration {
         }
     }
 
-    /// Return the energy per area that breaking all bonds across an area dissipates, divided by the fracture
+    /// Return the energy that breaking all bonds across a unit area dissipates, divided by the fracture
     /// energy.
     pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
@@ -69,8 +70,8 @@ impl Calibration {
 }
 
 impl BondEnergy {
-    /// Return w_c (J/m⁶) from the energy per area G0 (J/m²) and the horizon δ (m). It is 4G0/(πδ⁴) in 3-D,
-    /// 3G0/(2δ³h) in the plane, and 2G0/(δ²A) in 1-D.
+    /// Return w_c (J/m⁶) from the energy per area G0 (J/m²) and the horizon δ (m). w_c is 4G0/(πδ⁴) in 3-D,
+    /// 3G0/(2δ³h) in the plane, and 2G0/(δ²A) in 1-D, with the thickness h (m) and the cross-section A (m²).
     pub fn from_energy(dimension: Dimension, energy: f64, horizon: f64) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         energy
@@ -84,7 +85,7 @@ impl BondEnergy {
     }
 
     /// Return the threshold (J/m⁶) of a point with strength f and the smallest stretch s_min of its intact
-    /// bonds. It is w_c ((f s0 − α s_min)/s0)², or 0 if f s0 < α s_min. Without scatter f = 1.
+    /// bonds. The threshold is w_c ((f s0 − α s_min)/s0)², or 0 if f s0 < α s_min. Without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         let share = (strength - self.alpha * smallest / self.stretch).max(0.0);
@@ -98,7 +99,8 @@ mod tests {
     use crate::damage::{Sense, WorkMeasure};
     use crate::dimension::Constraint;
 
-    /// Energy of all bonds across a unit area by the midpoint rule, divided by the fracture energy.
+    /// Return the energy of breaking all bonds across a unit area, by the midpoint rule, divided by the
+    /// fracture energy.
     fn taken(dimension: Dimension) -> f64 {
         let (horizon, energy, cells) = (3e-3, 135.0, 1500_u32);
         let critical = BondEnergy::from_energy(dimension, energy, horizon);

@@ -1,5 +1,5 @@
 //! Criteria that break bonds. Both ends of a bond evaluate its criterion with the same operations, so that
-//! their results agree.
+//! the results at both ends agree.
 //!
 //! - Stretches are compared by x of [`crate::material::bond`], which needs no root.
 //! - Energies are compared by the work of the force states of the ends that act on the bond.
@@ -29,10 +29,10 @@ pub enum Criterion {
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
-    /// Bonds break when the work of the acting force states reaches the sum of the critical works (J/m⁶) of
-    /// the acting ends.
+    /// Bonds break when the work of the acting force states reaches the sum of the numbers of the acting
+    /// ends. The numbers are the shares of points i and j in the critical work, J/m⁶.
     Work([f64; 2], WorkRule),
-    /// Same as [`Self::Work`], with the work thresholds of points i and j.
+    /// Same as [`Self::Work`], with the numbers computed from the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
     /// stress measures of its acting ends.
@@ -47,7 +47,7 @@ pub enum Criterion {
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold or a stretch threshold to another horizon. Entry `[e][k]` converts
-/// the threshold of point k to end e; all are 1 if both horizons are equal.
+/// the threshold of point k to the horizon of end e. All entries are 1 if both horizons are equal.
 pub type HorizonRatios = [[f64; 2]; 2];
 
 /// Critical stretch of a bond between points whose critical stretches belong to different horizons.
@@ -221,7 +221,7 @@ impl Criterion {
         matches!(*self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] above which bonds are marked as beyond the series. If
+    /// The |x| of [`crate::material::bond`] above which bonds are marked in [`Bond::beyond_series`]. If
     /// [`Self::marks_all`], only marked bonds break.
     #[inline(always)]
     pub fn limit(&self) -> f64 {
@@ -261,7 +261,7 @@ impl Criterion {
     ) -> u8 {
         match *self {
             Self::Never => 0,
-            // Every bond that breaks has an |x| above the limit, so none of these bonds breaks.
+            // Only bonds with |x| above the limit break, and none of these eight bonds has such an |x|.
             Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(critical) if !L::SCALED => simd.at_least(
                 bond.relative_square_extension,
@@ -358,9 +358,9 @@ impl Criterion {
         }
     }
 
-    /// Return the fraction of the energy of each broken bond that exceeds its criterion: 1 − (s_c/s)², 1 −
-    /// w_c/w or 1 − (σ_c/σ)², at least 0. Bonds exceed their criterion because it is checked only once per
-    /// step. Criteria of stretch read [`Bond::stretch`].
+    /// Return the fraction of the energy of each broken bond that exceeds the criterion: 1 − (s_c/s)²,
+    /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0, with the threshold s_c, w_c or σ_c. Bonds exceed the criterion
+    /// because it is checked only once per step. Criteria of stretch read [`Bond::stretch`].
     #[inline(always)]
     pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
         &self,
@@ -410,9 +410,9 @@ impl WorkRule {
         self.family_correction > 0.0
     }
 
-    /// Return the critical work of bonds from the critical works of both ends in untruncated families; only
-    /// acting ends count. The sum is written out, because array methods are not always inlined. Without
-    /// inlining, all data of a bond stay in memory.
+    /// Return the critical work of bonds (J/m⁶) from the shares of points i and j in untruncated families;
+    /// only acting ends count. The sum is written out, because array methods are not always inlined. Without
+    /// inlining, all data of a bond stay in memory instead of registers.
     #[inline(always)]
     fn sum_of_acting<S: Simd, L, P>(
         self,
@@ -426,7 +426,8 @@ impl WorkRule {
         critical_i + critical_j
     }
 
-    /// Return the critical work of an end from its critical work in an untruncated family.
+    /// Return the share of an end in the critical work (J/m⁶), from the share of this end in an untruncated
+    /// family.
     #[inline(always)]
     fn corrected(self, critical: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {

@@ -20,13 +20,13 @@ use super::pull_apart::pull_apart;
 pub struct CriticalStretch {
     /// Critical stretch s0.
     pub critical: f64,
-    /// α: effect of the smallest stretch of a point on its threshold.
+    /// α: effect of the smallest stretch of a point on the threshold of this point.
     pub alpha: f64,
 }
 
 impl CriticalStretch {
     /// Return s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio of
-    /// bond-based laws.
+    /// bond-based laws. In the table, c is the micromodulus of `pmb`, and A the cross-section (m²).
     ///
     /// | dimension | s0 | source |
     /// |---|---|---|
@@ -79,8 +79,8 @@ impl CriticalStretch {
     /// Return the critical stretch of bonds between two bodies whose interface opens at a normal stress σ
     /// (Pa).
     ///
-    /// It is the mean of the strains σ/E′ of both bodies in tension along the normal. A bond along the normal
-    /// has this stretch if half of it lies in each body.
+    /// The result is the mean of the strains σ/E′ of both bodies in tension along the normal. A bond along
+    /// the normal has this stretch if half of the bond lies in each body.
     /// E′ is E in 3-D, plane stress and uniaxial stress, E/(1−ν²) in plane strain, and E(1−ν)/((1+ν)(1−2ν))
     /// under uniaxial strain.
     pub fn from_strength(dimension: Dimension, bodies: [Isotropic; 2], strength: f64) -> f64 {
@@ -88,8 +88,8 @@ impl CriticalStretch {
         0.5 * (a + b)
     }
 
-    /// Return the ratio of stress to strain in tension along one direction, Pa. Transverse directions have no
-    /// load, unless the dimension prevents their strain.
+    /// Return the ratio of stress to strain in tension along one direction, Pa. The transverse stresses are
+    /// 0, except in directions in which the dimension allows no strain.
     pub fn tensile_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
         let (modulus, nu) = (elastic.youngs_modulus, elastic.poisson_ratio);
         match dimension {
@@ -107,8 +107,8 @@ impl CriticalStretch {
         }
     }
 
-    /// Return the threshold of a point with strength f and the smallest stretch s_min of its intact bonds: f
-    /// s0 − α s_min. Without scatter f = 1.
+    /// Return the threshold f s0 − α s_min of a point, from its strength f and the smallest stretch s_min of
+    /// its intact bonds. Without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         strength * self.critical - self.alpha * smallest

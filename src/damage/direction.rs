@@ -40,7 +40,8 @@ const LEAST_BASE: f64 = 0.1;
 /// Tolerance of [`LEAST_BASE`] for the round-off of p.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of directions per quarter of a circle, in sums over all directions.
+/// Number of directions per quarter of a circle, in sums over all directions. In 3-D, also the number of
+/// steps of the z component from 0 to 1.
 const DIRECTIONS: u32 = 256;
 
 /// Factor w_c/w of the critical work of a bond, as a function of the bond's direction.
@@ -121,8 +122,8 @@ impl ToughnessByDirection {
         self.base + self.share * across
     }
 
-    /// Fracture energy of cracks with a unit normal, divided by the fracture energy of cracks along a.
-    /// Computed as a sum over directions.
+    /// Fracture energy of cracks with this unit normal, divided by the fracture energy of cracks along a. The
+    /// quotient is computed as a sum over bond directions.
     pub fn cost(&self, dimension: usize, normal: [f64; 3]) -> f64 {
         let quarter = f64::from(DIRECTIONS);
         let mut sums = [0.0; 2];
@@ -155,8 +156,8 @@ impl ToughnessByDirection {
     }
 }
 
-/// Return the means of c^k, k = 2^squarings, over the bonds that cross a plane. The first mean is for a
-/// normal parallel to a, the second for a normal perpendicular to a.
+/// Return the means of c^k, k = 2^squarings, over the bonds that cross a plane. The first mean is for a plane
+/// whose normal is parallel to a, the second for a plane whose normal is perpendicular to a.
 fn means(dimension: usize, is_tough_across: bool, squarings: u32) -> [f64; 2] {
     let mut means = [1.0; 2];
     for j in 1..=1_u32 << squarings {
@@ -174,7 +175,7 @@ fn means(dimension: usize, is_tough_across: bool, squarings: u32) -> [f64; 2] {
     means
 }
 
-/// Computation of the factors of the critical work of bonds at both ends, from their directions.
+/// Computation of the factors w_c/w at points i and j, from the directions of eight bonds.
 pub(super) struct DirectionFactors<'a, const D: usize> {
     directions: &'a [ToughnessByDirection; 2],
     xi: [Lanes; D],

@@ -38,7 +38,8 @@ impl DamageLaw {
         }
     }
 
-    /// α: effect of the smallest stretch of a point on its threshold; 0 for the stress criterion.
+    /// α: effect of the smallest stretch of a point on the threshold of this point; 0 for the stress
+    /// criterion.
     pub fn alpha(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.alpha,
@@ -47,7 +48,7 @@ impl DamageLaw {
         }
     }
 
-    /// The factor [`WorkRule::family_correction`]; 0 for the criteria of stretch and stress.
+    /// The factor [`WorkRule::family_correction`]; 0 for the stretch criterion and the stress criterion.
     pub fn family_correction(&self) -> f64 {
         match self {
             Self::CriticalStretch(_) | Self::Stress(_) => 0.0,
@@ -71,8 +72,8 @@ impl DamageLaw {
         }
     }
 
-    /// Return the threshold of a point with this strength (1 without scatter) and this smallest stretch of
-    /// its intact bonds.
+    /// Return the threshold of a point: a stretch, a work (J/m⁶) or a stress (Pa). `strength` is the random
+    /// factor of the point, 1 without scatter, and `smallest` is the smallest stretch of its intact bonds.
     #[inline(always)]
     pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         match self {

@@ -1,27 +1,31 @@
 //! Energy for pulling an ordinary state-based body apart along a plane, with a critical stretch.
 //!
 //! The halves of a body move apart by Δ normal to the plane. A bond at the angle φ to the normal has the
-//! extension Δ cos φ and breaks at s0|ξ|. Breaking a bond dissipates its energy ½ (A/m) ω|ξ|²s0². At each
-//! end, the dilatation energy decreases by κ θ (d/m) ω|ξ|² s0, which is dissipated, too. Here θ is the
-//! dilatation of the bonds that are still intact. The sum over all bonds across a unit area is G0 = δ s0² (A
-//! b + κ τ). The numbers b and τ depend only on the dimension and the influence function; ω, κ and A are
-//! defined in [`crate::material::Ordinary`]. For the Poisson ratio of bond-based laws κ = 0. With ω = 1/|ξ|
-//! the result is then the critical stretch of the bond-based law (Silling & Askari 2005; Dipasquale et al.
-//! 2014, eq. 5).
+//! extension Δ cos φ, and breaks when this extension is s0|ξ|. Breaking a bond dissipates at each end the
+//! bond energy ½ (A/m) ω|ξ|²s0². It also dissipates the decrease κ θ (d/m) ω|ξ|² s0 of the dilatation energy
+//! of the end, where θ is the dilatation of the bonds that are still intact. The sum over all bonds across a
+//! unit area is G0 = δ s0² (A b + κ τ). The numbers b and τ depend only on the dimension and the influence
+//! function. The symbols d, m, ω, κ and A are those of `ordinary.rs`, see [`crate::material::Ordinary`]. For
+//! the Poisson ratio of bond-based laws κ = 0. With ω = 1/|ξ| the result is then the critical stretch of the
+//! bond-based law (Silling & Askari 2005; Dipasquale et al. 2014, eq. 5).
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use crate::material::Influence;
 
-/// Quadrature of τ: number of distances from the plane, and of lengths and angles of bonds per distance.
+/// Number of distances of points from the plane in the quadrature of τ.
 const DISTANCES: u32 = 48;
+
+/// Number of bond lengths per distance in the quadrature of τ.
 const LENGTHS: u32 = 64;
+
+/// Number of angles φ per bond length in the quadrature of τ.
 const ANGLES: u32 = 64;
 
-/// Return b and τ in G0 = δ s0² (A b + κ τ), in `dimension` 2 or 3; τ to about 10⁻³.
+/// Return b and τ in G0 = δ s0² (A b + κ τ), in `dimension` 2 or 3. The relative error of τ is about 10⁻³.
 ///
-/// The quadrature takes tens of milliseconds, so each result is kept for the next material.
+/// The quadrature takes tens of milliseconds, so each result is stored for later calls.
 pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
     static RESULTS: [[OnceLock<[f64; 2]>; 4]; 2] = [const { [const { OnceLock::new() }; 4] }; 2];
     let result = &RESULTS[usize::from(dimension == 3)][influence as usize];

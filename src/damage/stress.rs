@@ -1,9 +1,10 @@
-//! Stress criterion: a bond breaks irreversibly when the stress at its ends reaches a strength.
+//! Stress criterion: a bond breaks irreversibly when the mean stress of its ends reaches a strength.
 //!
-//! The criterion reads a scalar measure of the Cauchy stress σ = P Fᵀ/det F of a point. F is the deformation
-//! gradient of the point's family. In plane problems, σ and det F include the direction perpendicular to the
-//! plane. The mean of the measures at the ends that act on the bond is compared with the strength. Strength
-//! and horizon determine the energy per area that a growing crack dissipates.
+//! The criterion reads a scalar measure of the Cauchy stress σ = P Fᵀ/det F of a point. P is the first
+//! Piola–Kirchhoff stress of the point, and F is the deformation gradient of its family. In plane problems, σ
+//! and det F include the direction perpendicular to the plane. The mean of the measures at the ends that act
+//! on the bond is compared with the strength. Strength and horizon determine the energy per area that a
+//! growing crack dissipates.
 
 use nalgebra::Matrix3;
 
@@ -86,14 +87,15 @@ pub struct StressLimit {
 
 /// Computation of the mean stress measure of each bond, Pa. An end counts in the mean if the bond is within
 /// the horizon of the end, and the point at this end carries stress. The result also has one bit per bond,
-/// set if at least one end counts. Points i and j compute the same bits.
+/// set if at least one end counts. The result is the same for points i and j.
 pub(super) struct MeanStress {
     stresses: [Lanes; 2],
     acting: [u8; 2],
 }
 
 impl MeanStress {
-    /// Copy the stress measures of points i and j (Pa), and the bits of the bonds within the horizon of each.
+    /// Copy the stress measures of points i and j (Pa), and for points i and j the bits of the bonds within
+    /// the horizon of the point.
     #[inline(always)]
     pub(super) fn new<S: Simd>(simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Self {
         Self {

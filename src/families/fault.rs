@@ -7,8 +7,8 @@ use crate::points::Point;
 use crate::problem::Problem;
 use crate::problem::{Body, PointSource};
 
-/// Upper limit on the number of neighbours of a point. It is reached at a horizon of about 17 spacings in 3-D
-/// and 80 in 2-D.
+/// Upper limit on the number of neighbours of a point. A lattice reaches this limit at a horizon of about 17
+/// spacings in 3-D and 80 in 2-D.
 pub const MOST_NEIGHBOURS: f64 = 20_000.0;
 
 /// An error of building families.
@@ -40,7 +40,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Create the error message, with the deck key that causes the error.
+    /// Create the error. The message names the body or the deck key that causes the fault, except for
+    /// [`Self::TooManyHoles`].
     pub fn error(&self, problem: &Problem) -> Error {
         match self {
             Self::SamePlace(points) => same_place(problem, points),

@@ -34,7 +34,7 @@ pub struct GridFrame {
 }
 
 impl GridFrame {
-    /// The cell whose centre is nearest to a position, m.
+    /// The cell whose centre is nearest to a position (m), counted from [`Self::origin`].
     pub fn cell(&self, position: [f64; 3]) -> [i64; 3] {
         std::array::from_fn(|k| ((position[k] - self.origin[k]) / self.spacing[k]).round() as i64)
     }
@@ -73,7 +73,8 @@ pub struct Grid {
     pub(super) lines: Vec<Line>,
     /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
-    /// For owned points and for ghosts: the runs by slot, and the first run of each chunk.
+    /// For owned points and for ghosts: the runs by slot, and the index of the first run of each chunk of
+    /// [`CHUNK`] slots, followed by the number of runs.
     runs: [(Vec<Run>, Vec<u32>); 2],
     /// The runs of the owned points, by local index.
     by_point: Vec<Run>,
@@ -123,8 +124,8 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // Width of the padding. Any x of a band, plus or minus the longest bond, must be in bounds relative
-        // to each line of the band.
+        // Width of the padding. In each line of a band, the slot of any x of the band, plus or minus the
+        // longest bond, must be in bounds, even if the line does not contain this x.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];
@@ -189,10 +190,10 @@ impl Grid {
         }
     }
 
-    /// Return the line in the band of line `index` that is displaced by these numbers of cells in y and z;
-    /// `None` if there is no such line.
+    /// Return the line in the same band that is displaced from line `index` by these numbers of cells in y
+    /// and z; `None` if there is no such line.
     ///
-    /// The line is close to `index` in memory, so the search begins there.
+    /// The wanted line is close to line `index` in memory, so the search begins at line `index`.
     pub(super) fn line_beside(&self, index: usize, [y, z]: [i64; 2]) -> Option<&Line> {
         let key = |line: &Line| [line.at[0], line.at[2], line.at[1]];
         let [band, own_z, own_y] = key(&self.lines[index]);
@@ -308,7 +309,7 @@ fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
         .collect()
 }
 
-/// Sort runs by local index and merge consecutive ones.
+/// Sort runs by local index, and merge runs with consecutive slots and consecutive local indices.
 fn by_point(runs: &[Run]) -> Vec<Run> {
     let mut sorted = runs.to_vec();
     sorted.sort_unstable_by_key(|run| run.point);
@@ -324,8 +325,8 @@ fn by_point(runs: &[Run]) -> Vec<Run> {
     sorted
 }
 
-/// The longest runs of the selected slots, split at the boundaries of chunks, and the first run of each
-/// chunk.
+/// The longest runs of the selected slots, split at the boundaries of chunks of [`CHUNK`] slots. Also return
+/// the index of the first run of each chunk, followed by the number of runs.
 fn runs(points: &[u32], selected: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut starts = Vec::new();

@@ -24,15 +24,15 @@ const CHUNK: usize = 256;
 pub struct BondLattice {
     /// Block of i, the points that sum over these bonds.
     pub block_i: usize,
-    /// Block of j, their neighbours.
+    /// Block of j, the neighbours of the points i.
     pub block_j: usize,
-    /// Index of the grid.
+    /// Index of the grid among all grids.
     pub index: usize,
     /// The layout of the grid.
     pub grid: Arc<Grid>,
-    /// Volume of j, m³.
+    /// Volume of each point j, m³.
     pub volume: f64,
-    /// Volume of i, m³.
+    /// Volume of each point i, m³.
     pub own_volume: f64,
     offsets: Vec<Offset>,
     /// Whether weights may differ from 1, and whether the weights of i and j may differ.
@@ -216,7 +216,7 @@ impl BondLattice {
         }
     }
 
-    /// Set the volume weights of both ends (`end` = 0) or only of j (`end` = 1) to `weight(ξ)`, ξ in m.
+    /// Set the weights of both ends (`end` = 0) or only of j (`end` = 1) to `weight(ξ)`, ξ in m.
     pub fn weigh(&mut self, end: usize, weight: impl Fn([f64; 3]) -> f64) {
         for offset in &mut self.offsets {
             offset.weights[end] = weight(offset.reference);
@@ -227,7 +227,8 @@ impl BondLattice {
         self.weighted[end] = true;
     }
 
-    /// Call `visit(group, lane, [i, j])` with local indices i and j for each intact bond.
+    /// Call `visit(group, lane, [i, j])` for each intact bond, with its group and lane in the store and the
+    /// local indices i and j.
     fn for_each(&self, mut visit: impl FnMut(usize, usize, [usize; 2])) {
         for k in 0..self.vectors.len() {
             self.for_each_of(self.intact(k).iter().copied(), k, &mut visit);
@@ -240,8 +241,8 @@ impl BondLattice {
         &self.store.intact[vector * count..(vector + 1) * count]
     }
 
-    /// Call `visit(group, lane, [i, j])` with local indices i and j for each set bit of the lane group with
-    /// index `vector`.
+    /// Call `visit(group, lane, [i, j])` as [`Self::for_each`] does, for each set bit of `bits`: the bits of
+    /// the bonds of the lane group with index `vector`, one byte per offset.
     fn for_each_of(
         &self,
         bits: impl Iterator<Item = u8>,
@@ -352,7 +353,7 @@ impl BondLattice {
     }
 
     /// Call `visit(point, vector, lane)` for each point with bonds. The arguments are the local index, the
-    /// index of its lane group, and its lane.
+    /// index of the lane group, and the lane of the point.
     pub fn for_each_point(&self, mut visit: impl FnMut(usize, usize, usize)) {
         for (k, vector) in self.vectors.iter().enumerate() {
             for lane in (0..WIDTH).filter(|lane| vector.members >> lane & 1 == 1) {
@@ -407,7 +408,7 @@ impl BondLattice {
     }
 }
 
-/// The bits of eight slots, set for points of a block.
+/// One bit for each of the eight slots from `slot` on, set if the slot contains a point of a block.
 fn mask(grid: &Grid, slot: usize, block: usize) -> u8 {
     let blocks = &grid.blocks[slot..slot + WIDTH];
     let bit = |k: usize| u8::from(blocks[k] as usize == block) << k;

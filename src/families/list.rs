@@ -15,7 +15,7 @@ const CHUNK: usize = 512;
 pub struct BondList {
     /// Block of i, the points that sum over these bonds.
     pub block_i: usize,
-    /// Block of j, their neighbours.
+    /// Block of j, the neighbours of the points i.
     pub block_j: usize,
     /// Local index of each row's point, ascending.
     pub(super) points: Vec<u32>,
@@ -26,8 +26,8 @@ pub struct BondList {
     pub(super) neighbours: Neighbours,
     /// State of the bonds; the intact bits of padding are clear.
     pub(super) store: Store,
-    /// Volume weights of the ends i and j, 0 for padding. If the weights of i are `None`, all weights are 1.
-    /// If only the weights of j are `None`, the weights of i apply to both ends.
+    /// [Weights](crate::material::bond::Weights) of the ends i and j, 0 for padding. If the weights of i are
+    /// `None`, all weights are 1. If only the weights of j are `None`, the weights of i apply to both ends.
     pub(super) weights: [Option<Vec<Lanes>>; 2],
     /// The largest local index in the list, plus one.
     pub(super) reach: usize,
@@ -41,8 +41,8 @@ pub struct Row<'a> {
     pub neighbours: NeighbourGroups<'a>,
     /// State of the bonds.
     pub groups: Groups<'a>,
-    /// Volume weights of the ends i and j. If the weights of i are `None`, all weights are 1. If only the
-    /// weights of j are `None`, the weights of i apply to both ends.
+    /// [Weights](crate::material::bond::Weights) of the ends i and j. If the weights of i are `None`, all
+    /// weights are 1. If only the weights of j are `None`, the weights of i apply to both ends.
     pub weights: [Option<&'a [Lanes]>; 2],
 }
 
@@ -110,8 +110,8 @@ impl BondList {
         }
     }
 
-    /// Set the volume weights of the bonds to `weight(end, ξ)`, with ξ = `offset(i, j)` in m. With `ends` =
-    /// 1, the weight of end 0 (point i) applies to both ends; with `ends` = 2, each end has a weight.
+    /// Set the weights of the bonds to `weight(end, ξ)`, with ξ = `offset(i, j)` in m. With `ends` = 1, the
+    /// weight of end 0 (point i) applies to both ends; with `ends` = 2, each end has its own weight.
     pub fn weigh(
         &mut self,
         ends: usize,
@@ -236,8 +236,8 @@ impl BondList {
         }
     }
 
-    /// Call `visit(row, point, bytes)` for each row. The arguments are the index of the row, its point, and
-    /// the length of its checkpoint row.
+    /// Call `visit(row, point, bytes)` for each row. The arguments are the index of the row, the local index
+    /// of its point, and the number of bytes that [`Self::save_row`] writes for the row.
     pub fn for_each_row(&self, mut visit: impl FnMut(usize, usize, usize)) {
         let bytes = 1 + WIDTH * self.store.history_bytes_per_bond();
         for (row, point) in self.points.iter().enumerate() {
@@ -246,7 +246,7 @@ impl BondList {
         }
     }
 
-    /// Write the checkpoint row: for each group the intact bits, then the history.
+    /// Write a row to a checkpoint: for each group the intact bits, then the history.
     pub fn save_row(&self, row: usize, bytes: &mut [u8]) {
         let width = self.store.history_bytes_per_bond();
         let groups = self.starts[row]..self.starts[row + 1];

@@ -120,8 +120,8 @@ impl BlockBonds {
         with!(self, bonds => &mut bonds.store)
     }
 
-    /// Call `visit(i, bytes)` for each point with bonds. The arguments are its local index and the length of
-    /// its checkpoint row. The rows do not depend on the number of ranks.
+    /// Call `visit(i, bytes)` for each point with bonds. The arguments are the local index and the length of
+    /// the checkpoint row of the point. The rows do not depend on the number of ranks.
     pub fn row_lengths(&self, mut visit: impl FnMut(usize, usize)) {
         match self {
             Self::List(list) => list.for_each_row(|_, point, length| visit(point, length)),
@@ -132,7 +132,8 @@ impl BlockBonds {
         }
     }
 
-    /// Write the checkpoint row of each point at `bytes[next[point]..]` and advance `next[point]`.
+    /// Write the checkpoint row of each point with bonds at `bytes[next[point]..]`, and advance `next[point]`
+    /// by the length of the row; `point` is the local index of the point.
     pub fn save(&self, next: &mut [usize], bytes: &mut [u8]) {
         match self {
             Self::List(list) => list.for_each_row(|row, point, length| {
@@ -150,7 +151,7 @@ impl BlockBonds {
         }
     }
 
-    /// Restore the rows that [`Self::save`] wrote.
+    /// Restore the rows that [`Self::save`] wrote, and advance `next` as [`Self::save`] does.
     pub fn restore(&mut self, next: &mut [usize], bytes: &[u8]) {
         match self {
             Self::List(list) => {

@@ -1,6 +1,6 @@
 //! Compressed neighbour indices of list families, in groups of eight.
 //!
-//! Points close in space usually have close indices. A compact group stores its lowest index and eight
+//! Points close in space usually have close indices. A compact group stores its smallest index and eight
 //! 16-bit differences. If the range of indices is too wide, for example in a group of owned points and
 //! ghosts, the group stores eight full indices in a second array.
 
@@ -19,7 +19,7 @@ const IN_FULL: u32 = 1 << 31;
 struct Compact {
     /// Smallest of the eight indices; with [`IN_FULL`], an index into the full groups.
     first: u32,
-    /// Differences from the lowest index.
+    /// Differences from the smallest index; unused with [`IN_FULL`].
     differences: [u16; WIDTH],
 }
 
@@ -40,7 +40,7 @@ pub struct NeighbourGroups<'a> {
 /// The neighbour indices of a group.
 #[derive(Debug, Clone, Copy)]
 pub enum Group<'a> {
-    /// The lowest index and the differences from it.
+    /// The smallest index, and the differences from the smallest index.
     Compact(u32, &'a [u16; WIDTH]),
     /// The indices.
     Full(&'a [u32; WIDTH]),
@@ -67,7 +67,7 @@ impl Neighbours {
         self.compact.push(Compact { first, differences });
     }
 
-    /// Append groups of another set.
+    /// Append groups of another list.
     ///
     /// # Panics
     /// If the number of full groups is 2³¹ or more.

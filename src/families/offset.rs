@@ -15,7 +15,7 @@ pub struct Offset {
     pub inverse: f64,
     /// 1/|ξ|², 1/m².
     pub inverse_square: f64,
-    /// Volume weights of the ends i and j.
+    /// [Weights](crate::material::bond::Weights) of the ends i and j.
     pub weights: [f64; 2],
     /// Steps along x.
     pub(super) x: i32,
@@ -23,15 +23,15 @@ pub struct Offset {
     pub(super) line: u32,
 }
 
-/// Number of steps of length `spacing` within a length `cutoff`, limited by the extent of the points; all in
-/// m.
+/// Number of steps of length `spacing` (m) within a length `cutoff` (m), limited by the extent of the points
+/// (m).
 pub(super) fn steps(cutoff: f64, spacing: f64, extent: f64) -> i64 {
     let limit = (extent / spacing).ceil();
     (cutoff / spacing).floor().min(limit) as i64
 }
 
-/// Estimate the largest number of neighbours within `cutoff` (m) on a lattice with `cells` cells per
-/// direction.
+/// Estimate the largest number of neighbours within `cutoff` (m) on a lattice with these edges of the cells
+/// (m) and `cells` cells per direction.
 pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimension: usize) -> f64 {
     use std::f64::consts::PI;
     let reach = |k: usize| cutoff / spacing[k];
@@ -42,7 +42,7 @@ pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimensio
     within.min(widths.product())
 }
 
-/// The offsets up to the length `cutoff` (m), sorted by z, y and x. Also return the line offsets that occur
+/// Return the offsets up to the length `cutoff` (m), sorted by z, y and x, and the line offsets that occur
 /// in these offsets. `extent` is the extent of the points per direction, m.
 pub(super) fn offsets(
     spacing: [f64; 3],

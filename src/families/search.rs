@@ -33,9 +33,9 @@ pub fn cutoff(horizon: f64) -> f64 {
 /// The points of a domain, sorted by block, then by global id. The search returns indices into this order. If
 /// these indices are sorted, the neighbours are sorted by id.
 struct Order {
-    /// Local index of each sorted index.
+    /// Local index of the point at each position in this order.
     local: Vec<u32>,
-    /// Sorted index of the first point of each block, followed by the number of points.
+    /// Position in this order of the first point of each block, followed by the number of points.
     first: Vec<u32>,
     /// Bins of the points of each block, by index relative to the block's first point. Each block has
     /// separate bins, so points without bonds to the block do not search these points.
@@ -138,8 +138,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
     Ok(lists)
 }
 
-/// Return an error if the lists will not fit in memory. Their memory is extrapolated from the fraction `done`
-/// of the points.
+/// Return an error if the lists will not fit in memory. The memory of the complete lists is extrapolated from
+/// the fraction `done` of the points.
 fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
     let remaining = bytes as f64 * (1.0 / done - 1.0);

@@ -45,7 +45,7 @@ pub struct VectorBonds<'a> {
 pub struct Vectors<'a> {
     pub(super) lattice: LatticeTables<'a>,
     pub(super) vectors: &'a [Vector],
-    /// Index of the first lane group.
+    /// Index in the lattice of the first lane group of the range.
     pub(super) first: usize,
     pub(super) groups: Groups<'a>,
 }

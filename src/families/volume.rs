@@ -5,8 +5,8 @@
 //!   points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). `LinearInside` is the form of
 //!   LAMMPS (Parks et al. 2008): the factor drops from 1/2 to 0 at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
-//!   Schweitzer 2016, eq. 2). It has a closed form in 1-D and 2-D, and is computed by quadrature over slices
-//!   in 3-D.
+//!   Schweitzer 2016, eq. 2). This fraction has a closed form in 1-D and 2-D, and is computed by quadrature
+//!   over slices in 3-D.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -20,7 +20,7 @@ use super::search::cutoff;
 /// Number of quadrature slices of a cell in 3-D.
 const SLICES: u32 = 256;
 
-/// Resolution of the offsets in the cache, in cell edges.
+/// Resolution of the offsets in the cache, as a fraction of the edge of a cell.
 const RESOLUTION: f64 = 1e-6;
 
 /// A quarter of the edge in units of [`RESOLUTION`]. Offsets between points of the same or adjacent
@@ -80,8 +80,9 @@ impl CellShare {
         share
     }
 
-    /// The upper limit (m) of the length of bonds with a positive factor. For `exact`, the ball of radius δ
-    /// touches a corner of a cell at this distance along its diagonal.
+    /// The upper limit (m) of the length of bonds with a positive factor. For `exact`, a cell whose centre
+    /// lies at this distance from point i, along a diagonal of the cell, touches the ball of radius δ with a
+    /// corner.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {
@@ -91,7 +92,7 @@ impl CellShare {
         }
     }
 
-    /// The factor at an offset ξ (m). It is the same at ξ and −ξ.
+    /// The factor at an offset ξ (m). The factors at ξ and −ξ are equal.
     pub fn at(&self, offset: [f64; 3]) -> f64 {
         let squared = offset.iter().map(|x| x * x).sum::<f64>();
         let is_inside = squared <= cutoff(self.horizon).powi(2);
@@ -159,7 +160,8 @@ impl CellShare {
     }
 }
 
-/// Sort the components. The factor is symmetric in the axes, so fewer values are cached.
+/// Sort the components, the largest first. The factor does not depend on the order of the axes, so fewer
+/// values are cached.
 fn ordered(mut steps: [i64; 3]) -> [i64; 3] {
     steps.sort_unstable_by(|a, b| b.cmp(a));
     steps
@@ -270,8 +272,8 @@ mod tests {
     fn cached_factors_are_those_of_their_offsets() {
         for horizon in [1.5, 3.0] {
             let share = CellShare::new(VolumeCorrection::Exact, horizon, 1.0, 3);
-            // Offsets on and off the twice-refined grid, and beyond the cutoff; the second pass reads the
-            // cache.
+            // Offsets at multiples of a quarter of the edge, other offsets, and offsets beyond the cutoff.
+            // The second pass over the same offsets reads the table or the cache.
             for step in [0.25, 0.3, 0.25, 0.3] {
                 let axis = || (0..16).map(|k| f64::from(k) * step);
                 for offset in axis().flat_map(|x| axis().map(move |y| [x, -y, 0.5])) {

@@ -5,8 +5,8 @@ use std::ops::{Deref, DerefMut};
 /// Number of sets of a first-level cache. Consecutive cache lines of 64 bytes lie in consecutive sets.
 const SETS: usize = 64;
 
-/// Offset between the starts of consecutive columns, in cache lines. With this offset, the starts of eighteen
-/// columns are at least three lines apart, modulo [`SETS`].
+/// Offset between the first entries of consecutive columns, in cache lines. With this offset, the first
+/// entries of eighteen columns are at least three lines apart, modulo [`SETS`].
 const STEP: usize = 27;
 
 /// Number of values in a cache line.
@@ -15,9 +15,10 @@ const LINE: usize = 8;
 /// One of several columns of numbers that loops read at the same index.
 ///
 /// The allocator requests large arrays from the system one by one (arrays of 1 MB and more in the `fissure`
-/// command). All of them start at the same offset within a page. Entries with the same index in many such
-/// columns would then lie in the same set of the cache, which holds only eight or twelve lines. Therefore,
-/// each column starts some cache lines later than the previous one.
+/// command). All these arrays start at the same offset within a page. Entries with the same index in many
+/// such columns would then lie in the same set of the cache, and a set holds only eight or twelve lines.
+/// Therefore, the columns do not begin at the starts of their arrays, but at different numbers of cache lines
+/// after the starts.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,
@@ -25,8 +26,8 @@ pub struct Column {
 }
 
 impl Column {
-    /// Create a column with `count` entries of `value`. `number` is its index among the columns that loops
-    /// read together.
+    /// Create a column with `count` entries of `value`. `number` is the index of the column among the columns
+    /// that loops read together.
     pub fn new(number: usize, count: usize, value: f64) -> Self {
         let lead = number * STEP % SETS * LINE;
         Self {

@@ -58,13 +58,15 @@ pub trait LaneTuple: Copy + Send + Sync {
         })
     }
 
-    /// Load each quantity by calling `take` with its column. Quantities without a column are 0.
+    /// Load each quantity by calling `take` with the column of the quantity. Quantities without a column are
+    /// 0.
     #[inline(always)]
     fn load(columns: &Self::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
         Self::load_first::<Self>(columns, take)
     }
 
-    /// Same as [`Self::load`], from the first columns of a tuple that is at least as long.
+    /// Same as [`Self::load`], from the first columns of another type of tuple with at least as many
+    /// quantities.
     #[inline(always)]
     fn load_first<T: LaneTuple>(columns: &T::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
         const { assert!(Self::COUNT <= T::COUNT) };

@@ -33,8 +33,8 @@ impl Lanes {
         Self([value; WIDTH])
     }
 
-    /// Apply a function to each lane. The lanes are written out instead of looped over: the function is
-    /// inlined at very many places, and a loop takes longer to compile.
+    /// Apply a function to each lane. The code has one call per lane instead of a loop, because this method
+    /// is inlined at very many places and a loop takes longer to compile.
     #[inline(always)]
     fn map(self, of: impl Fn(f64) -> f64) -> Self {
         let [a, b, c, d, e, f, g, h] = self.0;
@@ -69,8 +69,8 @@ impl Lanes {
         self.map(libm::exp)
     }
 
-    /// Power with the same exponent in all lanes. Each lane is a call of a function that gives the same result
-    /// on every processor.
+    /// Power with the same exponent in all lanes. Each lane is a call of a function that gives the same
+    /// result on every processor.
     #[inline(always)]
     pub fn pow(self, exponent: f64) -> Self {
         self.map(|base| libm::pow(base, exponent))

@@ -39,7 +39,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
         self.select(a, bits, Lanes::splat(0.0))
     }
 
-    /// Run a rarely needed task out of line, so it uses no registers of the hot loop.
+    /// Run a rarely needed task out of line, so that the task uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
     /// Return `a`. With AVX2 and AVX-512, the result is opaque to the compiler, which then does not split the
@@ -131,7 +131,7 @@ mod x86 {
             has.then_some(Self(()))
         }
 
-        /// AVX2, which every machine with AVX-512 has.
+        /// Return the proof of AVX2, which every machine with AVX-512 has.
         pub fn avx2(self) -> Avx2 {
             Avx2(())
         }
@@ -264,7 +264,7 @@ mod x86 {
         unsafe { std::mem::transmute(a) }
     }
 
-    /// Masks of four lanes by their four bits. All 64 bits of a selected lane are set.
+    /// Masks of four lanes, indexed by one bit per lane. All 64 bits of a selected lane are set.
     static MASKS: [[u64; 4]; 16] = {
         let mut masks = [[0; 4]; 16];
         let mut bits = 0;
@@ -414,8 +414,8 @@ mod x86 {
 
     /// Make a value opaque to the compiler. The compiler then keeps the operations before and after this call
     /// in whole vectors instead of splitting them by lane. Measured with rustc 1.95 on AMD Zen 3 (AVX2):
-    /// without this call, PMB in lists reaches only 0.68 of its rate, and LPS in lattices 0.75. PMB in
-    /// lattices does not need the call, and correspondence is faster without it.
+    /// without this call, the law `pmb` in lists reaches only 0.68 of its speed, and `ordinary` in lattices
+    /// 0.75. `pmb` in lattices does not need the call, and `correspondence` is faster without the call.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {

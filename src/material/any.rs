@@ -16,7 +16,7 @@ pub struct Counts {
     pub constants: usize,
     /// Count of the numbers of a point, [`Law::Point`].
     pub point: usize,
-    /// Count of the numbers that only the point itself reads, [`Law::OWN_NUMBERS`].
+    /// Count of the values of a point that the loops over bonds do not read, [`Law::OWN_NUMBERS`].
     pub own: usize,
     /// Count of the passes, [`Law::PASSES`].
     pub passes: usize,
@@ -79,13 +79,13 @@ pub type AnyPoint = UpTo<{ MOST.point }>;
 /// The bond history of one end of a bond, with room for any law.
 pub type AnyHistory = UpTo<{ MOST.bond_history }>;
 
-/// Keep the first entries of a longer tuple.
+/// Return the first entries of a longer tuple.
 #[inline(always)]
 fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))
 }
 
-/// Pad a shorter tuple with zeros.
+/// Return a shorter tuple, padded with zeros.
 #[inline(always)]
 fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
     B::each(|k| {
@@ -169,7 +169,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;
     type ReferenceSum = [Lanes; MOST.reference_sum];
-    // Passes use the law of point i, not this pair of laws.
+    // Passes call the concrete law of point i, not this implementation.
     type Sum = [Lanes; 0];
     type Force = [Lanes; D];
     const ISA_SET: IsaSet = IsaSet::Avx2;

@@ -1,13 +1,15 @@
 //! Geometry of eight deformed bonds, without square roots and divisions at small strains.
 //!
-//! With γ = η·(2ξ + η) and x = γ/|ξ|², the deformed length is |Y|² = |ξ|² (1 + x).
+//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², the square of its length is
+//! |Y|² = |ξ|² (1 + x).
 //! Laws need two functions of x:
 //!
 //! - the stretch Q(x) = √(1 + x) − 1;
-//! - the extension over the deformed length, P(x) = 1 − (1 + x)^(−½). A force c s Y/|Y| is (c/|ξ|) P(x) Y.
+//! - the extension over the deformed length, P(x) = 1 − (1 + x)^(−½). With the micromodulus c and the stretch
+//!   s, a force c s Y/|Y| is (c/|ξ|) P(x) Y.
 //!
-//! For |x| ≤ [`NEAR`] both functions are Taylor series. The first omitted term is below 6·10⁻¹⁸ of the
-//! result.
+//! For |x| ≤ [`NEAR`] both functions are computed as Taylor series. The first omitted term is below 6·10⁻¹⁸
+//! of the result.
 //! Larger |x| use the closed forms P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)), which avoid
 //! cancellation.
 //! Both ends of a bond compute the same bits of x, and therefore of P and Q.
@@ -78,7 +80,7 @@ pub enum Weights {
 
 impl Weights {
     /// Return two masks, for points i and j: one bit per bond within the horizon of the point. Broken bonds
-    /// are included. The force state of an end acts only on the bonds of its mask.
+    /// are included. The force state of point i or j acts only on the bonds in the mask of this point.
     #[inline(always)]
     pub fn acting(self) -> [u8; 2] {
         match self {
@@ -116,7 +118,7 @@ impl Weights {
     }
 }
 
-/// The elastic part of the relative displacement of eight bonds at a temperature.
+/// The elastic part of the relative displacement of eight bonds with the thermal stretch a.
 #[derive(Debug, Clone, Copy)]
 pub struct Elastic<const D: usize> {
     /// Elastic relative displacement Y/(1 + a) − ξ, m.
@@ -180,8 +182,8 @@ pub struct Wanted {
 /// Compute the geometry of bonds with the relative displacement η (m).
 ///
 /// Stretches are computed for the bonds whose bit in `intact` is set. [`Bond::beyond_series`] marks the
-/// intact bonds with |x| above `limit`, which is at most [`NEAR`]. With `ONLY_NEAR`, the stretches of bonds
-/// with |x| above [`NEAR`] are undefined.
+/// intact bonds with |x| above `limit`. The `limit` must be at most [`NEAR`]. With `ONLY_NEAR`, the stretches
+/// of bonds with |x| above [`NEAR`] are wrong, because the series are used for all bonds.
 #[inline(always)]
 pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     simd: S,
@@ -261,8 +263,8 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 }
 
 impl<const D: usize> Bond<D> {
-    /// Compute the stretches; with `linear`, [`deform`] has set them already. Loops call this only for the
-    /// groups of bonds that need stretches.
+    /// Compute [`Self::stretch`]; with `linear`, [`deform`] has set it already. Loops call this function only
+    /// for the groups of bonds that need stretches.
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);
@@ -281,8 +283,8 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// Return `near`, or in marked lanes with |x| above [`NEAR`] the quotient x/(√(1 + x) + o). `other` computes
-/// o from 1 + x.
+/// Return `near`, or in the lanes of `beyond_series` with |x| above [`NEAR`] the quotient x/(√(1 + x) + o).
+/// `other` computes o and its rounding error from 1 + x and its rounding error.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,

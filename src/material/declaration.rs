@@ -44,13 +44,13 @@ pub struct Declaration {
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
     /// `None` if a damage law breaks the bonds.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
-    /// Whether the law also breaks bonds by their history, beside a damage law. Bonds of such a law break
-    /// without a damage law too.
+    /// Whether the law breaks bonds because of their history, in addition to a damage law. Bonds of such a
+    /// law also break without a damage law.
     pub wears_out: bool,
     /// Check the horizon, and return an error message if it is wrong; `None` if every horizon is allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
-    /// Whether the law, with these values of its keys, scales a critical stretch that follows from a fracture
-    /// energy, bond by bond.
+    /// Whether the law, with these values of its keys, scales the critical stretch by a factor per bond. The
+    /// law scales only a critical stretch that follows from a fracture energy.
     pub scales_thresholds: fn(&Values) -> bool,
     /// Create the law from the constants of one body.
     pub build: fn(&Given) -> Built,
@@ -95,7 +95,7 @@ impl Declaration {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }
 
-    /// Find the key of this name.
+    /// Return the key with this name; `None` if the law has no such key.
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys.iter().find(|key| key.name == name)
     }
@@ -304,8 +304,8 @@ pub struct Given<'a> {
     pub horizon: f64,
     /// Values of the law's own keys; all required keys have a value.
     pub values: &'a Values,
-    /// Whether the critical stretch follows from a fracture energy, so that the law may scale it bond by
-    /// bond. Otherwise the deck gives the critical stretch, and it holds for all bonds.
+    /// Whether the critical stretch follows from a fracture energy; the law may then scale it by a factor per
+    /// bond. Otherwise the deck gives the critical stretch, and all bonds have this critical stretch.
     pub from_fracture_energy: bool,
 }
 

@@ -1,8 +1,8 @@
-//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) e. The plastic stretch s_p of a bond
-//! changes so that |s − s_p| never exceeds the yield stretch s_y.
+//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) Y/|Y|, with the micromodulus c and the
+//! plastic stretch s_p of the bond. s_p changes so that |s − s_p| never exceeds the yield stretch s_y.
 //!
-//! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005). Unloading has
-//! the same slope c.
+//! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005). The slope of
+//! unloading is c, as in loading.
 //! The elastic energy of a bond is c (s − s_p)² |ξ|/2. Plastic flow by Δs_p dissipates c s_y |Δs_p| |ξ|.
 
 use super::bond::Weights;
@@ -53,8 +53,8 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Return the critical stretch s0 of a fracture energy (J/m²). At s0, breaking a bond dissipates the same
-/// energy as breaking an elastic bond at its critical stretch s_e.
+/// Return the critical stretch s0 of a fracture energy (J/m²). Breaking a bond at s0 dissipates the same
+/// energy as breaking an elastic bond at s_e, the critical stretch of `pmb` for this fracture energy.
 ///
 /// Breaking dissipates c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
 /// s0 = s_e²/(2 s_y) + s_y/2 if s_e > s_y; otherwise s0 = s_e.
@@ -103,7 +103,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
 
     #[inline(always)]
     fn force_state(&self, bond: &Bond<D>, _: &[Lanes; 0], [plastic, _]: &[Lanes; 2]) -> Along {
-        // s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
+        // With P = `extension_over_deformed`: s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
         let elastic = bond.extension_over_deformed
             - *plastic * (Lanes::splat(1.0) - bond.extension_over_deformed);
         Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))

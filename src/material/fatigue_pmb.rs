@@ -1,18 +1,21 @@
-//! Fatigue of microelastic bonds: f = c s e, until the remaining life λ of the bond is used up.
+//! Fatigue of microelastic bonds: f = c s Y/|Y| with the micromodulus c, until the remaining life λ of the
+//! bond is used up.
 //!
-//! Silling & Askari 2014, SAND2014-18590. In a cyclic load with the load ratio R, a bond has the stretches s and R s
-//! at the largest and the smallest load. If one of them is positive, the cyclic strain of the bond is
-//! ε = (1 − R) |s|, otherwise it is 0. Its remaining life begins at 1 and decreases with the number N of cycles:
+//! Silling & Askari 2014, SAND2014-18590. In a cyclic load with the load ratio R, a bond has the stretch s at
+//! the largest load and R s at the smallest load. If one of these two stretches is positive, the cyclic
+//! strain of the bond is ε = (1 − R) |s|; otherwise ε is 0. The remaining life λ begins at 1 and decreases
+//! with the number N of cycles:
 //!
 //! dλ/dN = −A (ε − ε∞)^m for ε > ε∞, otherwise 0.
 //!
 //! The bond breaks when λ reaches 0. In a constant cyclic strain this is after 1/(A (ε − ε∞)^m) cycles.
-//! In the field of a crack with ε∞ = 0, the crack grows by da/dN ∝ ΔK^m.
+//! With ε∞ = 0, a crack of length a grows by da/dN ∝ ΔK^m, with the range ΔK of the stress intensity factor.
 //!
-//! The law stores the used life 1 − λ. A time step is a block of cycles with the stretches at its end. λ does not change the force of an intact bond.
+//! The law stores the used life 1 − λ. A time step is a block of cycles, all with the stretches at the end of
+//! the step. λ does not change the force of an intact bond.
 //!
-//! The report has separate constants A and m for the nucleation of cracks (phase I) and for their growth
-//! (phase II). This law has one pair of constants for both phases.
+//! The law of SAND2014-18590 has separate constants A and m for the nucleation of cracks (phase I) and for
+//! their growth (phase II). This law has one pair of constants for both phases.
 
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
@@ -30,9 +33,9 @@ pub struct FatiguePmb {
     pub cycles_per_second: f64,
     /// Load ratio R: smallest load divided by largest load of a cycle.
     pub load_ratio: f64,
-    /// Factor A.
+    /// Factor A in dλ/dN.
     pub coefficient: f64,
-    /// Exponent m.
+    /// Exponent m in dλ/dN.
     pub exponent: f64,
     /// Cyclic strain ε∞ up to which bonds have infinite life.
     pub limit: f64,
@@ -152,7 +155,8 @@ impl<const D: usize> Law<D> for FatiguePmb {
         step: f64,
     ) -> [Lanes; 1] {
         let range = bond.stretch * (1.0 - self.load_ratio);
-        // With a negative load ratio, a bond that the largest load compresses is stretched by the smallest load.
+        // With a negative load ratio, a bond that the largest load compresses is stretched by the smallest
+        // load.
         let strain = if self.load_ratio < 0.0 {
             range.abs()
         } else {

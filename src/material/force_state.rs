@@ -25,8 +25,9 @@ pub trait ForceState<const D: usize>: Copy {
     /// Return the component ab of the symmetric part of T⊗Y, J/m⁶.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
-    /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. Both
-    /// ends compute the same bits. A central force works on the extension, so R does not matter.
+    /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. The
+    /// bits of the result are the same whether point i or point j computes it. A central force works on the
+    /// extension, so R does not matter.
     fn work<S: Simd>(
         self,
         simd: S,
@@ -70,7 +71,8 @@ impl<const D: usize> ForceState<D> for Along {
         self.0 * bond.deformed[a] * bond.deformed[b]
     }
 
-    /// Return ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x); for linear laws ½ t ξ·η.
+    /// Return ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x) and the symbols of `bond.rs`. For
+    /// linear laws, return ½ t ξ·η.
     #[inline(always)]
     fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 0]) -> Lanes {
         let share = if linear {

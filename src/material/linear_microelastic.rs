@@ -1,4 +1,4 @@
-//! Linear microelastic material: f = C η with C = λ(|ξ|) ξ⊗ξ.
+//! Linear microelastic material: the force density of a bond per volume is f = C η with C = λ(|ξ|) ξ⊗ξ.
 //!
 //! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ is the linearisation of the prototype microelastic
 //! material with the micromodulus c.
@@ -16,10 +16,10 @@ use crate::lanes::{IsaSet, Lanes};
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearMicroelastic {
-    /// c, N/m⁶.
+    /// Micromodulus c, N/m⁶; 1 if the deck gives λ(|ξ|).
     pub micromodulus: f64,
-    /// Classical energy density W₁ (J/m³) at unit isotropic stretch, to which the energy sum of each point is
-    /// scaled; `None` for no scaling.
+    /// Classical energy density W₁ (J/m³) at unit isotropic stretch, to which the surface correction scales
+    /// the energy density of each point; `None` without surface correction.
     pub corrected_to: Option<f64>,
 }
 

@@ -12,6 +12,7 @@
 //! A law declares how many point numbers and history values it has, and computes their values. An *end* of a
 //! bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
 //! cracks. The *initial* family of a point has the bonds of step 1 of [`Law`], before any bond breaks.
+//! Y = ξ + η is the deformed bond, and Ṽ the corrected volume of point j.
 
 mod any;
 pub mod bond;
@@ -145,8 +146,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Number of passes over the bonds before the force evaluation.
     const PASSES: usize = 0;
 
-    /// Number of values of a point that only its own law reads. These values follow the numbers of
-    /// [`Self::Point`].
+    /// Number of values of a point that only this law's functions per point read, such as
+    /// [`Self::point_energy`]. The loops over bonds do not read these values, and ghosts have none. They are
+    /// stored after the numbers of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
     /// Whether [`Self::force_state`] or [`Self::bond_history`] reads [`Bond::stretch`].
@@ -210,9 +212,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the
-    /// values that only the law reads ([`Self::OWN_NUMBERS`]). A plastic state that plastic flow has changed
-    /// is stored only at the end of a step. `step` is the time since the plastic state (s); 0 if no time has
-    /// passed.
+    /// [`Self::OWN_NUMBERS`]. Also update `_plastic`, the plastic state of the point. The caller stores an
+    /// updated plastic state only at the end of a step. `_step` is the time since the stored plastic state
+    /// (s); 0 if no time has passed.
     fn update_point(
         &self,
         _pass: usize,
@@ -234,8 +236,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Test whether a pass reads the bond history after the step. Otherwise the pass reads the history before
-    /// the step.
+    /// Test whether a pass reads the bond history at the end of the step. Otherwise the pass reads the
+    /// history at the start of the step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
@@ -262,8 +264,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) -> Self::Force;
 
     /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
-    /// ends. The results of both ends are equal to the last bit, except for the sign. Laws may override
-    /// this function to save operations.
+    /// ends. A force along the bond is divided by a length, as in [`Self::force`]. The results of both ends
+    /// are equal to the last bit, except for the sign. Laws may override this function to save operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -282,8 +284,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         }
     }
 
-    /// Return the [work](ForceState::work) of the force state of one end, J/m⁶, with the [`Self::rotation`]
-    /// of its family.
+    /// Return the [work](ForceState::work) of the force state of one end, J/m⁶. `rotation` is the
+    /// [`Self::rotation`] of the family of this end.
     #[inline(always)]
     fn end_work<S: Simd>(
         &self,
@@ -304,8 +306,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Compute the stress of a point, for laws with a deformation gradient per point. `None` if the point
-    /// carries no stress. The arguments are the sums of the first pass, the point numbers, and the plastic
-    /// state before or after the flow of a step.
+    /// carries no stress, and for all other laws. The arguments are the sums of the first pass, the point
+    /// numbers, and the plastic state before or after the flow of a step.
     fn family_stress(
         &self,
         _sums: &[f64],
@@ -323,19 +325,21 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         0.0
     }
 
-    /// Return the weighted volume m (m⁵) of a point from its numbers; `None` if the law does not store m,
-    /// or the point has no bonds.
+    /// Return the weighted volume m (m⁵) of a point from the numbers of this point; `None` if the law does
+    /// not store m, or the point has no bonds.
     fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
-    /// Return the dilatation θ of a point from its numbers. `None` for the default θ = (d/m) Σ ω|ξ|εṼ.
+    /// Return the dilatation θ of a point from the numbers of this point. `None` for the default
+    /// θ = (d/m) Σ ω|ξ| e Ṽ, with the number of dimensions d and the extension e = |Y| − |ξ|.
     fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
     /// Return the Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the
-    /// plane. `None` for ν (τ_xx + τ_yy), which holds for laws that are linear in the strain.
+    /// plane. If `None`, this stress is ν (τ_xx + τ_yy), with the Kirchhoff stress τ of the plane; this holds
+    /// for laws that are linear in the strain.
     fn stress_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -344,8 +348,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Return the contribution of a bond to the stress across the plane, Pa/m³; for laws with
-    /// [`Self::HAS_BOND_STRESS_ACROSS`].
+    /// Return the contribution of a bond to the Kirchhoff stress across the plane, per volume of j, Pa/m³;
+    /// for laws with [`Self::HAS_BOND_STRESS_ACROSS`].
     #[inline(always)]
     fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
         Lanes::splat(0.0)
@@ -362,13 +366,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Test whether the law needs enough bonds in all directions. The intact bonds of a point are then
-    /// compared with its family before pre-cracks.
+    /// compared with all bonds of the point, including the bonds that pre-cracks cut.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Test whether a point carries no force, because its intact bonds are too few for the law, or because
-    /// the law has no stress at its deformation.
+    /// Test whether a point carries no force, because the law cannot use its intact bonds (too few or too
+    /// stiff), or because the law has no stress at the deformation of the point.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
@@ -380,23 +384,23 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Lanes::splat(0.0)
     }
 
-    /// Return the fraction of its stiffness that an intact bond has lost at one end, from 0 to 1. The
-    /// damage of the point counts this fraction of the bond as broken.
+    /// Return the fraction of the stiffness that an intact bond has lost at one end, from 0 to 1. The
+    /// damage of this end counts this fraction of the bond as broken.
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// Return one bit per bond that breaks by its history at one end, beside the damage law. The bond breaks
-    /// if this bit is set at an end whose force state acts on the bond. Checked after each step that stores
-    /// the history.
+    /// Return one bit per bond that breaks because of its history at one end, with or without a damage law.
+    /// The bond breaks if this bit is set at an end whose force state acts on the bond. The bits are checked
+    /// after each step that stores the history.
     #[inline(always)]
     fn is_worn_out<S: Simd>(&self, _simd: S, _history: &Self::BondHistory) -> u8 {
         0
     }
 
-    /// Return a spring constant k (N/m⁷) per bond that bounds the energy of one end: W ≤ ½ Σ k (|Y| − |ξ|)²
-    /// Ṽ. For bond-based laws k = |∂T/∂η|.
+    /// Return a spring constant k (N/m⁷) per bond that bounds the strain energy density W (J/m³) of one end:
+    /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
 
     /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k
@@ -409,7 +413,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// same strain. `_sums` are the sums of [`Self::reference_contribution`].
     ///
     /// Laws that give truncated families the energy density of untruncated families return more than 1 for
-    /// them. All other laws return 1.
+    /// truncated families. All other laws return 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }

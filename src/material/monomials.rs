@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::lanes::Lanes;
 
-/// Return the exponents of x, y and z in the monomials of a degree, in the order of the sums.
+/// Return the exponents of x, y and z in each monomial of a degree, in the order in which all sums of
+/// monomials are stored.
 pub fn exponents(degree: usize) -> impl Iterator<Item = [usize; 3]> {
     (0..=degree).flat_map(move |z| (0..=degree - z).map(move |y| [degree - z - y, y, z]))
 }
@@ -16,7 +17,8 @@ pub fn index_of(wanted: [usize; 3]) -> usize {
     found.expect("the degree is the sum of the exponents")
 }
 
-/// Return the number of components of a tensor of this degree that have these exponents.
+/// Return the number of components of a tensor whose indices contain x, y and z as often as these exponents
+/// say. For example, (1, 1, 0) stands for the components xy and yx, so the result is 2.
 pub fn multiplicity(exponents: [usize; 3]) -> f64 {
     let factorial = |n: usize| (1..=n).product::<usize>();
     let all = factorial(exponents.iter().sum());
@@ -46,7 +48,7 @@ pub fn write_monomials<const D: usize>(
 }
 
 /// Return the solution of smallest norm of a linear least-squares problem. Singular values below `rank` times
-/// the largest are dropped. `None` if an input is not finite.
+/// the largest singular value are dropped. `None` if an input is not finite.
 pub fn least_squares(
     matrix: DMatrix<f64>,
     wanted: &DVector<f64>,

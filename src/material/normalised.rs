@@ -1,13 +1,14 @@
 //! Prototype microelastic material with one micromodulus per point, computed from the point's own family.
 //!
 //! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3. The micromodulus c_i scales the energy of
-//! the discrete family at unit isotropic stretch to the classical energy density W₁. With w = c_i s²|ξ|/2,
-//! the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch is therefore
-//! correct at surfaces and on any lattice. A bond has the mean of both micromoduli, c_ij = (c_i + c_j)/2. A
-//! critical stretch s_c that follows from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy
-//! of breaking the bond.
+//! the discrete family at unit isotropic stretch to the classical energy density W₁. With the bond energy
+//! w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch
+//! is therefore correct at surfaces and on any lattice. A bond has the mean of the micromoduli of points i
+//! and j, c_ij = (c_i + c_j)/2. A critical stretch s_c that follows from a fracture energy is scaled to s_c
+//! √(c/c_ij), with the micromodulus c of an untruncated family. This keeps the energy of breaking the bond.
 //!
-//! With the influence function 1/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
+//! With the influence function δ/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2 with
+//! c̄_i = c_i δ = 4 W₁ / Σ Ṽ. The equation has W₁ = 9K/4.
 
 use std::f64::consts::PI;
 
@@ -22,10 +23,11 @@ use crate::lanes::Lanes;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalised {
-    /// Classical energy density W₁ at unit isotropic stretch, J/m³.
+    /// Energy density W₁ at unit isotropic stretch, J/m³: the classical one, or 9K/4 for
+    /// `form = "diehl2016"`.
     pub energy: f64,
-    /// Micromodulus to which the critical stretch of the damage law belongs, N/m⁶; `None` if the critical
-    /// stretch holds for all bonds.
+    /// Micromodulus c of an untruncated family, N/m⁶, for which the damage law has computed the critical
+    /// stretch; `None` if the deck gives the critical stretch, which then holds for all bonds.
     pub reference: Option<f64>,
 }
 
@@ -76,8 +78,8 @@ fn as_printed(given: &Given) -> bool {
     given.values.word(FORM.name) == "diehl2016"
 }
 
-/// Return the micromodulus of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/Σ V, divided by
-/// the horizon because the influence function is δ/|ξ|.
+/// Return the micromodulus (N/m⁶) of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/Σ V,
+/// divided by the horizon because the influence function is δ/|ξ|.
 fn printed_micromodulus(given: &Given) -> f64 {
     let volume = match given.dimension {
         Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),
@@ -86,9 +88,9 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// Return the critical stretch of a fracture energy (J/m²). For the printed law, the critical stretch follows
-/// in the plane from eq. 16–17, and in space from the energy of all bonds across a plane. For the other law,
-/// it is the critical stretch of `pmb`.
+/// Return the critical stretch of a fracture energy (J/m²). For `form = "diehl2016"`, the critical stretch
+/// follows in the plane from eq. 16–17, and in space from the energy of all bonds across a plane. For
+/// `form = "energy"`, the result is the critical stretch of `pmb`.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     if !as_printed(given) {
         return bond_based_critical_stretch(given, energy);

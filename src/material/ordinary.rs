@@ -1,8 +1,9 @@
 //! Ordinary state-based linear peridynamic solid, for any Poisson ratio.
 //!
 //! Silling, Epton, Weckner, Xu & Askari 2007; the plane forms follow Le, Chan & Schwartz 2014.
-//! The law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension ε = |Y| − |ξ|, the dilatation θ = (d/m) Σ
-//! ω|ξ|εṼ and the deviatoric extension ε_d = ε − θ|ξ|/d:
+//! In d dimensions, the law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension ε = |Y| − |ξ|, the
+//! dilatation θ = (d/m) Σ ω|ξ|εṼ and the deviatoric extension ε_d = ε − θ|ξ|/d. The force state along the
+//! bond t (N/m⁶) and the strain energy density W (J/m³) are
 //!
 //! t = (d k′θ/m) ω|ξ| + (A/m) ω ε_d, W = ½ k′θ² + ½ (A/m) Σ ω ε_d² Ṽ.
 //!
@@ -101,14 +102,15 @@ impl Ordinary {
         (extension_factor > 0.0).then(|| self.extensional / extension_factor)
     }
 
-    /// Return the energy of a bond divided by its energy in an untruncated family, from the weighted volume m
-    /// of its point.
+    /// Return the energy of a bond at one end, divided by the energy of this bond in an untruncated family at
+    /// the same stretch. `sum` is the weighted volume m of this end, m⁵.
     pub(super) fn truncation_factor_of(&self, sum: f64) -> f64 {
         if sum > 0.0 { self.whole / sum } else { 1.0 }
     }
 }
 
-/// Return k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion θ in this dimension.
+/// Return k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion θ in this dimension. `None` in
+/// 1-D.
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
     match dimension {
         Dimension::Line { .. } => None,
@@ -229,7 +231,7 @@ impl<const D: usize> Law<D> for Ordinary {
     const CONSTANTS: usize = 1;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// θ.
+    /// The only such number is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]
@@ -276,7 +278,7 @@ impl<const D: usize> Law<D> for Ordinary {
         [extension_factor, volume_factor]: &[Lanes; 2],
         _: &[Lanes; 0],
     ) -> Along {
-        // |ξ|/|Y| = 1 − P and |ξ| s/|Y| = P.
+        // With P = `extension_over_deformed`: |ξ|/|Y| = 1 − P and |ξ| s/|Y| = P.
         Along(*volume_factor + bond.extension_over_deformed * (*extension_factor - *volume_factor))
     }
 
@@ -321,7 +323,8 @@ impl<const D: usize> Law<D> for Ordinary {
         self.truncation_factor_of(sums[0])
     }
 
-    /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω ε² Ṽ. Therefore (A + max(κ, 0) d²)/m is a bound.
+    /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω ε² Ṽ. Therefore the spring constant (A + max(κ, 0) d²)/m bounds the
+    /// energy.
     #[inline(always)]
     fn stiffness(&self, _: Lanes, [extension_factor, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;

@@ -1,16 +1,17 @@
 //! Ordinary state-based elastic–perfectly plastic solid: the norm of the deviatoric force state cannot exceed
 //! a yield value.
 //!
-//! Mitchell 2011, SAND2011-3166. Each bond has a plastic extension e_p. Energy and force are those of
-//! [`Ordinary`] at the elastic extensions ε − e_p:
+//! Mitchell 2011, SAND2011-3166. Each bond has a plastic extension e_p per end. Energy and force are those of
+//! [`Ordinary`] at the elastic extensions ε − e_p, with the symbols of `ordinary.rs`:
 //!
 //! W = ½ κθ² + ½ (A/m) Σ ω (ε − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (ε − e_p) Ṽ.
 //!
-//! The deviatoric force is t_d = (A/m) ω ε_d. Here ε_d is ε − e_p minus its mean over the intact bonds: ε_d =
-//! ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//! The deviatoric force is t_d = (A/m) ω ε_d. Here ε_d is ε − e_p minus its mean over the intact bonds:
+//! ε_d = ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
-//! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ.
-//! The return is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by (1 − r) ε_d.
+//! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ and the yield value ψ₀.
+//! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by (1 − r)
+//! ε_d.
 //!
 //! Plastic flow preserves volume, Σ ω|ξ| e_p Ṽ = 0. Therefore this is Mitchell's law until bonds of the
 //! family break.
@@ -18,11 +19,12 @@
 //! remaining plastic extensions would expand the family, and breaking bonds would add energy.
 //!
 //! ψ₀ follows from the yield stress σ_y in pure shear.
-//! A deviatoric strain e has ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane. It yields at e:e =
-//! σ_y²/(6G²).
+//! A deviatoric strain e has ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane. The point yields at
+//! e:e = σ_y²/(6G²).
 //! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
 //! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
-//! With the thickness h, Mitchell's plane value is 75σ_y²/(8πhδ⁴). It belongs to A = 15G, whereas the plane law here has A = 8G.
+//! With the thickness h, Mitchell's value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G,
+//! whereas this law has A = 8G in the plane.
 
 use super::ordinary::{Ordinary, SURFACE_CORRECTION, eased_force};
 use super::{
@@ -36,10 +38,11 @@ use crate::lanes::{IsaSet, Lanes};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrdinaryPlastic {
     elastic: Ordinary,
-    /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by its weighted volume.
+    /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by a weighted volume, see
+    /// `whole`.
     strength: f64,
-    /// m of an untruncated family (m⁵), if it determines the yield value of all points; `None` for the m of
-    /// each point.
+    /// m of an untruncated family (m⁵), if this m determines the yield value of all points. `None` if the m
+    /// of each point determines the yield value of the point.
     whole: Option<f64>,
 }
 
@@ -134,7 +137,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 3;
-    /// θ.
+    /// The only such number is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

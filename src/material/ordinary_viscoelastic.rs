@@ -1,16 +1,17 @@
 //! Ordinary state-based standard linear solid: the deviatoric part of the force relaxes.
 //!
-//! Mitchell 2011, SAND2011-8064. Each bond has a back extension e_b that follows the deviatoric extension ε_d
-//! with the relaxation time τ. The fraction λ of the deviatoric force acts on ε_d − e_b:
+//! Mitchell 2011, SAND2011-8064. Each bond has a back extension e_b per end. With the symbols of
+//! `ordinary.rs`, e_b follows the deviatoric extension ε_d with the relaxation time τ. The fraction λ of the
+//! deviatoric force depends on ε_d − e_b, and the rest on ε_d:
 //!
 //! t = (d k′θ/m) ω|ξ| + (A/m) ω (ε_d − λ e_b), ė_b = (ε_d − e_b)/τ.
 //!
-//! The energy W = ½ κθ² + ½ (A/m) Σ ω (ε² + λ (e_b² − 2 ε_d e_b)) Ṽ also depends on θ through ε_d.
-//! Its derivative, the force, therefore has the additional term λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ. This term is 0
-//! until bonds of the family break.
+//! The energy W = ½ κθ² + ½ (A/m) Σ ω (ε² + λ (e_b² − 2 ε_d e_b)) Ṽ depends on θ also through ε_d.
+//! The force is the derivative of W, and therefore has the additional term λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ. This
+//! term is 0 until bonds of the family break.
 //!
-//! ε_d is assumed to change linearly during a step. Then e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a =
-//! exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
+//! ε_d is assumed to change linearly during a step Δt, from ε_d,n to ε_d,n + Δε_d. Then
+//! e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a = exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
 //! The elastic constants are those of the instantaneous response. The long-term shear modulus is (1 − λ) G.
 
 use super::ordinary::{
@@ -178,7 +179,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 2;
-    /// θ.
+    /// The only such number is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

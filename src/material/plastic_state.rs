@@ -1,10 +1,10 @@
 //! Plastic state of a point, stored from step to step.
 
-/// Plastic strain, equivalent plastic strain, change of the yield stress by rate and temperature, energy of the
-/// unreduced control and dissipated energy; initially 0.
+/// Plastic state of a point; all numbers are initially 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlasticState {
-    /// E_p, or C_p⁻¹ − I for logarithmic strains, in the order xx, yy, zz, yz, xz, xy.
+    /// Plastic strain E_p, or C_p⁻¹ − I with C_p = F_pᵀ F_p for logarithmic strains, in the order xx, yy, zz,
+    /// yz, xz, xy.
     pub strain: [f64; 6],
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,

@@ -1,4 +1,5 @@
-//! Prototype microelastic material: f = c s Y/|Y|, w = c s² |ξ| / 2; each end exerts half of the force.
+//! Prototype microelastic material: the force density of a bond per volume is f = c s Y/|Y|, and its energy
+//! is w = c s² |ξ| / 2 (J/m⁶). Each end exerts half of the force.
 //!
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6.
 //! The micromodulus c follows from equal strain energy under isotropic expansion. Without failure this is the
@@ -23,7 +24,8 @@ pub struct Pmb {
 }
 
 impl Pmb {
-    /// Create the law from Young's modulus E (Pa) and the horizon δ (m).
+    /// Create the law from Young's modulus E (Pa) and the horizon δ (m). In the table, h is the thickness
+    /// (m), and A the cross-section (m²).
     ///
     /// | dimension | c | source |
     /// |---|---|---|
@@ -58,7 +60,7 @@ impl Pmb {
     /// Return the classical energy density W₁ at unit isotropic stretch (J/m³), with the Poisson ratio of
     /// bond-based laws.
     ///
-    /// It is 9K/2 = 3E in 3-D, E/(1−ν) in plane stress and E/((1+ν)(1−2ν)) in plane strain. In 1-D it is E/2
+    /// W₁ is 9K/2 = 3E in 3-D, E/(1−ν) in plane stress and E/((1+ν)(1−2ν)) in plane strain. In 1-D, W₁ is E/2
     /// in uniaxial stress and (λ + 2G)/2 in uniaxial strain.
     pub fn isotropic_energy(dimension: Dimension, youngs_modulus: f64) -> f64 {
         youngs_modulus

@@ -1,7 +1,7 @@
 //! Rotation of a family: the orthogonal factor R of its deformation gradient F = R U.
 //!
-//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ, |φ| ≤
-//! π. The formula
+//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ,
+//! |φ| ≤ π. The formula
 //!
 //! (R − I) ξ = q₀ t + q × t with t = 2 q × ξ
 //!
@@ -19,16 +19,16 @@ pub type Rotation = [f64; 4];
 /// The identity, R = I.
 pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 
-/// Largest number of iterations of the polar decomposition; stretches of a factor of a thousand need about
-/// fifteen.
+/// Largest number of iterations of the polar decomposition. A stretch by a factor of 1000 needs about fifteen
+/// iterations.
 const MOST_ITERATIONS: usize = 40;
 
-/// R has converged if no entry changes by more than this in an iteration; the next change would be of the
-/// order of the square of this change.
+/// R has converged if no entry changes by this number or more in an iteration; the next change would be of
+/// the order of the square of this number.
 const CONVERGED: f64 = 1e-9;
 
-/// Return R of a deformation gradient in the plane or in space. In space, the result is the identity if det F
-/// ≤ 0 or if the iteration does not converge.
+/// Return R of a deformation gradient in the plane or in space. In space, the result is the identity if
+/// det F ≤ 0 or if the iteration does not converge. In the plane, see `in_plane`.
 pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     let mut f = Matrix3::identity();
     f.view_mut((0, 0), (D, D)).copy_from(gradient);
@@ -38,8 +38,8 @@ pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     }
 }
 
-/// Return R in the plane. Its angle is that of the vector (F_xx + F_yy, F_yx − F_xy); R is the identity if
-/// this vector is 0.
+/// Return R in the plane. The angle of R is the angle of the vector (F_xx + F_yy, F_yx − F_xy); R is the
+/// identity if this vector is 0.
 fn in_plane(f: &Matrix3<f64>) -> Rotation {
     let (cosine, sine) = (f[(0, 0)] + f[(1, 1)], f[(1, 0)] - f[(0, 1)]);
     let length = (cosine * cosine + sine * sine).sqrt();
@@ -53,8 +53,8 @@ fn in_plane(f: &Matrix3<f64>) -> Rotation {
 
 /// Return cos(φ/2) and sin(φ/2) from cos φ and sin φ, |φ| ≤ π.
 fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
-    // For φ up to 120°, cos(φ/2) follows from a square root; beyond, sin(φ/2) does. The other one follows
-    // from sin φ = 2 sin(φ/2) cos(φ/2).
+    // For |φ| below 120°, cos(φ/2) is computed by a square root; for larger |φ|, sin(φ/2) is. The other
+    // function follows from sin φ = 2 sin(φ/2) cos(φ/2).
     if cosine > -0.5 {
         let half = (0.5 * (1.0 + cosine)).sqrt();
         [half, 0.5 * sine / half]
@@ -88,8 +88,8 @@ fn orthogonal_factor(f: Matrix3<f64>) -> Option<Matrix3<f64>> {
     None
 }
 
-/// Return the quaternion of a rotation matrix, q₀ ≥ 0. Its largest component is computed first (Shepperd
-/// 1978).
+/// Return the quaternion of a rotation matrix, with q₀ ≥ 0. The largest component of the quaternion is
+/// computed first (Shepperd 1978).
 fn quaternion(r: &Matrix3<f64>) -> Rotation {
     let [x, y, z] = [r[(0, 0)], r[(1, 1)], r[(2, 2)]];
     let squares = [

@@ -1,19 +1,19 @@
-//! Softening microelastic material. In tension f = c (1 − d) s e, where the damage variable d depends on the
-//! largest past stretch κ. In compression f = c s e.
+//! Softening microelastic material. In tension f = c (1 − d) s Y/|Y| with the micromodulus c, where the
+//! damage variable d depends on the largest past stretch κ. In compression f = c s Y/|Y|.
 //!
-//! On first loading f/c is F(κ), and 1 − d = F(κ)/κ.
+//! On first loading |f|/c is F(κ), and 1 − d = F(κ)/κ.
 //! F is κ up to the strength stretch s0, and then falls from s0 to 0 at the critical stretch sc. Unloading
-//! goes to the origin.
+//! is along the straight line to the origin.
 //! Damage does not act in compression, because the faces of a crack close.
 //!
 //! | curve | F between s0 and sc |
 //! |---|---|
 //! | bilinear | s0 (sc − κ)/(sc − s0) |
 //! | trilinear | linear from s0 to β s0 at κ = s0 + γ (sc − s0), and from there to 0 at sc |
-//! | exponential | s0 (exp(−(κ − s0)/a) − r)/(1 − r), sc = s0 + a ln(1/r) |
+//! | exponential | s0 (exp(−(κ − s0)/a) − r)/(1 − r), sc = s0 + a ln(1/r), with the decay stretch a |
 //!
-//! A body in uniaxial tension bears more than E s0. When the bonds along the axis soften, bonds in other
-//! directions approach their strength.
+//! A body in uniaxial tension bears a stress of more than E s0. When the bonds along the axis soften, bonds
+//! in other directions approach their strength.
 //! Therefore s0 is chosen such that the tensile strength f_t is the largest stress in uniaxial tension. This
 //! stress is computed by quadrature over the directions of the bonds.
 //!
@@ -65,15 +65,17 @@ pub enum SofteningCurve {
     },
 }
 
-/// Residual r: fraction of the strength that an unshifted exponential has at sc.
+/// Residual r of the exponential curve: the value of exp(−(κ − s0)/a) at κ = sc.
 const RESIDUAL: f64 = 0.01;
 
 /// Number of decay stretches from s0 to sc, ln(1/r).
 const DECAYS: f64 = 4.605_170_185_988_092;
 
-/// β and γ of a straight line. [`CONCRETE`] has β and γ of concrete (Petersson 1981): the stress is ⅓ f_t at
-/// the crack opening 0.8 G_F/f_t, and 0 at 3.6 G_F/f_t.
+/// β and γ of a straight line.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
+
+/// β and γ of concrete (Petersson 1981): with the tensile strength f_t and the fracture energy G_F, the
+/// stress is ⅓ f_t at the crack opening 0.8 G_F/f_t, and 0 at 3.6 G_F/f_t.
 const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 
 const TENSILE_STRENGTH: Key = Key {
@@ -173,8 +175,9 @@ fn number(values: &Values, key: &Key) -> Option<f64> {
     values.get(key.name).map(|_| values.number(key.name))
 }
 
-/// Return the error if the strength or the end of the curve is not given exactly once, or if a curve other
-/// than `trilinear` has kink keys.
+/// Return the error if the strength (`tensile_strength` or `strength_stretch`) or the end of the curve
+/// (`fracture_energy` or `critical_stretch`) is not given exactly once, or if a curve other than `trilinear`
+/// has kink keys.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     for [first, second] in [
         [&TENSILE_STRENGTH, &STRENGTH_STRETCH],
@@ -236,7 +239,7 @@ fn tensile_modulus(given: &Given) -> f64 {
     CriticalStretch::tensile_modulus(given.dimension, elastic)
 }
 
-/// Return sc from s0.
+/// Return sc from the deck, or from the fracture energy of the deck and this s0.
 fn critical_stretch(given: &Given, strength: f64) -> f64 {
     let values = given.values;
     number(values, &CRITICAL_STRETCH).unwrap_or_else(|| {
@@ -247,11 +250,11 @@ fn critical_stretch(given: &Given, strength: f64) -> f64 {
     })
 }
 
-/// Iterations for s0 from f_t. The largest stress depends weakly on sc/s0; an iteration gains more than half
-/// a digit.
+/// Number of iterations that compute s0 from f_t. The largest stress depends weakly on sc/s0; an iteration
+/// gains more than half a digit.
 const STRENGTH_ITERATIONS: u32 = 8;
 
-/// Return s0 and sc.
+/// Return s0 and sc from the keys of the deck. If no valid curve exists, sc is not above s0.
 fn stretches(given: &Given) -> (f64, f64) {
     let values = given.values;
     if let Some(strength) = number(values, &STRENGTH_STRETCH) {
@@ -335,36 +338,41 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Number of directions between the axis and the plane normal to the axis, in the quadrature of the stress.
+/// Number of bond directions between the axis of tension and the plane normal to this axis, in the quadrature
+/// of the stress.
 const DIRECTIONS: usize = 64;
 
-/// Search for the largest stress. [`STRAIN_GROWTH`] is the factor of the strain from one sample to the
-/// next. The search ends below the fraction [`PAST_LARGEST`] of the largest stress, or after
-/// [`MOST_STRAINS`] samples.
+/// Factor of the strain from one sample to the next in the search for the largest stress.
 const STRAIN_GROWTH: f64 = 1.02;
+
+/// The search for the largest stress ends when the stress is below this fraction of the largest stress so
+/// far.
 const PAST_LARGEST: f64 = 0.95;
+
+/// Largest number of samples in the search for the largest stress.
 const MOST_STRAINS: usize = 400;
 
 /// Bisection steps for the transverse strain.
 const ACROSS_ITERATIONS: usize = 25;
 
 impl SofteningPmb {
-    /// Return F on first loading; linear in compression.
+    /// Return F on first loading; in compression, the stretch itself.
     fn first_loading(&self, stretch: Lanes) -> Lanes {
         let zero = Lanes::splat(0.0);
         let pulled = stretch.max(zero);
         pulled * self.secant(pulled) + stretch.min(zero)
     }
 
-    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by the elastic stress at
-    /// the strength stretch.
+    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by its elastic stress at
+    /// the axial strain s0.
     pub fn largest_tension(&self, dimension: Dimension) -> f64 {
         let in_space = match dimension {
             Dimension::Line { .. } => return 1.0,
             Dimension::PlaneStress { .. } | Dimension::PlaneStrain { .. } => false,
             Dimension::Space => true,
         };
-        // cos² and sin² of the angle to the axis, and the weight of the direction.
+        // cos² and sin² of the angle between bond and axis, and the weight of the direction in the
+        // quadrature.
         let directions: [[Lanes; 3]; DIRECTIONS / WIDTH] = std::array::from_fn(|group| {
             let angle = |lane: usize| {
                 let middle = (WIDTH * group + lane) as f64 + 0.5;
@@ -379,7 +387,8 @@ impl SofteningPmb {
             let (cos, sin) = (lanes(libm::cos), lanes(libm::sin));
             [cos * cos, sin * sin, weight]
         });
-        // Axial and transverse stress.
+        // Axial and transverse stress, both without a constant factor, from the axial and the transverse
+        // strain.
         let stress = |along: f64, across: f64| {
             let mut sums = [Lanes::splat(0.0); 2];
             for [cos2, sin2, weight] in directions {
@@ -428,7 +437,7 @@ impl Described for SofteningPmb {
 }
 
 impl SofteningPmb {
-    /// Clamp largest stretches to the range from s0 to sc.
+    /// Clamp the largest past stretches κ to the range from s0 to sc.
     #[inline(always)]
     fn in_softening(&self, largest: Lanes) -> Lanes {
         largest
@@ -443,7 +452,7 @@ impl SofteningPmb {
         way.max(Lanes::splat(0.0)).min(Lanes::splat(1.0))
     }
 
-    /// Return F/s0 for largest stretches from s0 to sc.
+    /// Return F/s0 for largest past stretches κ from s0 to sc.
     #[inline(always)]
     fn relative_force(&self, largest: Lanes) -> Lanes {
         let one = Lanes::splat(1.0);
@@ -461,7 +470,8 @@ impl SofteningPmb {
         }
     }
 
-    /// Return ∫ F dκ from s0 to the largest stretch, divided by s0, for largest stretches from s0 to sc.
+    /// Return ∫ F dκ from s0 to the largest past stretch of a bond, divided by s0. The largest past stretches
+    /// are between s0 and sc.
     #[inline(always)]
     fn relative_area(&self, largest: Lanes) -> Lanes {
         let one = Lanes::splat(1.0);
@@ -482,7 +492,7 @@ impl SofteningPmb {
         }
     }
 
-    /// Return 1 − d of bonds with these largest stretches.
+    /// Return 1 − d of bonds with these largest past stretches κ.
     #[inline(always)]
     fn secant(&self, largest: Lanes) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {
@@ -530,7 +540,7 @@ impl<const D: usize> Law<D> for SofteningPmb {
         squares * bond.length * (0.25 * self.elastic.micromodulus)
     }
 
-    /// Return the work of loading to κ, minus the work that unloading returns.
+    /// Return the work of loading to κ, minus the work that unloading from κ returns.
     #[inline(always)]
     fn dissipated(&self, length: Lanes, [largest]: &[Lanes; 1]) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {

@@ -5,8 +5,8 @@ use nalgebra::SMatrix;
 use super::Bond;
 use crate::lanes::Lanes;
 
-/// Diagonal and mixed entries of eight tensors. Space has three mixed entries. In the plane the second mixed
-/// entry is unused; on a line the only one is unused.
+/// Diagonal and mixed entries of eight tensors. In 3-D, all three mixed entries are used. In 2-D, the second
+/// mixed entry is unused; in 1-D, the only mixed entry is unused.
 pub type Symmetric<const D: usize> = ([Lanes; D], [Lanes; D]);
 
 /// Return the indices of the mixed entries of a symmetric tensor in storage order: yz, xz, xy in space and xy
@@ -32,7 +32,7 @@ pub fn symmetric<const D: usize>((diagonal, others): &Symmetric<D>, a: usize, b:
     if D == 3 { others[3 - a - b] } else { others[0] }
 }
 
-/// Create a symmetric tensor from its diagonal and mixed entries.
+/// Create a symmetric tensor from its diagonal entries, followed by its mixed entries.
 pub fn from_entries<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
     let mut tensor = SMatrix::zeros();
     for a in 0..D {
@@ -45,7 +45,7 @@ pub fn from_entries<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
     tensor
 }
 
-/// Write the diagonal and mixed entries of a symmetric tensor to a slice.
+/// Write the diagonal entries of a symmetric tensor, then its mixed entries, to a slice.
 pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64]) {
     for a in 0..D {
         entries[a] = tensor[(a, a)];

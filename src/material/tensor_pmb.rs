@@ -1,18 +1,18 @@
 //! Prototype microelastic material with a surface correction: the elastic tensor of every point is fitted to
 //! that of the solid.
 //!
-//! The micromodulus of an end is c n·H n, with the direction n of the bond and a symmetric tensor H of the
-//! point.
+//! The micromodulus of an end is c n·H n, with the micromodulus c of an untruncated family, the direction n
+//! of the bond and a symmetric tensor H of the end.
 //! The elastic tensor of a family is ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ.
-//! That of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the
-//! energy density W₁ at unit isotropic stretch.
-//! H is the least-squares fit over all components, which is independent of the axes.
+//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d +
+//! 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
+//! H is the least-squares fit over all components of the elastic tensor. This fit is independent of the axes.
 //! In an untruncated family H is nearly I. Near a surface H is larger normal to the surface than along it.
 //!
-//! A bond has the mean of both micromoduli, c_ij(n). A critical stretch s_c that follows from a fracture
-//! energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. The method generalises the
-//! surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4), which fit energies along three
-//! axes with an ellipsoid. Le & Bobaru (2018) compare other corrections.
+//! A bond has the mean of the micromoduli of points i and j, c_ij(n). A critical stretch s_c that follows
+//! from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. The method
+//! generalises the surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4), which fit
+//! energies along three axes with an ellipsoid. Le & Bobaru (2018) compare other corrections.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
@@ -21,18 +21,20 @@ use super::symmetric::{Symmetric, mixed, quadratic_form, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
-/// Smallest eigenvalue of H. Without this limit, bonds in bodies of two or three points across would repel
-/// when stretched.
+/// Smallest eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are two or
+/// three points thick.
 const SMALLEST: f64 = 0.2;
 
 /// Largest eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly in one
 /// plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
-/// Singular values below this fraction of the largest are dropped; the solution of smallest norm is used.
+/// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
+/// norm is used.
 ///
 /// For a horizon of 3 spacings, the smallest ratio is 0.23 at a corner of a plate, 0.14 at a corner of a
-/// block, and 0.1 in a strip of two points. It is below 1e-4 in a slightly bent strip of one point.
+/// block, and 0.1 in a strip two points wide. The ratio is below 1e-4 in a slightly bent strip one point
+/// wide.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
@@ -80,7 +82,8 @@ impl Described for TensorPmb {
     }
 }
 
-/// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc from its exponents.
+/// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc. The exponents say how many of its indices are x,
+/// y and z.
 fn isotropic(exponents: [usize; 3]) -> f64 {
     let odd = exponents.iter().any(|exponent| exponent % 2 == 1);
     match exponents.iter().max() {
@@ -180,8 +183,8 @@ impl<const D: usize> Law<D> for TensorPmb {
             * (0.5 * self.micromodulus)
     }
 
-    /// Return an upper bound on the spring constant of a bond. It contains the largest absolute row sum of H, which
-    /// is at least the largest eigenvalue of H.
+    /// Return an upper bound on the spring constant of a bond: c/|ξ| times the largest absolute row sum of ½
+    /// H, which is at least the largest eigenvalue of ½ H.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;

@@ -24,7 +24,7 @@ pub const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 /// Maximum length of a row, bytes.
 pub const LONGEST_ROW: u64 = 1 << 16;
 
-/// Positions of the columns of a point in a row.
+/// The columns of a point file, with the indices of the columns that are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns {
     /// All columns of a row, by name.
@@ -103,7 +103,7 @@ impl Columns {
 pub struct Layout {
     /// Index of the column of each quantity.
     pub columns: Columns,
-    /// Offset of the heading in bytes; `None` if the file has no heading.
+    /// Offset of the heading in the file, bytes; `None` if the file has no heading.
     pub heading: Option<u64>,
 }
 
@@ -121,7 +121,8 @@ pub struct HeadingError {
 /// If the deck names no columns, a heading with a column `x` names them. Any other heading is skipped.
 ///
 /// # Errors
-/// If the file cannot be read; in the inner result, if its heading lacks a column or names one twice.
+/// If the file cannot be read. The inner result is an error if the heading names the columns, but lacks a
+/// required column or names a column twice.
 pub fn layout(
     path: &Path,
     given: Option<&Columns>,
@@ -157,7 +158,7 @@ pub fn layout(
 pub struct Heading {
     /// Entries of the heading, without quotes.
     pub names: Vec<String>,
-    /// Offset of its first byte.
+    /// Offset of the first byte of the heading in the file, bytes.
     pub offset: u64,
     /// Line of the heading, from 1.
     pub line: u64,
@@ -207,7 +208,7 @@ pub fn is_comment(row: &str) -> bool {
     row.trim_start().starts_with(['#', '/', '*'])
 }
 
-/// The names of a heading; `None` if the row contains numbers.
+/// The names of a heading; `None` if the row contains a number or an empty entry.
 fn names(row: &str) -> Option<Vec<String>> {
     let row = row.strip_prefix(PERILAB_HEADER).unwrap_or(row);
     let entries = entries(row).ok()?;

@@ -13,8 +13,8 @@ const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.
 ///
-/// - For a crack without width, a point in its plane counts as on the positive side.
-/// - For a slot, every bond that touches the volume between its faces crosses it.
+/// - For a crack without width, a point in the plane of the crack counts as on the positive side.
+/// - A bond crosses a slot if the bond touches the volume between the faces of the slot.
 /// - Pass the end with the lower id first, so that both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     let bond = [from, to].map(Vector::from);
@@ -120,8 +120,8 @@ fn between_faces(
     within(bond, height, [-0.5, 0.5])
 }
 
-/// Return the part of a segment on which a linear coordinate lies in an interval [low, high] of length 1;
-/// `None` if there is no such part.
+/// Return the part of a segment on which a linear coordinate lies in an interval [low, high] of length 1,
+/// enlarged by [`RIM`]; `None` if there is no such part.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,

@@ -27,15 +27,16 @@ pub fn users(bodies: &[BodyPoints], file: &Path) -> Vec<(usize, Option<u32>)> {
         .collect()
 }
 
-/// Length of a sample of a long file, bytes.
+/// Length of each piece that is sampled from a long file, bytes.
 const PIECE: u64 = 1 << 16;
-/// Number of samples of a long file.
+/// Number of pieces that are sampled from a long file.
 const SAMPLED: u64 = 256;
 
 /// Largest absolute coordinate, m; squared distances then cannot overflow.
 const FARTHEST: f64 = 1e30;
 
-/// The columns that the deck names for a file. They are equal for all bodies that use the file.
+/// The columns that the deck names for the file of the body with index `user`; `None` if the deck names no
+/// columns. The columns are equal for all bodies that use the file.
 fn columns<'a>(bodies: &[BodyPoints<'a>], user: usize) -> Option<&'a Columns> {
     match bodies[user].points {
         PointSource::File { columns, .. } => columns.as_ref(),
@@ -89,8 +90,8 @@ pub(super) fn for_each_point(
     part.check(path, comm)
 }
 
-/// Sample the points of a file. Return the sampled points, and the number of points that each sample
-/// represents.
+/// Sample the points of a file. Return the sampled points, and the number of points of the file that each
+/// sampled point represents.
 ///
 /// From a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot be
 /// read or its heading is invalid.
@@ -129,7 +130,7 @@ fn read_part(
     })
 }
 
-/// Parse the point of a row.
+/// Parse the point of a row. The id of the result is 0.
 fn point(
     columns: &Columns,
     users: &[(usize, Option<u32>)],

@@ -11,7 +11,7 @@ use super::{MAX_PER_RANK, Point, distance_squared, shape};
 /// Binary logarithm of the maximum number of cells per rank. Testing this number of cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
-/// Number of cells sampled to estimate the fraction of a region within a body.
+/// Number of candidate cells that are sampled to estimate the fraction of them that belongs to a body.
 const SAMPLES: u64 = 1 << 17;
 
 /// Step of a low-discrepancy sequence in [0, 1): the inverse of the golden ratio.
@@ -44,7 +44,7 @@ impl<'a> LatticeBody<'a> {
     /// Create the lattice of the body with this index; `None` if its points do not come from a shape.
     ///
     /// # Errors
-    /// If its cells are too far from the origin to be numbered.
+    /// If cells of the body are too far from the origin to be numbered.
     pub fn new(problem: &'a Problem, body: usize) -> Result<Option<Self>> {
         let lattice = |body: &'a Body| match &body.points {
             PointSource::Lattice {
@@ -84,7 +84,7 @@ impl<'a> LatticeBody<'a> {
         self.region.total()
     }
 
-    /// The centre (m) of a candidate cell, by index, if it belongs to the body.
+    /// The centre (m) of the candidate cell with this index; `None` if the cell does not belong to the body.
     pub fn centre(&self, index: u64) -> Option<[f64; 3]> {
         self.centre_of(self.region.cell(index))
     }
@@ -127,7 +127,7 @@ impl<'a> LatticeBody<'a> {
         })
     }
 
-    /// Test whether a position (m) is within the shape and in no later body.
+    /// Test whether a position (m) is within the shape, and within the shape of no later body.
     fn contains(&self, position: [f64; 3]) -> bool {
         let within = |shape: &Shape| shape::contains(shape, position, self.tolerance);
         within(self.shape) && !self.later.iter().any(|shape| within(shape))
@@ -143,7 +143,7 @@ impl<'a> LatticeBody<'a> {
         u64::from(self.quadrature.points(self.dimension))
     }
 
-    /// Number of points. For a large region, it is estimated from sampled cells.
+    /// Number of points. With many candidate cells, the number is estimated from sampled cells.
     pub fn points(&self) -> f64 {
         let belongs = |index: &u64| self.centre(*index).is_some();
         let (cells, all) = (self.cells(), self.cells() as f64);

@@ -27,7 +27,8 @@ const NO_VOLUME: &str = "only single-node elements without a volume; sphere elem
 /// Maximum number of corners of an element.
 const MOST_CORNERS: usize = 8;
 
-/// Largest distance of an element from the plane of a plane mesh, relative to its size.
+/// Largest distance of an element from the plane of a plane mesh, or from the line of a 1-D mesh, relative to
+/// the size of the element.
 const PLANE_SLACK: f64 = 1e-6;
 
 /// A body whose points come from a mesh.
@@ -44,7 +45,7 @@ pub struct Found {
     pub points: Vec<Point>,
     /// For each set of the problem, the ids of its points; `None` for sets that name no group of the mesh.
     pub sets: Vec<Option<Runs>>,
-    /// Names of the groups, on rank 0.
+    /// Names of the groups, on rank 0; empty on the other ranks.
     pub names: Vec<String>,
 }
 
@@ -187,7 +188,7 @@ pub(super) struct MeshPoints {
 /// Read a mesh and generate its points, on one rank. The sets of the deck are not needed.
 ///
 /// # Errors
-/// Same as for [`read`], except that coinciding elements are not searched.
+/// Same as for [`read`], except that coinciding elements and ambiguous names of sets are not detected.
 pub(super) fn read_points(
     bodies: &[BodyPoints],
     dimension: Dimension,
@@ -291,11 +292,12 @@ fn bodies_of_elements(
     Ok(bodies)
 }
 
-/// Return the name of the part of the mesh that should belong to `rest`, the body without a block, but has
-/// only single-node elements without a volume.
+/// Return the name of a part of the mesh that should belong to `rest`, the body without a block, but has
+/// only single-node elements without a volume. `None` if there is no such part.
 ///
-/// In files of Exodus, this is a block of spheres that no other body selects. In other files, single-node
-/// elements may also define sets, so this is only the whole rest of the mesh.
+/// The part is the whole rest of the mesh, if all elements that belong to no other body are such elements. In
+/// files of Exodus, the part may also be a block of spheres that no other body selects. In other files,
+/// single-node elements may define sets, so no smaller part than the whole rest counts.
 fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {
     let is_left = |element: usize| bodies[element] == NO_BODY;
     let is_single = |element: usize| mesh.elements.kind(element).dimension() == 0;
@@ -391,6 +393,9 @@ fn points(
 
 /// Return volume and centroid of an element. `nodes` are the positions of its nodes, m. The volume is
 /// negative if the nodes of a solid element have the order of a mirrored element.
+///
+/// # Errors
+/// If det J changes sign within the element.
 fn solid(
     mesh: &Mesh,
     element: usize,
@@ -412,8 +417,8 @@ fn solid(
     Ok((size * dimension.out_of_plane_measure(), measure.centroid))
 }
 
-/// Check that an element lies in the line or plane of the problem. The line or plane contains the first node
-/// of the mesh.
+/// Check that an element lies in the line or plane of the problem, which contains the position `first`.
+/// `nodes` are the positions of the nodes of the element. All positions are in the unit of the mesh.
 fn lies_in_plane(
     nodes: &[[f64; 3]],
     dimension: usize,
@@ -442,7 +447,7 @@ fn lies_in_plane(
     }
 }
 
-/// Check that no two elements have the same corners or the same centroid.
+/// Check that no two elements with a point have the same corners or the same centroid.
 fn are_apart(mesh: &Mesh, points: &[Point], point_of: &[u32]) -> Result<()> {
     let corners = (0..point_of.len())
         .filter(|element| point_of[*element] != NO_POINT)

@@ -1,6 +1,7 @@
 //! Generation of points, and the geometry of shapes, sets and pre-cracks.
 //!
-//! Each rank generates or reads its own piece of the points; no rank stores all of them.
+//! Each rank generates its own piece of the points, or reads this piece from a point file. Only rank 0 reads
+//! meshes, and sends the other ranks their pieces.
 
 pub mod bins;
 pub mod columns;
@@ -32,21 +33,21 @@ use crate::mesh::{Runs, suggestion};
 use crate::problem::{Body, IdFile, Jitter, PointSource, Problem, Selector};
 use crate::scatter::{Scattered, uniform};
 
-/// Maximum number of points per rank.
+/// Upper limit on the number of points per rank.
 pub const MAX_PER_RANK: f64 = 2_147_483_647.0;
 
 /// A point, in the form in which ranks exchange points.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Point {
-    /// Global id, equal on any number of ranks. The ids of points without refinement are 0, 1, 2 … without
-    /// gaps.
+    /// Global id, the same for any number of ranks. Without refinement, the ids of the points are 0, 1, 2 …
+    /// without gaps.
     pub id: u64,
     /// Reference position, m; components beyond the dimension are 0.
     pub position: [f64; 3],
     /// Volume, m³.
     pub volume: f64,
-    /// Index of its block; before refinement, the block of its body.
+    /// Index of the block of the point. Before refinement, this is the index of the body.
     pub block: u32,
     /// Explicit padding, as `Pod` requires.
     pub unused: u32,
@@ -95,8 +96,8 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Generate this rank's piece of the points. Return the piece and the number of points of all ranks. The ids
-/// of a piece are contiguous per body. If several bodies share a file or mesh, the ids are contiguous per
-/// file or mesh. Collective.
+/// of a piece are contiguous per body. If several bodies share a file or mesh, the ids of the piece are
+/// contiguous per file or mesh. Collective.
 ///
 /// # Errors
 /// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, cells of

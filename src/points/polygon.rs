@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-/// Upper limit on the mean number of index entries per edge, in addition to the first entry of each edge.
+/// Upper limit on the mean number of strips that an edge touches in addition to its first strip.
 const MOST_ENTRIES: f64 = 8.0;
 
 /// Round-off of the distance to an edge, as a fraction of the polygon's extent.

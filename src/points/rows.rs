@@ -22,7 +22,7 @@ pub struct Part {
 /// bytes. Empty rows, comments and the heading, which starts at offset `heading`, are skipped.
 ///
 /// # Errors
-/// If the file cannot be read. Invalid rows are errors of the returned part.
+/// If the file cannot be read. The returned part contains the error of its first invalid row.
 pub fn for_each_row(
     path: &Path,
     heading: Option<u64>,

@@ -30,9 +30,9 @@ pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
     }
 }
 
-/// Test whether a position lies within the shape, or at most `tolerance` (m) outside. With a positive
-/// tolerance, points on the boundary count as inside despite round-off; with a negative tolerance, they count
-/// as outside.
+/// Test whether a position (m) lies within the shape, or at most `tolerance` (m) outside. With a positive
+/// tolerance, positions on the boundary count as inside despite round-off. With a negative tolerance,
+/// positions on the boundary count as outside.
 pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     match shape {
         Shape::Box { lower, upper } => (0..3)

@@ -9,8 +9,10 @@ use crate::problem::InitialFile;
 use super::columns::heading;
 use super::rows::for_each_row;
 
-/// Names of the columns of displacements (m) and velocities (m/s), by component.
+/// Names of the columns of displacements (m), by component.
 const DISPLACEMENT: [&str; 3] = ["ux", "uy", "uz"];
+
+/// Names of the columns of velocities (m/s), by component.
 const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
 
 /// Name of the column with the ids of the points, from 0.
@@ -21,7 +23,7 @@ const ID: &str = "id";
 pub struct ValueColumns {
     /// Number of columns, and so of entries per row.
     pub width: usize,
-    /// Offset of the heading in bytes.
+    /// Offset of the heading in the file, bytes.
     pub heading: u64,
     /// Column with the id of the point. Without it, the rows have the ids 0, 1, 2, …
     pub id: Option<usize>,

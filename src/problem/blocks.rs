@@ -9,7 +9,8 @@ use super::{Body, HorizonRule, PointSource, Problem};
 /// Number of block kinds for each level of a refined body.
 const KINDS: usize = 3;
 
-/// A property that the points of a block have in common.
+/// Kind of a block: whether its points have the full cell volume, and whether they have coarser points within
+/// their horizon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Points with the cell volume of their level, on a lattice. All points of a body without refinement have
@@ -17,7 +18,8 @@ pub enum Kind {
     Whole,
     /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,
-    /// Points with coarser points within their horizon, which is enlarged by a factor.
+    /// Points with coarser points within their horizon. The horizon of these points is enlarged by
+    /// [`Refinement::interface_factor`](super::Refinement::interface_factor).
     AtCoarser,
 }
 
@@ -53,7 +55,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Return the spacing relative to that of level 0: 2^−level.
+    /// Return the spacing of the level, divided by the spacing of level 0: 2^−level.
     fn scale(&self) -> f64 {
         0.5_f64.powi(self.level as i32)
     }

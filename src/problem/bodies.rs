@@ -21,7 +21,7 @@ pub struct Body {
     pub span: Range<usize>,
     /// Name of the material.
     pub material_name: String,
-    /// Law, density and elastic constants.
+    /// Law, density, elastic constants, damping and thermal expansion.
     pub material: Material,
     /// The damage law; `None` if bonds never break, or break by the law of the material.
     pub damage: Option<Damage>,
@@ -63,7 +63,8 @@ impl Body {
         }
     }
 
-    /// Return the positions of the points in a cell. Points from a file or a mesh count as centres.
+    /// Return the rule for the positions of the points in a cell. Points from a file or a mesh count as
+    /// centres.
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
             PointSource::Lattice { quadrature, .. } => quadrature,
@@ -155,7 +156,7 @@ pub struct InterfacePair {
     pub name: String,
     /// Names of the two bodies, in any order.
     pub bodies: [String; 2],
-    /// Elastic constants of the bonds.
+    /// Rule for the elastic constants and the horizon of the bonds.
     pub rule: InterfaceRule,
     /// Breaking of the bonds.
     pub damage: InterfaceDamage,
@@ -166,7 +167,8 @@ pub struct InterfacePair {
 /// Breaking of the bonds between two bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
-    /// By the damage laws of both bodies: a bond breaks at the smaller of their thresholds.
+    /// By the damage laws of both bodies. If the horizons are equal, a bond breaks at the smaller of the two
+    /// thresholds.
     OfBodies,
     /// Bonds never break.
     Unbreakable,
@@ -193,8 +195,8 @@ impl Interface {
         })
     }
 
-    /// Return the rule of the bonds between two bodies, which does not depend on their order. Within a body,
-    /// each end uses its own constants.
+    /// Return the rule of the bonds between two bodies. The rule does not depend on the order of the bodies.
+    /// Within a body, each end uses its own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
@@ -203,8 +205,8 @@ impl Interface {
         own.map_or(self.rule, |pair| pair.rule)
     }
 
-    /// Return how the bonds between two bodies break, which does not depend on their order. Within a body,
-    /// the damage law of the body decides.
+    /// Return how the bonds between two bodies break. The result does not depend on the order of the bodies.
+    /// Within a body, the damage law of the body decides.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
@@ -228,9 +230,9 @@ impl InterfacePair {
 pub enum InterfaceRule {
     /// No bonds join the blocks.
     None,
-    /// Means of the moduli and of the horizons.
+    /// Mean of the moduli, and mean of the horizons, of the two blocks.
     Average,
-    /// The smaller of the moduli and of the horizons.
+    /// The smaller of the two moduli, and the smaller of the two horizons.
     Minimum,
     /// Each end uses the constants of its body, for its half of the bond force.
     Own,
@@ -248,7 +250,7 @@ pub struct Damage {
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
     /// Dependence of the fracture energy on the direction of the crack; `None` if all directions are equal.
-    /// `toughness` is the fracture energy of cracks along the axis.
+    /// Otherwise, `toughness` is the fracture energy of cracks along the axis.
     pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
@@ -286,7 +288,8 @@ pub enum Toughness {
 /// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// Points in those cells of a lattice whose centre lies within a shape.
+    /// Points in those cells of a lattice whose centres lie within a shape, and within the shape of no later
+    /// body.
     Lattice {
         /// The region that the cells fill.
         shape: Shape,
@@ -418,8 +421,8 @@ pub struct IdFile {
     pub first: u64,
 }
 
-/// The points of a group of elements or nodes in the meshes, given by name or number. Their ids are known
-/// once the points have been generated.
+/// The points of a group of elements or nodes in the meshes. The deck gives the name or number of the group.
+/// The ids of the points are known once the points have been generated.
 #[derive(Clone)]
 pub struct MeshSet {
     /// Name or number of the group.

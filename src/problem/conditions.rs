@@ -115,12 +115,12 @@ pub enum Action {
     Displacement(Vec<Option<Expression>>),
     /// Prescribed velocity (m/s); `None` for free components.
     Velocity(Vec<Option<Expression>>),
-    /// Additional force density (N/m³): each expression is multiplied by its factor, and divided by the
-    /// [`Condition::depth`] if there is one.
+    /// Additional force density (N/m³) by component: the expression of the component times the factor of the
+    /// component, divided by [`Condition::depth`] if there is a depth.
     BodyForce(Vec<Expression>, Vec<f64>),
     /// Additional total force (N), distributed over the points by volume.
     Force(Vec<Expression>),
-    /// Prescribed temperature.
+    /// Prescribed temperature, in the unit of the reference temperatures of the materials.
     Temperature(Expression),
 }
 

@@ -35,8 +35,8 @@ pub struct ContactRule {
     pub static_friction: f64,
     /// Coefficient of sliding friction.
     pub kinetic_friction: f64,
-    /// Coefficient of restitution: relative speed of two points after a collision, divided by the speed
-    /// before. It is above 0; 1 means no damping.
+    /// Coefficient of restitution: relative speed of two points after a collision, divided by their relative
+    /// speed before the collision. The coefficient is above 0; 1 means no damping.
     pub restitution: f64,
 }
 
@@ -50,7 +50,8 @@ pub enum ContactModel {
 }
 
 impl Contact {
-    /// Return the contact rule for points of two bodies, independent of their order; `None` for no contact.
+    /// Return the contact rule for points of two bodies; `None` for no contact. The rule does not depend on
+    /// the order of the bodies.
     pub fn between(&self, here: &Body, there: &Body) -> Option<ContactRule> {
         let names = [&here.name, &there.name];
         let own = self.pairs.iter().find(|pair| pair.is_of(names));

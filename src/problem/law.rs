@@ -197,12 +197,12 @@ fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     format!("unknown name `{name}`{}", suggestion(name, known))
 }
 
-/// Format names of laws in backticks, such as `a`, `b` and `c`. `and` is the last conjunction.
+/// Format names of laws in backticks, such as `a`, `b` and `c`. `and` is the word before the last name.
 pub fn names(laws: impl IntoIterator<Item = &'static Declaration>, and: &str) -> String {
     listed(laws.into_iter().map(|law| format!("`{}`", law.name)), and)
 }
 
-/// Join the items to a list such as `a, b and c`.
+/// Join the items to a list such as `a, b and c`. `and` is the word before the last item.
 fn listed(items: impl IntoIterator<Item = String>, and: &str) -> String {
     let items: Vec<String> = items.into_iter().collect();
     match items.split_last() {

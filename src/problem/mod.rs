@@ -66,21 +66,22 @@ pub struct Problem {
     pub rigid: Vec<Rigid>,
     /// Bodies in the order of the deck.
     pub bodies: Vec<Body>,
-    /// Finer grids in parts of the bodies; `None` without refinement.
+    /// Settings of finer grids in parts of the bodies; `None` without refinement.
     pub refinement: Option<Refinement>,
     /// Sets: `all`, then one per body, then the sets of the deck.
     pub sets: Vec<Set>,
     /// Pre-cracks: bonds that cross their surfaces start broken.
     pub cracks: Vec<PreCrack>,
-    /// Initial values. If several apply to a point, the last one counts.
+    /// Initial values. If several entries give a displacement or a velocity for a point, the last entry
+    /// counts.
     pub initials: Vec<Initial>,
     /// Loads, supports and temperatures. If several supports or temperatures apply to a point, the last one
     /// counts.
     pub conditions: Vec<Condition>,
     /// End, time step and solution method of the run.
     pub time: Time,
-    /// Stages of the run in order. If empty, the run is a single stage in which all conditions act.
-    /// Otherwise, the last stage ends with [`Self::time`], of which only the end is used.
+    /// Stages of the run in order. If empty, the run is a single stage with [`Self::time`] in which all
+    /// conditions act. Otherwise, only the end of [`Self::time`] is used: the last stage ends at this time.
     pub stages: Vec<Stage>,
     /// The main result file.
     pub output: Output,

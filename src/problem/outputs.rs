@@ -35,7 +35,8 @@ pub enum CheckpointRule {
 pub struct Balance {
     /// Number of steps between comparisons of rank times.
     pub every_steps: u64,
-    /// Ratio of the slowest rank's time to the mean, above which points are rebalanced.
+    /// Ratio of the time of the slowest rank to the mean time of all ranks, above which points are
+    /// rebalanced.
     pub imbalance: f64,
 }
 
@@ -88,7 +89,7 @@ pub struct History {
     pub damage_threshold: f64,
     /// Sums, means and extremes of fields over sets.
     pub statistics: Vec<FieldStatistics>,
-    /// Probes: positions; the history contains values of the point nearest to each.
+    /// Probes: positions. The history contains values of the point nearest to each probe.
     pub probes: Vec<Probe>,
     /// Tracked fronts.
     pub fronts: Vec<Front>,
@@ -137,7 +138,7 @@ pub struct CrackPath {
     pub threshold: f64,
 }
 
-/// A probe: a position; the history contains values of the point nearest to it.
+/// A probe: a position. The history contains values of the point nearest to the probe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
     /// Name in the deck.
@@ -231,8 +232,9 @@ pub enum Field {
     Damage,
     /// Strain energy density W, J/m³.
     StrainEnergyDensity,
-    /// Dilatation θ, the trace of the three-dimensional strain. In plane stress, it is (1 − 2ν)/(1 − ν) times
-    /// the trace of the strain in the plane; under uniaxial stress, (1 − 2ν) times the strain along the bar.
+    /// Dilatation θ, the trace of the three-dimensional strain. In plane stress, θ is (1 − 2ν)/(1 − ν) times
+    /// the trace of the strain in the plane. Under uniaxial stress, θ is (1 − 2ν) times the strain along the
+    /// bar.
     Dilatation,
     /// Weighted volume m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
@@ -261,8 +263,8 @@ pub enum Field {
     NewlyBrokenBonds,
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for correspondence laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 if the point carries no force because it has too few intact bonds for its law, or a bond for which
-    /// the law defines no stress; otherwise 0.
+    /// 1 if the point carries no force, otherwise 0. A point carries no force if its law cannot use its
+    /// intact bonds, or defines no stress at the deformation of the point or of one of its bonds.
     Singular,
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.

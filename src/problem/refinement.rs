@@ -17,8 +17,8 @@ pub struct Refinement {
     pub rule: HorizonRule,
     /// Factor on the horizon of points that have points of a coarser level inside their horizon.
     pub interface_factor: f64,
-    /// Horizon of bonds between points of one body with different horizons: each end uses the horizon of its
-    /// point, or both use the mean.
+    /// Horizon of bonds between points of one body with different horizons: each end uses its own horizon, or
+    /// both ends use the mean of the two horizons.
     pub bonds: InterfaceRule,
     /// Regions that are refined from the start.
     pub regions: Vec<RefinedRegion>,
@@ -42,8 +42,8 @@ pub struct Trigger {
     pub condition: Option<Expression>,
     /// A condition on reference position and time that every triggering point must fulfil.
     pub only: Option<Expression>,
-    /// Time (s) after which a refined point is coarsened, if no triggering point and no point with broken
-    /// bonds has been near it. `None` for no coarsening.
+    /// Time (s) after which the grid is coarsened at a refined point, if the point has been outside the
+    /// horizons of triggering points and of points with broken bonds for this time. `None` for no coarsening.
     pub coarsen_after: Option<f64>,
 }
 

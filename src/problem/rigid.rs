@@ -18,7 +18,7 @@ pub struct Rigid {
     pub centre: [f64; 3],
     /// Prescribed or free motion.
     pub motion: RigidMotion,
-    /// Contact rule with points. Its model is [`Penalty`](super::ContactModel::Penalty).
+    /// Contact rule with points. The model of this rule is [`Penalty`](super::ContactModel::Penalty).
     pub rule: ContactRule,
 }
 
@@ -64,7 +64,7 @@ pub enum RigidMotion {
         velocity: [f64; 3],
         /// Initial angular velocity, 1/s.
         angular_velocity: [f64; 3],
-        /// Force at the centre, N, as an expression of t for each component. It may be empty.
+        /// Force at the centre, N, as an expression of t for each component; empty without such a force.
         force: Vec<Expression>,
     },
 }

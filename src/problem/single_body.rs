@@ -1,9 +1,10 @@
-//! Problems with a single body without conditions, for computations on a block of its lattice.
+//! Problems with a single body without conditions, for computations on a box of lattice cells of this body.
 
 use super::{PointSource, Problem, Shape, StepRule};
 
-/// Create a problem with this body only, without no-failure sets, scatter and damping, and return the edges
-/// of its cells (m). The result is `None` for points that are not on a lattice.
+/// Create a problem with the body of index `body` only, without no-failure sets, scatter and damping. Return
+/// the problem and the edges of the cells of the body (m). `None` if the points of the body are not on a
+/// lattice.
 pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
     let mut body = problem.bodies[body].clone();
     let PointSource::Lattice { spacing, .. } = body.points else {
@@ -13,7 +14,7 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
         damage.no_failure.clear();
         damage.weibull = None;
     }
-    // These problems make no time steps, so damping must not limit the step.
+    // These problems make no time steps. With damping, the fixed step below could be rejected as too long.
     body.material.damping = 0.0;
     let mut single = Problem {
         volume_correction: problem.volume_correction,
@@ -25,8 +26,8 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
     Some((single, spacing))
 }
 
-/// Replace the body's points by the cells between two corners (m) of a lattice. `origin` is a corner of a
-/// cell, m.
+/// Replace the points of the only body by those of the lattice cells in the box from `lower` to `upper` (m).
+/// `origin` is a corner of a cell, m.
 pub fn fill(
     problem: &mut Problem,
     [lower, upper]: [[f64; 3]; 2],

@@ -9,7 +9,8 @@ use crate::expression::Variable;
 pub struct ThermalExpansion {
     /// Coefficient of thermal expansion α, 1/K.
     pub coefficient: f64,
-    /// Reference temperature T₀, at which the undeformed material is free of stress.
+    /// Reference temperature T₀, at which the undeformed material is free of stress, in the unit of
+    /// prescribed temperatures.
     pub reference_temperature: f64,
 }
 
@@ -18,7 +19,7 @@ impl ThermalExpansion {
     ///
     /// If the strain perpendicular to the plane or bar is 0, the stress in this direction adds to the
     /// stretch. The free stretch per kelvin is then (1 + ν) α in plane strain, and (1 + ν)/(1 − ν) α under
-    /// uniaxial strain. Otherwise, it is α.
+    /// uniaxial strain. Otherwise, the free stretch per kelvin is α.
     pub fn in_setting(self, dimension: Dimension, poisson_ratio: f64) -> f64 {
         let factor = match dimension {
             Dimension::PlaneStrain { .. } => 1.0 + poisson_ratio,

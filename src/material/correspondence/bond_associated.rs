@@ -1,28 +1,30 @@
 //! Bond-associated correspondence: a classical stress for each bond, from the bond's own deformation
 //! gradient. This law has no zero-energy modes and needs no control.
 //!
-//! Breitzman & Dayal 2018. The gradient F_ξ of a bond has the bond's motion along the bond and the family's
-//! motion across the bond.
+//! Breitzman & Dayal 2018. The deformation gradient F_ξ of a bond describes the bond's own motion along the
+//! bond, and the family's motion across the bond.
 //! The energy is the mean of the classical energies of the bonds, whereas
 //! [`Correspondence`](super::Correspondence) uses the energy of the mean gradient.
-//! With F = I + H of [`Correspondence`](super::Correspondence) and n = ξ/|ξ|,
+//! With F = I + H of [`Correspondence`](super::Correspondence), n = ξ/|ξ| and the classical strain energy
+//! density Ψ,
 //!
 //! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|², W = Σ w Ψ(F_ξ), w = ω Ṽ/Σ ω Ṽ,
 //!
-//! summed over the intact bonds. The force state is the derivative of W, with P_ξ = ∂Ψ/∂F at F_ξ:
+//! summed over the intact bonds. The force state is the derivative of W. With the stress P_ξ = ∂Ψ/∂F at F_ξ
+//! it is
 //!
 //! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ), Z = Σ w P_ξ (I − n⊗n).
 //!
 //! Because F_ξ ξ = Y, W is 0 only for motions that keep the length of every bond.
 //! F is the gradient of the point, not the mean gradient of both ends. Therefore the force state depends on
 //! the point's own family only, and Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point.
-//! The gradients of Chen 2018 sum over the neighbours that both ends share. Such gradients would need enough
-//! shared neighbours and a shape tensor per bond, so they are not used.
+//! The gradients of Chen 2018 sum over the neighbours that points i and j share. Such gradients would need
+//! enough shared neighbours and a shape tensor per bond, so they are not used.
 //!
-//! A bound on the stiffness follows from W ≤ ½ c Σ w |H_ξ|², with |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|² and
-//! |H|² ≤ Σ ω |η|² Ṽ/λ.
-//! Here c is the largest modulus, and λ is the smallest eigenvalue of K. The spring constant c (1/λ + 1/(|ξ|²
-//! Σ ω Ṽ)) is therefore a bound.
+//! A bound on the stiffness follows from W ≤ ½ c Σ w |H_ξ|² with H_ξ = F_ξ − I. The terms are
+//! |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|², and |H|² ≤ Σ ω |η|² Ṽ/λ.
+//! Here c is the largest modulus of the solid, and λ is the smallest eigenvalue of K. The spring constant
+//! c (1/λ + 1/(|ξ|² Σ ω Ṽ)) is therefore a bound.
 
 use nalgebra::SMatrix;
 
@@ -44,7 +46,7 @@ use crate::lanes::{IsaSet, LaneTuple, Lanes};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BondAssociated {
     stress: Stress,
-    /// [`Stress::largest_modulus`], Pa.
+    /// Largest modulus of the solid, [`Stress::largest_modulus`], Pa.
     modulus: f64,
     /// Trace of the shape tensor of an untruncated family, m⁵.
     whole: f64,
@@ -90,11 +92,11 @@ impl Described for BondAssociated {
     }
 }
 
-/// Point numbers: the constants c/λ and c/Σ ω Ṽ of the stiffness; then 1/Σ ω Ṽ of the intact bonds, H, and
-/// Z K⁻¹.
+/// Point numbers: the constants c/λ (N/m⁷) and c/Σ ω Ṽ (N/m⁵) of the stiffness; then 1/Σ ω Ṽ of the intact
+/// bonds (m⁻³), H, and Z K⁻¹ (N/m⁷).
 type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
-/// Indices of the numbers of a point.
+/// Indices of the numbers of a point, see [`Point`]; K⁻¹ and a flag follow.
 struct Places;
 
 impl Places {
@@ -118,14 +120,14 @@ impl Places {
 }
 
 impl BondAssociated {
-    /// Compute the stresses at the gradients H_ξ of the bonds.
+    /// Compute the stresses at the displacement gradients H_ξ of the bonds, from H of the point.
     #[inline(always)]
     fn stresses<const D: usize>(&self, bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
         self.stress.of_bonds(&own_gradient(bond, gradient))
     }
 }
 
-/// Return H_ξ of the bonds.
+/// Return H_ξ of the bonds, from H of the point.
 #[inline(always)]
 fn own_gradient<const D: usize>(bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> Tensor<Lanes, D> {
     let xi = &bond.reference;
@@ -174,8 +176,8 @@ impl<const D: usize> Law<D> for BondAssociated {
         }
     }
 
-    /// Return the trace of the shape tensor of an untruncated family, divided by that of this family; 1 if K
-    /// is nearly singular.
+    /// Return the trace of the shape tensor of an untruncated family, divided by the trace of K of this
+    /// family; 1 if K is nearly singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {

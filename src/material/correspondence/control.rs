@@ -17,23 +17,24 @@ use std::f64::consts::PI;
 pub enum Control {
     /// B = 0.
     None,
-    /// B = (4/3) G/k I, with the shear modulus G and a diagonal entry k of the shape tensor of an untruncated
-    /// family. The dispersion of long shear waves then vanishes.
+    /// B = (4/3) G/k I, with the shear modulus G and a diagonal entry k (m⁵) of the shape tensor of an
+    /// untruncated family. Long shear waves then have no dispersion.
     ///
-    /// Derivation: consider a wave of amplitude u, wavenumber κ along an axis, and modulus M; let q = Σ ω
+    /// Derivation: consider a wave of amplitude u, wavenumber κ along the axis x, and modulus M; let q = Σ ω
     /// ξ_x⁴ Ṽ.
-    /// H loses the fraction κ²q/(6k), so the energy of the wave is ½ M κ² (1 − κ²q/(3k)) |u|².
-    /// z is −½ (κ·ξ)² u, so a control b/k I stores ½ b κ⁴q/(4k) |u|².
-    /// The sum is independent of q for b = (4/3) M, for every dimension, influence function and lattice.
+    /// H is too small by the fraction κ²q/(6k), so the energy of the wave is ½ M κ² (1 − κ²q/(3k)) |u|².
+    /// z is −½ (κ·ξ)² u, so a control (b/k) I stores the energy ½ b κ⁴q/(4k) |u|².
+    /// The sum of both energies is independent of q for b = (4/3) M, for every dimension, influence function
+    /// and lattice.
     Dispersion {
         /// Product (4/3) G/k, N/m⁷.
         strength: f64,
     },
     /// B = C : K⁻¹, B_ij = C_ijkl K⁻¹_kl (Wan, Chen, Chu & Chen 2019; Willberg et al. 2022, eq. 15). B has
-    /// the stiffness and the anisotropy of the solid, and no coefficient.
+    /// the stiffness and the anisotropy of the solid. The deck gives no coefficient for B.
     Wan2019(Hooke),
-    /// B = G (c/δ) (V_δ/ω₀) I (Silling 2017). Here G is a coefficient, c the micromodulus of a bond-based
-    /// solid, V_δ the volume within a horizon, and ω₀ = Σ ω Ṽ.
+    /// B = G (c/δ) (V_δ/ω₀) I (Silling 2017). Here G is a coefficient, c the micromodulus of `pmb`, V_δ the
+    /// volume of an untruncated family (m³), and ω₀ = Σ ω Ṽ (m³).
     Silling2017 {
         /// Coefficient G, dimensionless.
         coefficient: f64,
@@ -65,8 +66,8 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
-/// Return the error of `wan2019` with anisotropic constants for which C : I is not positive definite;
-/// `None` otherwise.
+/// Return the error of the control `wan2019` with anisotropic constants for which C : I is not positive
+/// definite. `None` for other controls and other constants.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let least = hooke::least_under_dilation(values, dimension)?;
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
@@ -110,8 +111,9 @@ impl Control {
         }
     }
 
-    /// Return the constant of a point for [`Self::matrix`], N/m⁷, from ω₀ (m³) of its initial family. It is 0
-    /// for the controls that do not use it, and for ω₀ = 0 with `silling2017`.
+    /// Return the constant of a point that [`Self::matrix`] needs, N/m⁷. `weight` is ω₀ (m³) of the initial
+    /// family of the point. The constant is 0 for `none` and `wan2019`, which do not use the constant, and
+    /// for ω₀ = 0 with `silling2017`.
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,
@@ -120,7 +122,7 @@ impl Control {
         }
     }
 
-    /// Return B (N/m⁷) of a point from K⁻¹ (m⁻⁵) and its constant.
+    /// Return B (N/m⁷) of a point from K⁻¹ (m⁻⁵) and [`Self::constant`] of the point.
     pub fn matrix<const D: usize>(
         &self,
         inverse: &SMatrix<f64, D, D>,
@@ -194,7 +196,7 @@ mod tests {
         Dimension::PlaneStrain { thickness: 0.5 },
     ];
 
-    /// Return λ (in plane stress that of the sheet) and G, Pa.
+    /// Return λ and G, Pa; in plane stress, λ of a thin sheet.
     fn constants(dimension: Dimension, ratio: f64) -> [f64; 2] {
         let shear = YOUNG / (2.0 * (1.0 + ratio));
         let across = match dimension {
@@ -220,8 +222,8 @@ mod tests {
                 let found = of(dimension).matrix(&plane, 0.0);
                 assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
             }
-            // C_ijkl K⁻¹_jl of an untruncated family is λ + (D + 1) G. This equals the control's B only if λ
-            // = G.
+            // C_ijkl K⁻¹_jl for K = I is (λ + 4 G) I. This equals B of the control, (3 λ + 2 G) I, only if
+            // λ = G.
             let other = lambda + 4.0 * shear;
             let found = of(Dimension::Space).matrix(&Matrix3::identity(), 0.0)[(0, 0)];
             let are_equal = (found / other - 1.0).abs() < 1e-14;

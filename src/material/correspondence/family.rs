@@ -6,21 +6,22 @@ use super::super::symmetric::{from_entries, mixed};
 use super::super::{Bond, Rotation, rotation};
 use crate::lanes::{LaneTuple, Lanes};
 
-/// A shape tensor counts as nearly singular if its determinant is below this fraction of that of an isotropic
-/// family with the same trace.
+/// A shape tensor counts as nearly singular if its determinant is at most this fraction of the determinant of
+/// an isotropic shape tensor with the same trace.
 const SINGULAR: f64 = 1e-2;
 
-/// Limit of the stiffness of a family's intact part, relative to the initial family. A stiffer part carries
-/// no force.
+/// Limit of the stiffness of a family's intact part, relative to the initial family. A point whose intact
+/// part is stiffer carries no force.
 ///
 /// The time step is stable for initial families only. Without a limit, points of torn plates moved without
-/// bound; even a limit of 16 prevented this.
+/// bound. A limit of 16 was already enough to prevent such motions.
 const STIFFEST: f64 = 8.0;
 
-/// Contribution of a bond to the shape tensor (diagonal and mixed entries) and to Σ ω η⊗ξ Ṽ (row by row).
+/// Contribution of a bond to the shape tensor (diagonal and mixed entries) and to Σ ω η⊗ξ Ṽ (row by row). The
+/// same type holds the sums of all contributions.
 pub type FamilyShare<const D: usize> = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D]);
 
-/// Return the [`FamilyShare`] of a bond without weight and volume, m².
+/// Return the [`FamilyShare`] of a bond without the factors ω and Ṽ, m².
 #[inline(always)]
 pub fn family_share<const D: usize>(bond: &Bond<D>) -> FamilyShare<D> {
     let xi = &bond.reference;
@@ -38,7 +39,7 @@ pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) 
     (LaneTuple::each(|d| xi[d] * xi[d]), others)
 }
 
-/// Create a tensor from its entries, row by row.
+/// Create a tensor from its entries, which are given row by row.
 pub fn from_rows<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
     SMatrix::from_fn(|a, b| entries[D * a + b])
 }
@@ -62,7 +63,7 @@ impl<const D: usize> ShapeTensor<D> {
         Self(from_entries(entries))
     }
 
-    /// Return K⁻¹ (m⁻⁵), unless K is nearly singular.
+    /// Return K⁻¹ (m⁻⁵); `None` if K is nearly singular.
     pub fn inverse(&self) -> Option<SMatrix<f64, D, D>> {
         let mean = self.0.trace() / D as f64;
         // False for a family without bonds, too.
@@ -73,8 +74,8 @@ impl<const D: usize> ShapeTensor<D> {
         }
     }
 
-    /// Return K⁻¹ (m⁻⁵) of the intact part of a family; `None` if K is nearly singular or this part is too
-    /// stiff.
+    /// Return K⁻¹ (m⁻⁵) of the intact part of a family; `None` if K is nearly singular, or if this part is
+    /// stiffer than `STIFFEST` allows.
     ///
     /// `modulus` is the largest modulus of the solid (Pa), and `whole` the spring constant of the initial
     /// family (N/m⁷).
@@ -87,19 +88,19 @@ impl<const D: usize> ShapeTensor<D> {
         }
     }
 
-    /// Return the trace Σ ω |ξ|² Ṽ, m⁵.
+    /// Return the trace of K, Σ ω |ξ|² Ṽ, m⁵.
     pub fn trace(&self) -> f64 {
         self.0.trace()
     }
 
-    /// Return the smallest eigenvalue, m⁵.
+    /// Return the smallest eigenvalue of K, m⁵.
     pub fn smallest(&self) -> f64 {
         extremes(&self.0)[0]
     }
 }
 
-/// Compute the rotation of a family from its [`FamilyShare`] sums; the identity if the shape tensor is nearly
-/// singular.
+/// Compute the rotation of a family from the sums of its [`FamilyShare`]s; the identity if the shape tensor
+/// is nearly singular.
 pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
     let inverse = ShapeTensor::<D>::new(sums).inverse();
     inverse.map_or(rotation::IDENTITY, |inverse| {

@@ -2,8 +2,8 @@
 //! the body.
 //!
 //! Voigt's order is xx, yy, zz, yz, xz, xy with engineering shear strains. A plane problem uses the
-//! components xx, yy and xy. In plane stress the matrix is that of a thin sheet. In plane strain its
-//! components are those of the solid.
+//! components xx, yy and xy. In plane stress the matrix is that of a thin sheet. In plane strain the
+//! components xx, yy and xy of the matrix are those of the solid.
 
 use nalgebra::{DMatrix, Matrix6, Rotation3, Vector3};
 
@@ -25,8 +25,8 @@ pub struct Hooke {
     matrix: Matrix6<f64>,
     /// Row for the direction across the plane: factors of the strains xx, yy and 2 xy.
     ///
-    /// The product is the stress zz (Pa) in plane strain, and the strain zz in plane stress. `None` in 3-D
-    /// and 1-D, and if the constants of the deck do not determine this row.
+    /// The sum of factors times strains is the stress zz (Pa) in plane strain, and the strain zz in plane
+    /// stress. `None` in 3-D and 1-D, and if the constants of the deck do not determine this row.
     across: Option<[f64; 3]>,
 }
 
@@ -227,7 +227,8 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// Return the error of a matrix that is not finite or not positive definite, at the key `first`.
+/// Return the error of a matrix that is not finite or not positive definite, at the key `first`; `None` for
+/// other matrices.
 fn indefinite(
     matrix: &Matrix6<f64>,
     dimension: Dimension,
@@ -249,8 +250,8 @@ fn indefinite(
     )
 }
 
-/// Return the smallest eigenvalue (Pa) of the matrix in the deck's notation, and a text with the strain that is the
-/// eigenvector.
+/// Return the smallest eigenvalue (Pa) of the matrix in Voigt's order, and the eigenvector of this eigenvalue
+/// as a text: the components of the strain, relative to the largest component.
 fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     let used = used(dimension);
     let written = DMatrix::from_fn(used.len(), used.len(), |a, b| matrix[(used[a], used[b])]);
@@ -300,7 +301,8 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let young = ["x", "y", "z"].map(|axis| of("youngs_modulus", axis));
     let mut compliance = Matrix6::zeros();
     for (k, young) in young.into_iter().enumerate() {
-        // The stiffness across a sheet does not matter, because it does not couple to the plane here.
+        // The stiffness across a sheet may have any value, because these matrices do not couple it to the
+        // plane.
         compliance[(k, k)] = if sheet && k == 2 { 1.0 } else { 1.0 / young };
     }
     for (axes, a, b) in [("yz", 1, 2), ("xz", 0, 2), ("xy", 0, 1)] {
@@ -317,8 +319,8 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     Some(compliance.try_inverse().unwrap_or(not_a_solid))
 }
 
-/// Return the elastic constants of the isotropic solid whose moduli are the averages over all directions
-/// (Voigt). `None` for isotropic constants.
+/// Return the elastic constants of the isotropic solid whose stiffness is the average of the stiffness over
+/// all directions (Voigt); in 2-D, over all directions in the plane. `None` for isotropic constants.
 pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
     let c = unturned(values, dimension)?;
     if matches!(dimension, Dimension::Space) {
@@ -345,7 +347,8 @@ pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
 }
 
 impl Hooke {
-    /// Create Hooke's matrix of a body; `None` if its entries are not finite.
+    /// Create Hooke's matrix of a body. `None` if an entry of the matrix of an anisotropic solid is not
+    /// finite.
     pub fn of(given: &Given) -> Option<Self> {
         let Some(own) = unturned(given.values, given.dimension) else {
             let matrix = isotropic(given);
@@ -375,7 +378,7 @@ impl Hooke {
     }
 
     /// Return the stress zz (Pa) in plane strain, or the strain zz in plane stress, from the strain in the
-    /// plane. `None` if the constants of the deck do not determine it.
+    /// plane. `None` in 3-D and 1-D, and if the constants of the deck do not determine this result.
     pub fn across<const D: usize>(&self, strain: &Tensor<f64, D>) -> Option<f64> {
         let [xx, yy, xy] = self.across?;
         Some(xx * strain[0][0] + yy * strain[1][1] + xy * (strain[0][1] + strain[1][0]))
@@ -399,8 +402,12 @@ impl Hooke {
         stress
     }
 
-    /// Return the shear modulus (Pa) of the isotropic solid whose compliance is the average over all
-    /// directions (Reuss). The softest shear modes dominate it.
+    /// Return the shear modulus (Pa) of the isotropic solid whose compliance is the average of the compliance
+    /// over all directions (Reuss); in 2-D, over all directions in the plane. The softest shear modes
+    /// dominate this shear modulus.
+    ///
+    /// # Panics
+    /// If Hooke's matrix is singular.
     pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
         let used = used(dimension);
         // The determinant of a matrix of very small or very large entries is not representable. A power of
@@ -425,9 +432,9 @@ impl Hooke {
         extremes(&matrix::<D>(&self.stress(&unit)))[0]
     }
 
-    /// Return the largest eigenvalue of C : E = λ E, Pa.
+    /// Return the largest eigenvalue λ of C : E = λ E, Pa.
     pub fn largest(&self) -> f64 {
-        // In Kelvin's notation the norm of a tensor is that of its vector.
+        // In Kelvin's notation a tensor and the vector of its components have the same norm.
         let factor = |k: usize| if k < 3 { 1.0 } else { 2_f64.sqrt() };
         let kelvin = Matrix6::from_fn(|a, b| self.matrix[(a, b)] * factor(a) * factor(b));
         kelvin
@@ -454,7 +461,7 @@ fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }
 
-/// Return the row of the stress zz in plane strain; `None` in other dimensions.
+/// Return the row `across` of [`Hooke`] for plane strain; `None` in other dimensions.
 fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
     let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
     is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))
@@ -477,7 +484,8 @@ fn isotropic(given: &Given) -> Matrix6<f64> {
     })
 }
 
-/// Transform a matrix from axes that are rotated by Bunge's angles (rad) to the axes of the body.
+/// Transform Hooke's matrix from the axes of the material to the axes of the body. The axes of the material
+/// are rotated by Bunge's angles (rad).
 fn turned(own: &Matrix6<f64>, [first, second, third]: [f64; 3]) -> Matrix6<f64> {
     let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
     let (z, x) = (Vector3::z_axis(), Vector3::x_axis());

@@ -2,23 +2,29 @@
 //!
 //! The yield stress is
 //!
-//! σ = (A + B ε̄ⁿ)(1 + C ln max(ε̄̇/ε̇₀, 1))(1 − T*ᵐ), T* = (T − T₀)/(T_m − T₀).
+//! σ = (A + B ε̄ⁿ)(1 + C ln max(ε̄̇/ε̇₀, 1))(1 − T*ᵐ), T* = (T − T₀)/(T_m − T₀),
 //!
-//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at its point: T − T₀ = β w/(ρ c), where w is the energy
-//! that the point has dissipated. The temperature of a step is that at its start.
+//! with the equivalent plastic strain ε̄, the temperature T, the initial temperature T₀, the melting
+//! temperature T_m, and the constants of [`JohnsonCook`].
+//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at the point where it is generated: T − T₀ = β w/(ρ
+//! c). Here w is the energy density that the point has dissipated, β the fraction of w that becomes heat, and
+//! ρ c the volumetric heat capacity. A step is computed with the temperature at the start of the step.
 //!
-//! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of time
-//! has this factor, so that a stress that has been returned to the yield surface does not flow again.
+//! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of
+//! time uses this stored factor. Therefore a stress that has been returned to the yield surface does not flow
+//! again.
 //!
-//! The increment of plastic strain is ΔE_p = x S_d with the final deviator S_d, and Δε̄ = ⅔ x q. x divides the
-//! parts of the equivalent trial stress by 1 + x c ([`Modes`]). The equation
+//! The increment of plastic strain is ΔE_p = x S_d with the deviator S_d of the final stress, and Δε̄ = ⅔ x q
+//! with the equivalent stress q of the final stress. The factor x follows from the trial stress: each part of
+//! the equivalent trial stress is divided by 1 + x c, with the stiffness c of the part ([`Modes`]). The
+//! equation
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!
-//! is solved by Newton's method in ln u, with u = x/(1 + x c) for the largest c. In 3-D and plane strain there
-//! is one part, and u is proportional to Δε̄. Then σ is convex in ln u, also at ε̄ = 0, where the slope of ε̄ⁿ is
-//! infinite for n < 1. Newton's method therefore converges from above. In plane stress, a bracket safeguards
-//! the method.
+//! is solved by Newton's method in ln u, with u = x/(1 + x c) for the largest c. In 3-D and plane strain
+//! there is one part, and u is proportional to Δε̄. Then F is convex in ln u, also at ε̄ = 0, where the slope
+//! of ε̄ⁿ is infinite for n < 1. Newton's method therefore converges from above. In plane stress, a bracket
+//! safeguards the method.
 
 use super::super::{Key, Kind, LawFault, PlasticState, Property, Values};
 use super::plastic::{HARDENING, YIELD_STRESS};
@@ -38,7 +44,7 @@ pub struct JohnsonCook {
     reference_rate: f64,
     /// Thermal softening exponent m.
     softening_exponent: f64,
-    /// T* per dissipated energy density, β/(ρ c (T_m − T₀)), m³/J; 0 without thermal softening.
+    /// T* divided by the dissipated energy density: β/(ρ c (T_m − T₀)), m³/J; 0 without thermal softening.
     heating: f64,
 }
 
@@ -116,7 +122,7 @@ pub const TAYLOR_QUINNEY: Key = Key {
     },
 };
 
-/// Keys of which thermal softening needs all.
+/// Keys of thermal softening. The deck gives either all or none of them.
 const THERMAL: [&Key; 4] = [
     &SOFTENING_EXPONENT,
     &MELTING_TEMPERATURE,
@@ -136,16 +142,18 @@ const ALL: [&Key; 8] = [
     &TAYLOR_QUINNEY,
 ];
 
-/// β if the deck does not give it.
+/// Default of the Taylor–Quinney coefficient β.
 const DEFAULT_TAYLOR_QUINNEY: f64 = 0.9;
 
-/// Smallest factor of the temperature. A molten point keeps this fraction of its yield stress.
+/// Smallest factor of the temperature on the yield stress. A molten point keeps this fraction of its yield
+/// stress.
 const MOLTEN: f64 = 1e-3;
 
 /// Tolerance of F, relative to the equivalent trial stress.
 const TOLERANCE: f64 = 1e-14;
 
-/// Largest number of iterations. About five are needed, and up to thirty at the first yield with a small n.
+/// Largest number of Newton iterations. About five are needed, and up to thirty at the first yield with a
+/// small n.
 const MOST_ITERATIONS: usize = 100;
 
 /// Return the first key of this hardening that the deck gives.
@@ -194,7 +202,8 @@ pub fn fault(values: &Values) -> Option<LawFault> {
     None
 }
 
-/// Parts of the equivalent trial stress that plastic flow reduces at different rates: q² = Σ s/(1 + x c)².
+/// Parts of the equivalent trial stress that plastic flow reduces at different rates. The final equivalent
+/// stress q is q² = Σ s/(1 + x c)², summed over the parts.
 #[derive(Debug, Clone, Copy)]
 pub struct Modes {
     /// Squared parts s of the trial stress, Pa².
@@ -220,17 +229,18 @@ impl Modes {
 pub struct Surface {
     /// A + B ε̄ⁿ at the start of the step, Pa.
     pub by_strain: f64,
-    /// Yield stress at the start of the step, below the reference strain rate, Pa. If no time passes, it contains
-    /// the factor of the strain rate of the last step.
+    /// Yield stress at the start of the step for rates below the reference strain rate, Pa. If no time
+    /// passes, this yield stress contains the factor of the strain rate of the last step.
     pub limit: f64,
     /// Ratio of `limit` to `by_strain`.
     factor: f64,
-    /// Increment of ε̄ at the reference strain rate. Infinite if the yield stress does not depend on the rate.
+    /// Increment of ε̄ in the step at the reference strain rate. Infinite if the yield stress does not depend
+    /// on the rate, or if no time passes.
     threshold: f64,
 }
 
 impl JohnsonCook {
-    /// Create the hardening of a body; `None` if the deck gives no key of it.
+    /// Create the hardening of a body; `None` if the deck gives no key that only this hardening has.
     pub fn of(values: &Values) -> Option<Self> {
         first_given(values)?;
         let number = |key: &Key| values.get(key.name).map(|_| values.number(key.name));
@@ -277,7 +287,8 @@ impl JohnsonCook {
         self.yield_stress + self.modulus * libm::pow(equivalent, self.exponent)
     }
 
-    /// Return the yield surface of a state in a step of this length (s); 0 if no time passes.
+    /// Return the yield surface of a state in a step. `step` is the length of the step (s), 0 if no time
+    /// passes.
     pub fn surface(&self, state: &PlasticState, step: f64) -> Surface {
         let factor = if step > 0.0 {
             self.by_heat(state.work)
@@ -298,7 +309,7 @@ impl JohnsonCook {
         }
     }
 
-    /// Return 1 − T*ᵐ for a dissipated energy (J/m³).
+    /// Return 1 − T*ᵐ for a dissipated energy density (J/m³); at least [`MOLTEN`].
     fn by_heat(&self, work: f64) -> f64 {
         if self.heating == 0.0 {
             return 1.0;
@@ -307,15 +318,15 @@ impl JohnsonCook {
         (1.0 - libm::pow(temperature, self.softening_exponent)).max(MOLTEN)
     }
 
-    /// Advance the state over a step in which the stress is inside of the yield surface.
+    /// Advance the state over a step in which the stress is inside the yield surface.
     pub fn rest(&self, surface: &Surface, state: &mut PlasticState) {
         state.yield_change = surface.factor - 1.0;
     }
 
-    /// Return x (1/Pa) of a trial stress outside of the yield surface, and advance the state.
+    /// Return x (1/Pa) of a trial stress outside the yield surface, and advance the state.
     ///
-    /// The dissipated energy is the mean of the yield stresses before and after, times Δε̄. Its error is of
-    /// second order in the step, except in a step in which flow begins.
+    /// The energy that the step dissipates is Δε̄ times the mean of the yield stresses before and after the
+    /// step. The error of this energy is of second order in the step, except in a step in which flow begins.
     pub fn flow(&self, modes: &Modes, surface: &Surface, state: &mut PlasticState) -> f64 {
         let before = surface.by_strain * (1.0 + state.yield_change);
         let [x, growth, factor] = self.root(modes, surface, state.equivalent);
@@ -330,7 +341,7 @@ impl JohnsonCook {
     fn root(&self, modes: &Modes, surface: &Surface, equivalent: f64) -> [f64; 3] {
         let [soft, stiff] = modes.stiffnesses;
         let [trial, ..] = modes.at(0.0);
-        // q is at most trial/(1 + x soft), so q is below the limit here.
+        // q is at most trial/(1 + x soft). At x = `most`, q is therefore at most the limit.
         let most = (trial / surface.limit - 1.0) / soft;
         // x must stay finite, also if the yield stress is below the round-off of the trial stress.
         let largest = (1.0 - f64::EPSILON) / stiff;
@@ -368,7 +379,8 @@ impl JohnsonCook {
 }
 
 impl Surface {
-    /// Return the factor on A + B ε̄ⁿ with this increment of ε̄, and its derivative.
+    /// Return the factor on A + B ε̄ⁿ with this increment of ε̄, and the derivative of the factor by the
+    /// increment.
     fn by_rate(&self, coefficient: f64, growth: f64) -> [f64; 2] {
         if growth > self.threshold {
             let rate = 1.0 + coefficient * libm::log(growth / self.threshold);
@@ -433,8 +445,8 @@ mod tests {
         Plastic::of(&given).unwrap()
     }
 
-    /// Pull a point uniaxially to a logarithmic strain at a constant rate (1/s). Return the Kirchhoff stress
-    /// along the bar after each step (Pa), and the state at the end.
+    /// Pull a point uniaxially to a logarithmic strain at a constant rate (1/s). Return the axial Kirchhoff
+    /// stress after each step (Pa), and the state at the end.
     fn pull(law: &Plastic, strain: f64, rate: f64, steps: i32) -> (Vec<f64>, PlasticState) {
         let mut state = PlasticState::default();
         let step = strain / rate / f64::from(steps);
@@ -448,7 +460,7 @@ mod tests {
                 let (piola, _) = law.at(&gradient, state, step).unwrap();
                 piola * deformation
             };
-            // Secant method for a stress across of 0.
+            // Secant method for the transverse strain at which the transverse stress is 0.
             let mut last = (across, kirchhoff(across, &mut state.clone())[(1, 1)]);
             across -= 1e-6;
             for _ in 0..50 {
@@ -471,7 +483,7 @@ mod tests {
         for strain in [1e-3, 0.01, 0.1, 1.0] {
             let (stresses, state) = pull(&law, strain, 1.0, 40);
             let stress = stresses[39];
-            // The strain is σ/E + ε̄. Bisection for ε̄.
+            // The strain is σ/E + ε̄. Find ε̄ by bisection.
             let [mut low, mut high] = [0.0, strain];
             for _ in 0..200 {
                 let middle = 0.5 * (low + high);
@@ -499,8 +511,9 @@ mod tests {
         }
     }
 
-    /// Integrate the rate equations of a bar by the method of Runge and Kutta. Above the yield stress the rate
-    /// of flow follows from the stress: ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns stress (Pa), ε̄ and work (J/m³).
+    /// Integrate the rate equations of a bar by the method of Runge and Kutta. Above the yield stress the
+    /// rate of flow follows from the stress: ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns stress (Pa), ε̄ and work
+    /// (J/m³).
     fn integrated(strain: f64, rate: f64) -> [f64; 3] {
         let steps = 400_000;
         let step = strain / rate / f64::from(steps);
@@ -533,7 +546,7 @@ mod tests {
         let law = copper(MODULUS, &[&BY_STRAIN, &BY_RATE, &BY_HEAT]);
         let (strain, rate) = (0.5, 1e4);
         let [stress, flowed, work] = integrated(strain, rate);
-        // The temperature matters.
+        // The temperature changes the yield stress noticeably.
         assert!(work / TO_MELT > 0.02, "{work}");
         let error = |steps| {
             let (stresses, state) = pull(&law, strain, rate, steps);
@@ -571,7 +584,8 @@ mod tests {
         }
     }
 
-    /// Compare the root of a trial stress `1 + excess` times the yield stress with that of bisection.
+    /// Compare the root for a trial stress of `1 + excess` times the yield stress with the result of
+    /// bisection.
     fn compare(law: &JohnsonCook, equivalent: f64, step: f64, excess: f64) {
         let state = PlasticState {
             equivalent,
@@ -608,7 +622,7 @@ mod tests {
                     &mut low
                 }) = middle;
             }
-            // An increment of this size does not change the stress at the tolerance of the root.
+            // An error of x of this size changes q by less than a few times the tolerance of the root.
             let [q, fall, _] = modes.at(x);
             let allowed = 1e-12 * x + 4.0 * TOLERANCE * trial / fall;
             let case = format!(

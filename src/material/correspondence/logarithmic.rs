@@ -2,14 +2,14 @@
 //!
 //! F = F_e F_p. The stored state of a point is C_p⁻¹ − I with C_p = F_pᵀ F_p, so that b_e = F_e F_eᵀ = F
 //! C_p⁻¹ Fᵀ.
-//! With the eigenvalues b_a and the eigenvectors n_a of b_e (Simo 1992):
+//! With the eigenvalues b_a and the eigenvectors n_a of b_e, the logarithmic strains ε_a, the Kirchhoff
+//! stress τ, P and the elastic energy density W are (Simo 1992):
 //!
 //! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ Σ ε + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
 //!
-//! The flow rule is that of small strains, applied to ε_a and τ_a. After the flow b_e is Σ exp(2 ε_a)
-//! n_a⊗n_a.
-//! A rigid rotation only rotates b_e, so no stress rate needs integration. Flow preserves volume, det C_p =
-//! 1.
+//! The flow rule is that of small strains, applied to ε_a and τ_a. After the flow, b_e is Σ exp(2 ε_a)
+//! n_a⊗n_a. A rigid rotation only rotates b_e, so no stress rate needs integration. Flow preserves volume:
+//! det C_p is 1.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -20,8 +20,8 @@ use super::plastic::{Plastic, tensor_of};
 /// Largest number of sweeps of Jacobi's method; about six are needed.
 const MOST_SWEEPS: usize = 30;
 
-/// Jacobi's method has converged if the squared off-diagonal entries are below this fraction of all squared
-/// entries.
+/// Jacobi's method has converged if the sum of the squares of the mixed entries is at most this fraction of
+/// the sum of the squares of all entries.
 const CONVERGED: f64 = 1e-32;
 
 /// Elastic trial state of a point, before any flow.
@@ -60,14 +60,15 @@ impl Trial {
         })
     }
 
-    /// Return the tensor Σ a_a n_a⊗n_a with these entries a_a.
+    /// Return the tensor Σ t_a n_a⊗n_a with these eigenvalues t_a.
     fn tensor(&self, entries: &Vector3<f64>) -> Matrix3<f64> {
         self.axes * Matrix3::from_diagonal(entries) * self.axes.transpose()
     }
 }
 
 /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
-/// state in a step of this length (s). `None` if det F ≤ 0 or b_e is not positive definite.
+/// state. `step` is the length of the time step (s), 0 if no time passes. `None` if det F ≤ 0 or b_e is not
+/// positive definite.
 pub fn at<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
@@ -104,7 +105,7 @@ pub fn across<const D: usize>(
     Some(trial.tensor(&stress.diagonal())[(2, 2)])
 }
 
-/// Add a symmetric tensor to entries xx, yy, zz, yz, xz, xy.
+/// Add a symmetric tensor to another one that is stored as the entries xx, yy, zz, yz, xz, xy.
 pub fn add(entries: &mut [f64; 6], change: &Matrix3<f64>) {
     let places = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
     for (entry, place) in entries.iter_mut().zip(places) {
@@ -229,7 +230,8 @@ mod tests {
                 0..100 => 3_f64.powf((f64::from(step) + 1.0) / 100.0),
                 _ => 3_f64.powf(2.0 - (f64::from(step) + 1.0) / 100.0),
             };
-            // Reference in one dimension: the stress as a function of the strain ln λ.
+            // Reference solution in one dimension: the stress as a function of the logarithm of the stretch
+            // `along`.
             let trial = YOUNG * (along.ln() - plastic);
             let limit = YIELD + HARDENING * flowed;
             let growth = ((trial.abs() - limit) / (YOUNG + HARDENING)).max(0.0);
@@ -351,8 +353,9 @@ mod tests {
     #[test]
     fn at_small_strains_it_is_the_law_of_small_strains() {
         let dimension = Dimension::PlaneStrain { thickness: 1.0 };
-        // Error as a fraction of the stress. The two strain measures differ by ε², and so does the pressure,
-        // whereas the yield stress limits the deviator. The error is therefore of the order K ε²/σ_y.
+        // Error as a fraction of the stress, divided by the size of the strain. The two strain measures
+        // differ by about ε², and the pressures by about K ε², whereas the yield stress limits the deviator.
+        // The error as a fraction of the stress is therefore at most of the order K ε²/σ_y.
         let error = |size: f64| {
             let laws = ["logarithmic", "green-lagrange"].map(|measure| law(dimension, measure));
             let mut states = [PlasticState::default(); 2];

@@ -1,21 +1,22 @@
 //! Correspondence: a classical stress at each point, from the deformation gradient of its family.
 //!
 //! Silling et al. 2007, §18; Willberg, Hesse & Heinecke 2022, eq. 6–15.
-//! The shape tensor is K = Σ ω ξ⊗ξ Ṽ, the displacement gradient is H = (Σ ω η⊗ξ Ṽ) K⁻¹, and F = I + H. Both
-//! sums are over the intact bonds.
+//! The shape tensor is K = Σ ω ξ⊗ξ Ṽ, the displacement gradient is H = (Σ ω η⊗ξ Ṽ) K⁻¹, and the deformation
+//! gradient is F = I + H. The sums are over the intact bonds.
 //! With a first Piola–Kirchhoff stress P(F), the force state is
 //!
 //! T⟨ξ⟩ = ω P K⁻¹ ξ + ω B z, z = η − H ξ.
 //!
-//! z is the part of the motion that does not change F (a zero-energy mode). B z is the force of the
-//! zero-energy control ([`Control`]).
+//! z is the part of the motion that does not change F (a zero-energy mode). ω B z is the force state of the
+//! zero-energy control, with the matrix B of the point ([`Control`]).
 //! The loops use T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H.
 //! The strain energy density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, because Σ ω z⊗ξ Ṽ = 0.
 //!
 //! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point.
-//! The control is then multiplied by a factor s that falls with the flow ([`Plastic::control_left`]). An
-//! elastic control would carry load that the solid cannot carry.
-//! When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the control is dissipated.
+//! B is then multiplied by a factor s that falls with the flow ([`Plastic::control_left`]). An elastic
+//! control would carry load that the solid cannot carry.
+//! When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the control is dissipated, with B before this
+//! multiplication.
 
 mod bond_associated;
 mod control;
@@ -49,7 +50,7 @@ use stress::Stress;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correspondence {
     response: Response,
-    /// [`Stress::largest_modulus`], Pa.
+    /// Largest modulus of the solid, [`Stress::largest_modulus`], Pa.
     modulus: f64,
     control: Control,
     /// Trace of the shape tensor of an untruncated family, m⁵.
@@ -133,8 +134,8 @@ impl Declared for Correspondence {
 fn invariants(values: &Values) -> Invariants {
     let stress = of_stress(values);
     let yields = values.get(plastic::YIELD_STRESS.name).is_some();
-    // In truncated families the control of Wan et al. has fixed axes, which do not rotate with the body. The
-    // control then exerts a moment of the order z². Other controls have no axes.
+    // In truncated families the control of Wan et al. has principal axes, which do not rotate with the body.
+    // The control then exerts a moment of the order z². Other controls are multiples of I, without such axes.
     let has_axes = values.word(control::KIND.name) == "wan2019";
     Invariants {
         conservative: stress.conservative && !yields,
@@ -177,26 +178,26 @@ impl Described for Correspondence {
     }
 }
 
-/// Constants: a spring constant that bounds the energy, and the constant of the control (N/m⁷). Then A, and
-/// the diagonal and mixed entries of B.
+/// Constants (both N/m⁷): a spring constant that bounds the energy, and [`Control::constant`]. Then A and the
+/// diagonal and mixed entries of B (all N/m⁷).
 type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
 /// Count of the point's own numbers: W − ½ P : H (J/m³), and the flag of a point without force.
 ///
-/// If a body yields and has a control, two more follow. One is ½ tr(B H K Hᵀ), the part of ½ Σ ω η·B η Ṽ that
-/// does not belong to the control (J/m³). The other is s at the start of the step.
+/// If a body yields and has a control, two more numbers follow. The first is ½ tr(B H K Hᵀ), the part of
+/// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is s at the start of the step.
 const OWN: usize = 4;
 
-/// Count of the own numbers that all points have.
+/// Count of the own numbers of points without a control that decreases with plastic flow.
 const OWN_OF_ELASTIC: usize = 2;
 
-/// A, and the diagonal and mixed entries of B.
+/// A, and the diagonal and mixed entries of B, N/m⁷.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
-/// Return A ξ + B η. The rows are written out: the compiler does not unroll loops of this size, and then
-/// keeps all of their data in memory.
+/// Return A ξ + B η, N/m⁶. The rows are written out, because the compiler would not unroll a loop over them,
+/// and would keep all of its data in memory instead of registers.
 #[inline(always)]
 fn times_bond<S: Simd, const D: usize>(
     simd: S,
@@ -244,8 +245,8 @@ struct Family<const D: usize> {
 
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state in a step of this length (s). `sums`
-    /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None` if K is nearly singular,
-    /// the intact part of the family is too stiff, or the law has no stress at H.
+    /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None`
+    /// if K is nearly singular, the intact part of the family is too stiff, or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],
@@ -338,7 +339,8 @@ impl<const D: usize> Law<D> for Correspondence {
         }
     }
 
-    /// Return the trace of K⁻¹ divided by that of an untruncated family; 1 if K is nearly singular.
+    /// Return the trace of K⁻¹, divided by the trace of K⁻¹ of an untruncated family; 1 if K is nearly
+    /// singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         shape

@@ -1,20 +1,22 @@
-//! J2 plasticity with isotropic hardening, in the strain of each point's family. This file implements small
-//! strains; [`logarithmic`] implements large strains.
+//! J2 plasticity with isotropic hardening, computed from the deformation gradient of each point's family.
+//! This file implements small strains; [`logarithmic`] implements large strains.
 //!
 //! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic strain, E = E_e + E_p. The
 //! stress is S = C : E_e, P = F S.
 //! A rigid rotation does not change E. Therefore the law needs no corotational frame, no polar decomposition
 //! and no integration of a stress rate.
-//! Without flow this is the St. Venant–Kirchhoff law. It is meant for small strains with rotations of any
-//! size.
+//! Without flow this is the St. Venant–Kirchhoff law. The law is meant for small strains with rotations of
+//! any size.
 //!
-//! With the deviator S_d and q = √(3/2 |S_d|²) the yield surface is q = σ_y + H ε̄.
-//! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H
-//! ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
-//! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the final stress, where x
-//! solves a scalar equation (§3.4).
+//! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²) and the equivalent plastic strain ε̄,
+//! the yield surface is q = σ_y + H ε̄.
+//! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3):
+//! Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
+//! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the deviator of the final
+//! stress, where x solves a scalar equation (§3.4).
 //!
-//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain, by rate and temperature.
+//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain, by rate and
+//! temperature.
 //!
 //! The whole plastic work ∫ q dε̄ is dissipated.
 
@@ -85,9 +87,9 @@ pub const STRAIN_MEASURE: Key = Key {
 /// been returned to the yield surface could flow again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. After a return
-/// to the yield surface, the round-off of b_e is larger, because it scales with the square of the stretches.
-/// Heating can make the yield stress small compared with the round-off of the stress.
+/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. After a
+/// return to the yield surface, the round-off of b_e is larger, because it scales with the square of the
+/// stretches. Heating can make the yield stress small compared with the round-off of the stress.
 const WIDE_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys; `None` if there is no error.
@@ -175,8 +177,8 @@ impl Plastic {
     }
 
     /// Return P (Pa) and the elastic energy density (J/m³) at a displacement gradient, and update the plastic
-    /// state in a step of this length (s); 0 if no time passes. `None` if the logarithmic strain does not
-    /// exist.
+    /// state. `step` is the length of the time step (s), 0 if no time passes. `None` if the logarithmic
+    /// strain does not exist.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -244,19 +246,19 @@ impl Plastic {
         stress
     }
 
-    /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))² with the current yield stress σ. This
-    /// factor is the square of the ratio of the secant shear modulus to G. It is 1 before any flow and never
-    /// grows, because σ does not contain the factor of rate and temperature.
+    /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))², where σ is the yield stress without
+    /// the factor of rate and temperature. The result is the square of the ratio of the secant shear modulus
+    /// to G. The result is 1 before any flow and never grows, because σ depends on ε̄ only.
     ///
-    /// The deviation z grows with ε̄. With the ratio instead of its square, the energy of the control would
-    /// grow with the plastic work, and limit loads would contain a part of this energy.
-    /// With the square, this energy stays at its value at first yield.
+    /// The motion z of the zero-energy modes grows with ε̄. With the ratio instead of its square, the energy
+    /// of the control would grow with the plastic work, and limit loads would contain a part of this energy.
+    /// With the square, the energy of the control stays at its value at first yield.
     pub fn control_left(&self, state: &PlasticState) -> f64 {
         let limit = self.limit(state);
         (limit / (limit + 3.0 * self.shear * state.equivalent)).powi(2)
     }
 
-    /// Return the current yield stress of this state without the factor of rate and temperature, Pa.
+    /// Return the yield stress of this state without the factor of rate and temperature, Pa.
     fn limit(&self, state: &PlasticState) -> f64 {
         match &self.hardening {
             Hardening::Linear(modulus) => self.yield_stress + modulus * state.equivalent,
@@ -264,9 +266,9 @@ impl Plastic {
         }
     }
 
-    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄, the plastic work and the
-    /// factor of rate and temperature. `step` is the length of the step (s), 0 if no time passes. `None` if
-    /// the stress is inside the yield surface or not finite.
+    /// Return the increment of the plastic strain at a trial stress (Pa), and update ε̄, the plastic work and
+    /// the factor of rate and temperature. `step` is the length of the step (s), 0 if no time passes. `None`
+    /// if the stress is inside the yield surface or not finite.
     pub fn flow(
         &self,
         trial: &Matrix3<f64>,
@@ -319,7 +321,7 @@ impl Plastic {
         }
     }
 
-    /// Return the parts of a trial stress (Pa) in plane stress.
+    /// Return the [`Modes`] of a trial stress (Pa) in plane stress.
     ///
     /// The final stress is S = S_trial − x C Π S, with the stiffness C in plane stress and the projection Π
     /// to the deviator, S_d = Π S. C and Π have the same eigenvectors. Each eigencomponent of the trial
@@ -335,7 +337,7 @@ impl Plastic {
         }
     }
 
-    /// Return the stress (Pa) in plane stress from a trial stress and x (1/Pa).
+    /// Return the final stress (Pa) in plane stress, from a trial stress (Pa) and x (1/Pa).
     fn shrunk_in_sheet(&self, trial: &Matrix3<f64>, x: f64) -> Matrix3<f64> {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
         let [even, uneven] = self.modes_of_sheet(trial).stiffnesses;
@@ -348,7 +350,8 @@ impl Plastic {
         stress
     }
 
-    /// Return Δε̄ and ΔE_p = x S_d in plane stress with a hardening modulus (Pa).
+    /// Return Δε̄ and ΔE_p = x S_d in plane stress with linear hardening. `limit` is the yield stress before
+    /// the flow, and `modulus` the hardening modulus, both in Pa.
     ///
     /// q decreases with x and is convex, so Newton's method converges to the root from one side.
     fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64, modulus: f64) -> (f64, Matrix3<f64>) {
@@ -387,7 +390,7 @@ fn deviator(stress: &Matrix3<f64>) -> Matrix3<f64> {
     stress - Matrix3::from_diagonal_element(stress.trace() / 3.0)
 }
 
-/// Return the equivalent stress q = √(3/2 |S_d|²).
+/// Return the equivalent stress q = √(3/2 |S_d|²), in the unit of the stress.
 fn equivalent(stress: &Matrix3<f64>) -> f64 {
     1.5_f64.sqrt() * deviator(stress).norm()
 }
@@ -415,8 +418,8 @@ mod tests {
         }
     }
 
-    /// Keys of hardening by strain, strain rate and heating. The temperature rises by about half of the melting
-    /// range.
+    /// Keys of hardening by strain, strain rate and heating. The temperature rises by about half of the
+    /// melting range.
     const JOHNSON_COOK: [(&str, f64); 8] = [
         ("hardening_modulus", 0.02),
         ("hardening_exponent", 0.3),
@@ -442,7 +445,8 @@ mod tests {
         law_with(dimension, &[])
     }
 
-    /// Length of a step of the random walk, s. Rates are both below and above the reference strain rate.
+    /// Return the length of a step of the random walk, s. The strain rates are below the reference strain
+    /// rate in some steps, and above it in others.
     fn duration(number: usize) -> f64 {
         [0.01, 1e4, 1.0, 100.0][number % 4]
     }

@@ -12,29 +12,30 @@ use crate::lanes::{Lanes, WIDTH};
 /// Law for the first Piola–Kirchhoff stress P and the strain energy density W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stress {
-    /// P = F S, S = C : E with E = ½ (FᵀF − I). It derives from an energy and is objective.
+    /// P = F S, S = C : E with E = ½ (FᵀF − I). This stress derives from an energy and is objective.
     StVenantKirchhoff(Hooke),
-    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E (Willberg et al. 2022, eq. 9, printed with F⁻¹). It
-    /// equals St. Venant–Kirchhoff at small strains without rotation, and is not objective.
+    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E and J = det F (Willberg et al. 2022, eq. 9, printed with
+    /// F⁻¹). This stress equals that of St. Venant–Kirchhoff at small strains without rotation. It is not
+    /// objective.
     Willberg2022(Hooke),
-    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress the thickness adjusts so
-    /// that the stress across the plane is 0.
+    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress, the stretch across the
+    /// plane is the one for which the stress across the plane is 0.
     NeoHooke(NeoHooke),
 }
 
 /// The constants of the compressible neo-Hookean solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeoHooke {
-    /// λ, Pa.
+    /// Lamé's first parameter λ, Pa.
     lambda: f64,
-    /// μ, Pa.
+    /// Shear modulus μ, Pa.
     shear: f64,
     plane_stress: bool,
-    /// Largest eigenvalue of Hooke's matrix at rest, Pa.
+    /// Largest eigenvalue of Hooke's matrix of the undeformed solid, Pa.
     largest: f64,
 }
 
-/// Results for eight bonds at their displacement gradients.
+/// Stresses and energies of eight bonds at the displacement gradients of these bonds.
 #[derive(Debug, Clone, Copy)]
 pub struct OfBonds<const D: usize> {
     /// P, Pa.
@@ -72,7 +73,7 @@ impl Stress {
         }
     }
 
-    /// Return the largest modulus c at rest, Pa: W ≤ ½ c |H|².
+    /// Return the largest modulus c of the undeformed solid, Pa: W ≤ ½ c |H|² for small H.
     pub fn largest_modulus(&self) -> f64 {
         match self {
             Self::StVenantKirchhoff(hooke) | Self::Willberg2022(hooke) => hooke.largest(),
@@ -114,8 +115,8 @@ impl Stress {
         }
     }
 
-    /// Return the Kirchhoff stress across the plane (Pa) in plane strain; `None` if the constants do not
-    /// determine it.
+    /// Return the Kirchhoff stress across the plane (Pa) in plane strain; `None` if the elastic constants of
+    /// the deck do not determine this stress.
     pub fn across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         let volume = determinant(&(SMatrix::identity() + gradient));
@@ -131,7 +132,7 @@ impl Stress {
         }
     }
 
-    /// Same as [`Self::across`] for eight bonds; 0 if the constants do not determine the stress.
+    /// Same as [`Self::across`] for eight bonds; 0 where [`Self::across`] returns `None`.
     #[inline(never)]
     pub fn across_of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> Lanes {
         Lanes(std::array::from_fn(|lane| {
@@ -140,13 +141,13 @@ impl Stress {
         }))
     }
 
-    /// Return the stretch F_zz across the plane in plane stress; `None` if the constants do not determine
-    /// F_zz, or if no positive F_zz exists.
+    /// Return the stretch F_zz across the plane in plane stress. `None` if the elastic constants of the deck
+    /// do not determine F_zz, or if no positive F_zz exists.
     pub fn stretch_across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         match self {
             Self::StVenantKirchhoff(hooke) => stretch_of(hooke.across(&strain)?),
-            // J of this law is det F in the plane, without a stretch across the plane.
+            // J of this law is the determinant of F in the plane; the law has no stretch across the plane.
             Self::Willberg2022(_) => Some(1.0),
             Self::NeoHooke(law) => {
                 let growth = growth(&(matrix(&strain) * 2.0));
@@ -227,8 +228,8 @@ fn st_venant_kirchhoff<T: Number, const D: usize>(
 }
 
 impl NeoHooke {
-    /// Return ln det FᵀF and W, from FᵀF − I of the plane or of space. The determinant includes the stretch
-    /// across the plane.
+    /// Return ln det FᵀF and W (J/m³), from FᵀF − I of the plane or of space. The returned ln det FᵀF
+    /// includes the stretch across the plane.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
         let own = libm::log1p(growth(doubled));
         // `across` is the logarithm of the squared stretch across the plane.

@@ -1,4 +1,4 @@
-//! Tensors of one point or of eight bonds, for formulas that both use.
+//! Tensors of one point or of eight bonds, for formulas that are computed for a point and for eight bonds.
 
 use std::ops::{Add, Mul};
 
@@ -8,7 +8,7 @@ use crate::lanes::Lanes;
 
 /// A number, or eight numbers.
 pub trait Number: Copy + Add<Output = Self> + Mul<Output = Self> + Mul<f64, Output = Self> {
-    /// Convert from a number.
+    /// Convert a number to this type. If the type holds eight numbers, all of them are `value`.
     fn of(value: f64) -> Self;
 }
 

@@ -1,19 +1,21 @@
-//! The fits of ω and σ of [`Pals`](super::Pals) to the family of a point.
+//! The fits of ω and σ of [`Pals`](super::Pals) to the family of a point. A sum over the family has the
+//! weight |ξ|² Ṽ per bond, unless a formula gives the terms.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 
 use crate::material::monomials::{index_of, least_squares, multiplicity};
 use crate::material::symmetric::mixed;
 
-/// Smallest σ/σ₀; bonds with σ ≤ 0 would repel when stretched. For a horizon of 3 spacings, the smallest σ/σ₀
-/// at a corner of a block is about 0.4.
+/// Smallest allowed σ/σ₀; bonds with σ ≤ 0 would repel when stretched. For a horizon of 3 spacings, the
+/// smallest σ/σ₀ at a corner of a block is about 0.4.
 const SMALLEST: f64 = 0.1;
 
 /// Largest allowed σ/σ₀. Without a limit and for a horizon of 3 spacings, σ/σ₀ reaches 1.8 at edges of a
-/// block, 12 in bars of three points across, and 30 in sheets of two layers.
+/// block, 12 in bars that are three points thick, and 30 in sheets of two layers.
 const LARGEST: f64 = 30.0;
 
-/// Singular values below this fraction of the largest are dropped; their multipliers stay 0.
+/// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
+/// norm is used.
 ///
 /// For a horizon of 3 spacings, the smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two
 /// layers, and 0 in a single layer.
@@ -38,7 +40,7 @@ fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
     total
 }
 
-/// Return the exponents of the product of two components.
+/// Return the exponents of the product of the components with the indices `a` and `b`.
 fn of_product(a: usize, b: usize) -> [usize; 3] {
     let mut exponents = [0; 3];
     exponents[a] += 1;
@@ -57,8 +59,9 @@ pub(super) struct Fit<const D: usize> {
     pub(super) sum: f64,
 }
 
-/// Fit the function c + Σ τ_k p_k to the conditions Σ p_l (c + Σ τ_k p_k) = wanted_l, as far as the family
-/// allows. c is `constant`; p_k and wanted_k are the entries of `conditions`.
+/// Fit the function g = c + Σ τ_k p_k, a sum over the conditions k with the multipliers τ_k. For each
+/// condition k, the sum over the family of p_k g must be wanted_k, as far as the family allows. c is
+/// `constant`; p_k and wanted_k are the entries of `conditions`.
 ///
 /// `sums` are the sums over the family of the monomials of degree 4, in the components of n or N.
 /// `one` is the polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².
@@ -100,18 +103,19 @@ fn nearest<const D: usize>(
     }
 }
 
-/// Return the polynomial n·n = 1; with the factor c its matrix is Λ = c I.
+/// Return the polynomial n·n = 1. The matrix of c n·n is Λ = c I.
 fn one_in_directions<const D: usize>() -> Vec<([usize; 3], f64)> {
     (0..D).map(|a| (of_product(a, a), 1.0)).collect()
 }
 
-/// Return the polynomial (Σ N_a)² = 1; with the factor c its matrix is S_ab = c.
+/// Return the polynomial (Σ N_a)² = 1. The matrix of c (Σ N_a)² is S with S_ab = c.
 fn one_in_squares<const D: usize>() -> Vec<([usize; 3], f64)> {
     let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
     pairs.map(|(a, b)| (of_product(a, b), 1.0)).collect()
 }
 
 /// Fit ω with the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab, from the sums of |ξ|² Ṽ times the monomials of n.
+/// `weighted_volume` is m, m⁵.
 ///
 /// Mixed conditions have the weight √2, because each represents two components. Therefore the fitted function
 /// rotates with the family.
@@ -126,7 +130,8 @@ pub(super) fn dilatational_fit<const D: usize>(sums: &[f64], weighted_volume: f6
 /// Fit σ/σ₀ with the conditions Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H, from the sums of |ξ|² Ṽ times the
 /// monomials of N.
 ///
-/// The probe strains H are unit strains along the axes and pure shears 1/√2 between the axes.
+/// The probe strains H are unit strains H_aa = 1 along the axes, and pure shears H_ab = H_ba = 1/√2 between
+/// the axes.
 pub(super) fn deviatoric_fit<const D: usize>(sums: &[f64], weighted_volume: f64) -> Fit<D> {
     let count = D as f64;
     let axes = (0..D).map(|k| {
@@ -151,8 +156,8 @@ pub(super) fn deviatoric_fit<const D: usize>(sums: &[f64], weighted_volume: f64)
     nearest(sums, 1.0, &one_in_squares::<D>(), &conditions)
 }
 
-/// Return the smallest and the largest N·S N over all N with N_a ≥ 0 and Σ N_a = 1. The extremes lie at a
-/// corner of this triangle, on an edge or inside.
+/// Return the smallest and the largest N·S N over all N with N_a ≥ 0 and Σ N_a = 1. These N form a triangle
+/// in 3-D and a line segment in 2-D. The extremes lie at a corner of the triangle, on an edge or inside.
 pub(super) fn extremes<const D: usize>(tensor: &SMatrix<f64, D, D>) -> [f64; 2] {
     let mut values: Vec<f64> = tensor.diagonal().iter().copied().collect();
     for (a, b) in mixed::<D>() {
@@ -196,7 +201,7 @@ pub(super) fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64
     tensor.map(|entry| 1.0 + share * (entry - 1.0))
 }
 
-/// Return the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ, in `d` dimensions.
+/// Return the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ for all extensions e, in `d` dimensions.
 ///
 /// In the scalar product ⟨a, b⟩ = Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|.
 /// The inputs are R ≥ ⟨r, r⟩, Q = ⟨|ξ|, |ξ|⟩ and τ = ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. These give the components of ε

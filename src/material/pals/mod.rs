@@ -5,7 +5,9 @@
 //!
 //! θ = Σ ω|ξ| e Ṽ, ε = e − θ|ξ|/d, W = ½ k′θ² + ½ Σ σ ε² Ṽ,
 //!
-//! t = (k′θ − (1/d) Σ σ|ξ| ε Ṽ) ω|ξ| + σ ε.
+//! t = (k′θ − (1/d) Σ σ|ξ| ε Ṽ) ω|ξ| + σ ε,
+//!
+//! with the number of dimensions d, the force state along the bond t, and k′, A and m of [`Ordinary`].
 //!
 //! At a small homogeneous strain H, a bond of direction n has e = |ξ| n·H n.
 //! The functions ω and σ must satisfy, for probe strains H along the axes and in shear between the axes,
@@ -13,13 +15,13 @@
 //! Σ ω|ξ| e Ṽ = tr H, Σ σ ε² Ṽ = 2G dev H : dev H.
 //!
 //! Among all such functions, ω and σ are nearest to those of [`Ordinary`], ω₀ = d/m and σ₀ = A/m.
-//! The distance is Σ |ξ|² (ω − ω₀)² Ṽ, and the same for σ.
+//! The distance of ω from ω₀ is Σ |ξ|² (ω − ω₀)² Ṽ, and that of σ from σ₀ is Σ |ξ|² (σ − σ₀)² Ṽ.
 //! Lagrange multipliers then give ω = n·Λ n and σ = N·S N, with N_a = n_a² and symmetric matrices Λ and S.
 //! Because ω is quadratic in n, the dilatation is exact for every homogeneous strain, not only for the probe
 //! strains.
 //!
-//! The loops multiply ω and σ by the influence function of the deck, as in all sums. Without the multipliers
-//! this is [`Ordinary`], for unbroken families.
+//! The loops multiply ω and σ by the influence function of the deck, as in all sums. With ω = ω₀ and σ = σ₀
+//! the law is [`Ordinary`], as long as no bond of the family is broken.
 //!
 //! A critical stretch that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)), with σ_w of
 //! an untruncated family. This keeps the energy of breaking the bond.
@@ -52,7 +54,7 @@ const OTHERS: usize = 1;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pals {
-    /// The linear solid without multipliers.
+    /// The linear solid with ω = ω₀ and σ = σ₀.
     ordinary: Ordinary,
     /// Whether the critical stretch is scaled with σ, because it follows from a fracture energy.
     is_scaled: bool,
@@ -144,7 +146,7 @@ impl<const D: usize> Law<D> for Pals {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// θ.
+    /// The only such number is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const SCALED: bool = true;
@@ -208,7 +210,7 @@ impl<const D: usize> Law<D> for Pals {
         changing[..3].copy_from_slice(&self.dilated(sums));
     }
 
-    /// Return t/|Y|, with |ξ|/|Y| = 1 − P and e/|Y| = P.
+    /// Return t/|Y|. With P = `extension_over_deformed`: |ξ|/|Y| = 1 − P and e/|Y| = P.
     #[inline(always)]
     fn force_state(
         &self,
