@@ -1,6 +1,7 @@
 //! Memory available to this process.
 
 use std::fs;
+use std::path::Path;
 
 /// [`check_room`] does not check allocations below this size (bytes), to save system calls. A checked
 /// allocation must leave this number of bytes free for other allocations.
@@ -52,12 +53,26 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory and swap left in this process's control group, bytes. `None` if the group has no limit,
-/// or on systems without control groups of version 2. Limits of parent groups are not read.
+/// Return the memory and swap left in this process's control group and in the groups that contain it, bytes:
+/// the smallest amount of a group with a limit. `None` if no group has a limit, or on systems without control
+/// groups of version 2.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
-    let path = groups.lines().find_map(|line| line.strip_prefix("0::"))?;
-    let read = |name: &str| fs::read_to_string(format!("/sys/fs/cgroup{path}/{name}")).ok();
+    let path = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
+    left_in_groups(Path::new("/sys/fs/cgroup"), Path::new(path))
+}
+
+/// Return the smallest amount of memory and swap (bytes) that is left in the control group `path` below
+/// `root`, and in the groups above it.
+fn left_in_groups(root: &Path, path: &Path) -> Option<u64> {
+    let groups = path.ancestors().map(|group| root.join(group));
+    groups.filter_map(|group| left_in_group(&group)).min()
+}
+
+/// Return the memory and swap left in the control group with this folder, bytes. `None` if the group has no
+/// limit.
+fn left_in_group(group: &Path) -> Option<u64> {
+    let read = |name: &str| fs::read_to_string(group.join(name)).ok();
     let number = |name: &str| read(name)?.trim().parse::<u64>().ok();
     let (limit, taken) = (number("memory.max")?, number("memory.current")?);
     // The kernel frees inactive file cache before an allocation fails.
@@ -91,6 +106,35 @@ fn entry(text: &str, name: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Slurm limits the memory of a job or step, a group above that of the process.
+    #[test]
+    fn limits_of_parent_groups_count() {
+        let root = std::env::temp_dir().join(format!("control_groups_{}", std::process::id()));
+        let task = Path::new("job/step/task");
+        fs::create_dir_all(root.join(task)).unwrap();
+        let write = |group: &str, limit: &str, taken: &str| {
+            let files = [
+                ("memory.max", limit),
+                ("memory.current", taken),
+                ("memory.stat", "anon 5\ninactive_file 20\n"),
+                ("memory.swap.max", "0"),
+                ("memory.swap.current", "0"),
+            ];
+            for (name, text) in files {
+                fs::write(root.join(group).join(name), text).unwrap();
+            }
+        };
+        assert_eq!(left_in_groups(&root, task), None);
+        write("job/step/task", "max", "300");
+        write("job/step", "1000", "400");
+        assert_eq!(left_in_groups(&root, task), Some(620));
+        write("job", "700", "500");
+        assert_eq!(left_in_groups(&root, task), Some(220));
+        write("job/step/task", "310", "300");
+        assert_eq!(left_in_groups(&root, task), Some(30));
+        fs::remove_dir_all(root).unwrap();
+    }
 
     #[test]
     fn an_excessive_allocation_is_refused() {
