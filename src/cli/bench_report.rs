@@ -25,7 +25,7 @@ pub struct Limited {
     pub bandwidth: f64,
     /// Minimum memory traffic of the loop, bytes/s.
     pub moved: f64,
-    /// Multiply-add rate, operations/s.
+    /// Operation rate of multiply-adds, operations/s; a multiply-add counts as two operations.
     pub arithmetic: f64,
     /// Operation rate of the loop, operations/s.
     pub done: f64,

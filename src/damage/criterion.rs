@@ -29,10 +29,10 @@ pub enum Criterion {
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
-    /// Bonds break when the work of the acting force states reaches the sum of the numbers of the acting
-    /// ends. The numbers are the shares of points i and j in the critical work, J/m⁶.
+    /// Bonds break when the work of the force states of the acting ends reaches the sum of the shares of
+    /// these ends in the critical work. The numbers are the shares of points i and j, J/m⁶.
     Work([f64; 2], WorkRule),
-    /// Same as [`Self::Work`], with the numbers computed from the work thresholds of points i and j.
+    /// Same as [`Self::Work`], with the shares computed from the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
     /// stress measures of its acting ends.

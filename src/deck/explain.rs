@@ -209,9 +209,9 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the depth of a traction or pressure, m; `None` if the depth differs between the bodies that may
-/// have points in the set. The depth in each body is then the spacing of this body, and a single number
-/// cannot express these depths. Also return `None` for a condition without a depth.
+/// Return the depth of a traction or pressure, m. `None` for a condition without a depth. Also `None` if the
+/// depth is the spacing of each body, and the bodies that may have points in the set have different spacings
+/// or one of them has no single spacing.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

@@ -111,7 +111,7 @@ mod x86 {
     pub struct Avx512(());
 
     impl Avx2 {
-        /// Create the proof if this machine has the instructions.
+        /// Return the proof that this machine has AVX2, BMI2 and FMA; `None` if it lacks one of them.
         pub fn detect() -> Option<Self> {
             let has = is_x86_feature_detected!("avx2")
                 && is_x86_feature_detected!("bmi2")
@@ -386,8 +386,8 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn transpose_avx512(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-        // Four numbers of each of two rows, from column `first` on. The second half is loaded from memory,
-        // which needs no shuffle.
+        // Four numbers of row `a` from column `first` on, then four of row `b`. The insertion reads the
+        // numbers of `b` directly from memory, so it needs no shuffle.
         let halves = |a: usize, b: usize, first: usize| {
             // SAFETY: each row has eight numbers, and `first` is 0 or 4.
             let [a, b] =

@@ -51,7 +51,7 @@ pub struct SofteningPmb {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SofteningCurve {
     /// Two straight lines that meet at the stretch `kink`, where the force is `kink_force` times the
-    /// strength.
+    /// force at s0.
     Lines {
         /// The stretch s0 + γ (sc − s0).
         kink: f64,

@@ -230,7 +230,7 @@ mod tests {
         let middle = 15 * 40 + 20;
         assert!(ring(0..8)[middle].is_some());
         assert!(ring(0..5)[middle].is_none());
-        // Few directions, but on all sides of a pixel.
+        // Points on all sides of a pixel, in a few or in all of the eight directions.
         for directions in [0b0101_0101, 0b1010_1010, 0b1001_0010, u8::MAX] {
             assert!(is_surrounded(directions), "{directions:b}");
         }

@@ -288,7 +288,7 @@ mod tests {
         assert!(close(ColourMap::Viridis.colour(0.0), [68, 1, 84]));
         assert!(close(ColourMap::Viridis.colour(0.5), [33, 145, 140]));
         assert!(close(ColourMap::Viridis.colour(1.0), [253, 231, 37]));
-        // Entries of the 256 colours of the published table.
+        // Some of the 256 colours of the published table.
         let turbo = |entry: f64| ColourMap::Turbo.colour(entry / 255.0);
         assert!(close(turbo(0.0), [48, 18, 59]));
         assert!(close(turbo(255.0), [122, 4, 3]));

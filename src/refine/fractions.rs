@@ -38,7 +38,7 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// The fraction of the point at a grid index in steps of the finest level.
+    /// The fraction that belongs to the set, of the point at a grid index in steps of the finest level.
     fn at(
         &mut self,
         body: usize,

@@ -97,7 +97,7 @@ impl<'a> Job<'a> {
         true
     }
 
-    /// Warn if explicit steps were too long for breaking bonds.
+    /// Warn if bonds broke far above their criterion because explicit steps were too long.
     pub(super) fn warn_of_overshoot(&mut self, recorder: &Recorder<'a>) {
         let Some(row) = recorder.last_row.as_ref() else {
             return;

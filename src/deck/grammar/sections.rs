@@ -60,9 +60,9 @@ pub const SECTIONS: [Section; 39] = [
     Section::new("thickness", Key, Fixed),
     Section::new("cross_section", Key, Fixed),
     Section::new("constraint", Key, Fixed),
-    // Parameters are compared where they are used.
+    // Parameters may change freely: a restart compares the values that use them.
     Section::new("parameters", Table, Free),
-    // Tables, like parameters, are compared where they are used.
+    // `[table.NAME]` may change freely, too: a restart compares the values that use the table.
     Section::new("table", Named, Free).referred_to(),
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),

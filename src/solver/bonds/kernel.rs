@@ -119,7 +119,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// [`Criterion::limit`]. x is defined in [`crate::material::bond`].
     const HAS_FAST_PATH: bool = false;
 
-    /// Whether to load the bits of all bonds, broken ones included.
+    /// Whether to load a bit for each bond, including broken bonds.
     const READS_BROKEN: bool = false;
 
     /// Whether the kernel's criterion can read stresses of points i and j.

@@ -411,7 +411,8 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sum over the bonds of a lane group; `None` if |x| of a bond exceeds the limit of the kernel's criterion.
+/// Sum over the bonds of a lane group; `None` if |x| of a bond, with x of [`crate::material::bond`],
+/// exceeds the limit of the kernel's criterion.
 /// The arguments are copied so that they stay in registers.
 ///
 /// # Safety

@@ -98,7 +98,7 @@ impl LoadFactors {
         3 * self.requested.len()
     }
 
-    /// Decode the factors of this number of conditions from [`Self::words`].
+    /// Decode the factors of `conditions` conditions from [`Self::words`].
     pub fn of_words(words: &[u64], conditions: usize) -> Self {
         if words.is_empty() {
             return Self::new(conditions);

@@ -364,8 +364,9 @@ struct Shape<const D: usize> {
     cells: [usize; D],
     node_strides: [usize; D],
     cell_strides: [usize; D],
-    /// Size and bandwidth of the stiffness matrix.
+    /// Number of rows of the stiffness matrix.
     size: usize,
+    /// Bandwidth of the stiffness matrix.
     band: usize,
 }
 

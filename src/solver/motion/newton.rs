@@ -297,8 +297,8 @@ impl<const D: usize> Vectors<D> {
         let mut linear = Linear { first, last: first };
         let wanted = simulation.progress.newton.forcing * first;
         let wanted = wanted.max(LINEAR_TOLERANCE_SHARE * allowed);
-        // Inner product of the residual and the preconditioned residual at the last direction, and the step
-        // length along this direction.
+        // `power` is the inner product of the residual and the preconditioned residual in the last iteration;
+        // `length` is the step length along the direction of that iteration.
         let (mut power, mut length) = (f64::NAN, 0.0);
         for number in 0..MAX_CG_ITERATIONS {
             if linear.last.is_nan() || linear.last <= wanted {

@@ -92,8 +92,8 @@ fn cell<const D: usize>(
     (middle, spacing, true)
 }
 
-/// Tolerance for a line parallel to a face of a cell, relative to the edge of the cell. With this tolerance,
-/// a line along the face between two cells lies in both cells.
+/// Distance by which a line parallel to a face may lie outside a cell, divided by half the edge of the cell.
+/// With this tolerance, a line along the face between two cells lies in both cells.
 const FACE: f64 = 1e-9;
 
 /// Return the range of distances a (m) for which the position a · `direction` lies in a box with this centre

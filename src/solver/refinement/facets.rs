@@ -87,7 +87,7 @@ impl Facets {
         any
     }
 
-    /// Whether the line between two positions (m) crosses a facet of `near`. For the line of a bond, `near`
+    /// Whether the line segment between two positions (m) crosses a facet of `near`. For the line of a bond, `near`
     /// must be the result of [`Self::near`] for one of its ends.
     pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);

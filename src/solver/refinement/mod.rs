@@ -232,8 +232,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// Collect the state of the points of other grids. `pieces` are the points of these grids that this rank
-    /// creates, and `left` are the nodes that are removed. Collective.
+    /// Compute the state of the points of new grids from the present state. `pieces` are the points of the new
+    /// grids that this rank creates, and `left` are the present nodes that are removed. Collective.
     fn state_on(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> GridState {
         let comm = self.comm;
         let past = Past::new(self, grids, left);
