@@ -1,11 +1,11 @@
 //! Ordinary state-based linear peridynamic solid, for any Poisson ratio.
 //!
 //! Silling, Epton, Weckner, Xu & Askari 2007; the plane forms follow Le, Chan & Schwartz 2014.
-//! In d dimensions, the law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension ε = |Y| − |ξ|, the
-//! dilatation θ = (d/m) Σ ω|ξ|εṼ and the deviatoric extension ε_d = ε − θ|ξ|/d. The force state along the
+//! In d dimensions, the law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension e = |Y| − |ξ|, the
+//! dilatation θ = (d/m) Σ ω|ξ|eṼ and the deviatoric extension e_d = e − θ|ξ|/d. The force state along the
 //! bond t (N/m⁶) and the strain energy density W (J/m³) are
 //!
-//! t = (d k′θ/m) ω|ξ| + (A/m) ω ε_d, W = ½ k′θ² + ½ (A/m) Σ ω ε_d² Ṽ.
+//! t = (d k′θ/m) ω|ξ| + (A/m) ω e_d, W = ½ k′θ² + ½ (A/m) Σ ω e_d² Ṽ.
 //!
 //! | dimension | k′ | A |
 //! |---|---|---|
@@ -13,7 +13,7 @@
 //! | plane strain | K + G/3 | 8G |
 //! | plane stress | E/(2(1−ν)) | 8G |
 //!
-//! With κ = k′ − A/d² the same law is t = (d κ θ/m) ω|ξ| + (A/m) ω ε and W = ½ κθ² + ½ (A/m) Σ ω ε² Ṽ.
+//! With κ = k′ − A/d² the same law is t = (d κ θ/m) ω|ξ| + (A/m) ω e and W = ½ κθ² + ½ (A/m) Σ ω e² Ṽ.
 //! Here m sums over the initial family, and θ sums over the intact bonds. Then t is the derivative of W with
 //! broken bonds as well.
 
@@ -64,7 +64,7 @@ impl Ordinary {
             .expect("the law declares that it has no 1-D form")
     }
 
-    /// Return d κ θ/m (N/m⁷) and θ, from A/m and Σ ω|ξ|εṼ.
+    /// Return d κ θ/m (N/m⁷) and θ, from A/m and Σ ω|ξ|eṼ.
     #[inline(always)]
     pub(super) fn dilated(&self, extension_factor: f64, sum: f64) -> [f64; 2] {
         let share = self.dimension * extension_factor / self.extensional;
@@ -225,7 +225,7 @@ impl<const D: usize> Law<D> for Ordinary {
     type BondHistory = [Lanes; 0];
     /// m = Σ ω|ξ|²Ṽ, m⁵.
     type ReferenceSum = [Lanes; 1];
-    /// Σ ω|ξ|εṼ over the intact bonds, m⁵.
+    /// Σ ω|ξ|eṼ over the intact bonds, m⁵.
     type Sum = [Lanes; 1];
     type Force = Along;
     const CONSTANTS: usize = 1;
@@ -323,7 +323,7 @@ impl<const D: usize> Law<D> for Ordinary {
         self.truncation_factor_of(sums[0])
     }
 
-    /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω ε² Ṽ. Therefore the spring constant (A + max(κ, 0) d²)/m bounds the
+    /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω e² Ṽ. Therefore the spring constant (A + max(κ, 0) d²)/m bounds the
     /// energy.
     #[inline(always)]
     fn stiffness(&self, _: Lanes, [extension_factor, _]: &[Lanes; 2]) -> Lanes {

@@ -2,25 +2,25 @@
 //! a yield value.
 //!
 //! Mitchell 2011, SAND2011-3166. Each bond has a plastic extension e_p per end. Energy and force are those of
-//! [`Ordinary`] at the elastic extensions ε − e_p, with the symbols of `ordinary.rs`:
+//! [`Ordinary`] at the elastic extensions e − e_p, with the symbols of `ordinary.rs`:
 //!
-//! W = ½ κθ² + ½ (A/m) Σ ω (ε − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (ε − e_p) Ṽ.
+//! W = ½ κθ² + ½ (A/m) Σ ω (e − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (e − e_p) Ṽ.
 //!
-//! The deviatoric force is t_d = (A/m) ω ε_d. Here ε_d is ε − e_p minus its mean over the intact bonds:
-//! ε_d = ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//! The deviatoric force is t_d = (A/m) ω e_d. Here e_d is e − e_p minus its mean over the intact bonds:
+//! e_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ and the yield value ψ₀.
 //! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by (1 − r)
-//! ε_d.
+//! e_d.
 //!
 //! Plastic flow preserves volume, Σ ω|ξ| e_p Ṽ = 0. Therefore this is Mitchell's law until bonds of the
 //! family break.
-//! After that, Mitchell's θ of the total extension ε would not give a force that derives from the energy. The
+//! After that, Mitchell's θ of the total extension e would not give a force that derives from the energy. The
 //! remaining plastic extensions would expand the family, and breaking bonds would add energy.
 //!
 //! ψ₀ follows from the yield stress σ_y in pure shear.
-//! A deviatoric strain e has ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane. The point yields at
-//! e:e = σ_y²/(6G²).
+//! A deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The point yields at
+//! ε:ε = σ_y²/(6G²).
 //! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
 //! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
 //! With the thickness h, Mitchell's value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G,
@@ -127,7 +127,7 @@ impl Described for OrdinaryPlastic {
 }
 
 impl<const D: usize> Law<D> for OrdinaryPlastic {
-    /// A/m and d κ θ/m (N/m⁷), the mean elastic stretch Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
+    /// A/m and d κ θ/m (N/m⁷), the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
     type Point = [Lanes; 4];
     /// e_p/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 2];
@@ -151,7 +151,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
-    /// Pass 0: Σ ω|ξ| (ε − e_p) Ṽ and Σ ω|ξ|² Ṽ. Pass 1: Σ ω ε_d² Ṽ. Pass 2: the sums of pass 0 after the
+    /// Pass 0: Σ ω|ξ| (e − e_p) Ṽ and Σ ω|ξ|² Ṽ. Pass 1: Σ ω e_d² Ṽ. Pass 2: the sums of pass 0 after the
     /// flow. All in m⁵.
     #[inline(always)]
     fn pass_contribution<const S: usize>(

@@ -1,17 +1,17 @@
 //! Ordinary state-based standard linear solid: the deviatoric part of the force relaxes.
 //!
 //! Mitchell 2011, SAND2011-8064. Each bond has a back extension e_b per end. With the symbols of
-//! `ordinary.rs`, e_b follows the deviatoric extension ε_d with the relaxation time τ. The fraction λ of the
-//! deviatoric force depends on ε_d − e_b, and the rest on ε_d:
+//! `ordinary.rs`, e_b follows the deviatoric extension e_d with the relaxation time τ. The fraction λ of the
+//! deviatoric force depends on e_d − e_b, and the rest on e_d:
 //!
-//! t = (d k′θ/m) ω|ξ| + (A/m) ω (ε_d − λ e_b), ė_b = (ε_d − e_b)/τ.
+//! t = (d k′θ/m) ω|ξ| + (A/m) ω (e_d − λ e_b), ė_b = (e_d − e_b)/τ.
 //!
-//! The energy W = ½ κθ² + ½ (A/m) Σ ω (ε² + λ (e_b² − 2 ε_d e_b)) Ṽ depends on θ also through ε_d.
+//! The energy W = ½ κθ² + ½ (A/m) Σ ω (e² + λ (e_b² − 2 e_d e_b)) Ṽ depends on θ also through e_d.
 //! The force is the derivative of W, and therefore has the additional term λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ. This
 //! term is 0 until bonds of the family break.
 //!
-//! ε_d is assumed to change linearly during a step Δt, from ε_d,n to ε_d,n + Δε_d. Then
-//! e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a = exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
+//! e_d is assumed to change linearly during a step Δt, from e_d,n to e_d,n + Δe_d. Then
+//! e_b ← e_d,n (1 − a) + e_b,n a + β Δe_d with a = exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
 //! The elastic constants are those of the instantaneous response. The long-term shear modulus is (1 − λ) G.
 
 use super::ordinary::{
@@ -141,8 +141,8 @@ impl Relaxation {
         [gone, beta]
     }
 
-    /// Return e_b/|ξ|, ε_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these values
-    /// before the step. `deviatoric` is ε_d/|ξ| after the step. `factor` times ε_d²/|ξ|² is the energy of
+    /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these values
+    /// before the step. `deviatoric` is e_d/|ξ| after the step. `factor` times e_d²/|ξ|² is the energy of
     /// a bond without relaxation times 2, J/m⁶.
     #[inline(always)]
     pub(super) fn after(
@@ -161,7 +161,7 @@ impl Relaxation {
         [now, deviatoric, *loss + taken]
     }
 
-    /// Return λ (e_b² − 2 ε_d e_b)/|ξ|² from ε_d/|ξ| and e_b/|ξ|.
+    /// Return λ (e_b² − 2 e_d e_b)/|ξ|² from e_d/|ξ| and e_b/|ξ|.
     #[inline(always)]
     pub(super) fn released(&self, deviatoric: Lanes, back: Lanes) -> Lanes {
         (back - deviatoric * 2.0) * back * self.share
@@ -171,7 +171,7 @@ impl Relaxation {
 impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     /// A/m and d κ θ/m + λ (A/m²) Σ ω|ξ| e_b Ṽ (both N/m⁷), and θ/d.
     type Point = [Lanes; 3];
-    /// e_b/|ξ|, ε_d/|ξ|, and the dissipated energy, J/m⁶.
+    /// e_b/|ξ|, e_d/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];
     type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 1];
@@ -193,7 +193,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
-    /// Pass 0: Σ ω|ξ|εṼ. Pass 1: Σ ω|ξ| e_b Ṽ. Both in m⁵.
+    /// Pass 0: Σ ω|ξ|eṼ. Pass 1: Σ ω|ξ| e_b Ṽ. Both in m⁵.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,

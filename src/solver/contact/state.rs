@@ -12,7 +12,7 @@ use super::rigid::RigidState;
 const CALM: u64 = 100;
 
 /// Limits that contact sets for the time step, over all ranks. The limits include contacts that will begin
-/// within the next [`LOOK_AHEAD`](super::LOOK_AHEAD) steps. k is the stiffness of a contact (N/m), and c is the damping coefficient of a
+/// within the next two steps (`LOOK_AHEAD`). k is the stiffness of a contact (N/m), and c is the damping coefficient of a
 /// contact (N s/m). 1/m is the inverse mass of a point, or the [mobility](super::rigid::RigidBody::mobility)
 /// of a rigid body (1/kg).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
