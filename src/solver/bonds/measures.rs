@@ -325,9 +325,9 @@ impl<const D: usize> Kernel<D> for EnergyRate {
     }
 }
 
-/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ in d dimensions. ε is the extension of the
+/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|eṼ in d dimensions. e is the extension of the
 /// bond, or ξ·η/|ξ| for linear laws. The first sum is the weighted volume m = Σ ω|ξ|²Ṽ of the whole family
-/// (m⁵). The second sum is Σ ω|ξ|εṼ over the intact bonds (m⁵).
+/// (m⁵). The second sum is Σ ω|ξ|eṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether ε is linear in η.
