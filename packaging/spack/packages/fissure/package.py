@@ -15,7 +15,7 @@ class Fissure(Package):
     #   spack repo add packaging/spack
     #   spack install fissure
     #
-    # builds the working tree with the MPI of Spack.
+    # builds the branch `main` with the MPI of Spack.
     homepage = "file://" + os.path.realpath(os.path.join(os.path.dirname(__file__), "../../../.."))
     git = homepage
 
