@@ -54,7 +54,7 @@ fn remove_null(schema: &mut Value) {
     }
 }
 
-/// Join a choice of tables with one key each into one table that allows one of the keys. Editors can then
+/// Join a choice of tables with one key each into one table that has exactly one of the keys. Editors can then
 /// complete the keys, and the messages of editors point to the key with the mistake.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {

@@ -57,8 +57,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         end,
         step: time.step.as_ref(),
         safety: &time.safety,
-        // With stages, keys without effect in a relaxation may be intended for other stages, so validate
-        // these keys as for explicit steps.
+        // With stages, `step` and `adaptive` may be for explicit stages even if the method of `[time]` is
+        // quasi-static, so validate these keys as for explicit steps.
         method: if deck.stage.is_empty() {
             method
         } else {
@@ -323,7 +323,7 @@ impl TimeSegment<'_> {
         })
     }
 
-    /// Return the settings of Newton's method; `shared` supplies the values of missing keys.
+    /// Return the settings of Newton's method; `shared` supplies missing `load_steps` and `tolerance`.
     fn newton(
         &self,
         scope: &Scope,

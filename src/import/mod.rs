@@ -79,7 +79,7 @@ impl Import {
             .count()
     }
 
-    /// Return the keys that are left out and change the results.
+    /// Return the lines of the keys that are left out and change the results.
     pub fn losses(&self) -> Losses {
         Losses::of(&self.entries)
     }

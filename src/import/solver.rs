@@ -43,7 +43,7 @@ pub struct Stage {
     pub end: f64,
     /// Solution method.
     pub method: Method,
-    /// Number of the step, to which conditions refer.
+    /// Number by which conditions refer to this solver step; `None` if the source deck gives no number.
     pub step_id: Option<u64>,
     /// Damping of the solver per step, divided by the time step, 1/s; `None` without damping or if the time
     /// step is unknown.

@@ -28,7 +28,8 @@ struct Velocity {
     /// Node id of the command.
     node: usize,
     group: String,
-    /// Velocity components; `None` for a component that neither this command nor an earlier command sets.
+    /// Velocity components; `None` for a component that neither this command sets nor the last earlier command
+    /// for the same group or for all atoms.
     components: [Option<f64>; 3],
 }
 
