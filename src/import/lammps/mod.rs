@@ -28,8 +28,8 @@ struct Velocity {
     /// Node id of the command.
     node: usize,
     group: String,
-    /// Velocity components; `None` for a component that neither this command sets nor the last earlier command
-    /// for the same group or for all atoms.
+    /// Velocity components, also those from earlier commands for the same group or for all atoms; `None` for a
+    /// component that none of these commands sets.
     components: [Option<f64>; 3],
 }
 
