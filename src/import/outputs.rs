@@ -77,7 +77,7 @@ const ALWAYS: [(&str, &str); 8] = [
     ("Deformed Coordinates", "coordinates and displacement"),
 ];
 
-/// Global variables that the history always contains.
+/// Global variables that the history always contains, with their notes for the log.
 const GLOBALS: [(&str, &str); 3] = [
     (
         "Global Kinetic Energy",

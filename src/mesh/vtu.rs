@@ -1,4 +1,5 @@
-//! Unstructured grids of VTK in XML: text, inline binary and appended data, uncompressed or compressed by zlib.
+//! Unstructured grids of VTK in XML: text, inline binary and appended data, uncompressed or compressed by
+//! zlib.
 
 use std::io::Read;
 use std::path::Path;
