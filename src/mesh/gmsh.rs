@@ -359,7 +359,7 @@ impl File<'_> {
         })
     }
 
-    /// Append an element. `nodes` are in the order of the file.
+    /// Append an element. `nodes` are the indices of its nodes, in the order of the file.
     fn add_element(&mut self, (kind, order): &(Kind, Vec<usize>), number: u64, nodes: &[u32]) {
         let line = match self.cursor.encoding {
             Encoding::Text => self.cursor.line,
