@@ -126,8 +126,8 @@ pub fn damage(
             tension_only,
         } => {
             let bond_based = BOND_BASED.contains(&material.law);
-            // Bonds of a bond-based law break in tension only, so the damage law for such a body differs from
-            // that for other bodies.
+            // In Fissure, bonds of a bond-based law break in tension only. A damage model that also breaks
+            // compressed bonds therefore becomes two damage laws: one for bond-based bodies, one for the rest.
             let name = if bond_based && !tension_only {
                 translation.name("damage", &format!("{} of bonds", model.read))
             } else {
