@@ -127,7 +127,8 @@ pub fn damage(
         } => {
             let bond_based = BOND_BASED.contains(&material.law);
             // In Fissure, bonds of a bond-based law break in tension only. A damage model that also breaks
-            // compressed bonds therefore becomes two damage laws: one for bond-based bodies, one for the rest.
+            // compressed bonds therefore becomes two damage laws: one for bond-based bodies, and one for
+            // other bodies.
             let name = if bond_based && !tension_only {
                 translation.name("damage", &format!("{} of bonds", model.read))
             } else {
