@@ -1,7 +1,7 @@
 //! Meshes of Gmsh: MSH 2.2 and 4.1, text or binary.
 //!
 //! Text and binary files of version 4.1 hold the same numbers in the same order, so one reader serves both.
-//! In version 2.2, only the elements differ between text and binary files.
+//! In version 2.2, only the numbers of the section `$Elements` have another order in binary files.
 
 use std::collections::hash_map::Entry;
 use std::path::Path;
