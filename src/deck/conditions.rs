@@ -15,8 +15,7 @@ use crate::problem::{self, Action, Depth, Selector};
 ///
 /// # Errors
 /// On an unknown set, an invalid expression or file, a table without values, or a table with both a
-/// file and expressions. On a velocity in a run that begins with a method that computes equilibria,
-/// and on a file in a deck with `[refinement]`.
+/// file and expressions. On a velocity in a run that begins with a method that computes equilibria.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,

@@ -89,8 +89,8 @@ impl Import {
 /// relative to the folder of the new deck. Without `code`, the code is detected from the text.
 ///
 /// # Errors
-/// If the file cannot be read, the code is unknown, or the deck lacks data that a run needs. The message
-/// gives file and line.
+/// If the file cannot be read or parsed, the code is unknown, or data that a run needs are missing or wrong.
+/// The message gives the file, and the line except if the file cannot be read.
 pub fn import(path: &Path, code: Option<Code>, target: &Path) -> Result<Import> {
     translate(&Source::read(path)?, code, target)
 }

@@ -104,7 +104,8 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// Append an element. `nodes` are the indices of its nodes, in the order that the module [`kind`] defines.
+    /// Append an element. `nodes` are the indices of its nodes, in the order that the module [`kind`]
+    /// defines.
     fn push(
         &mut self,
         kind: Kind,
