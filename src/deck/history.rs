@@ -16,8 +16,8 @@ use crate::problem::{self, Field, Interval};
 ///
 /// # Errors
 /// On an unknown set, field or component, or an invalid position, number or name. On an empty list `of`, and
-/// on an entry that a list names twice. On a missing or surplus `component` or `front`, and on a quantity that
-/// does not exist in this dimension.
+/// on an entry that a list names twice. On a missing or surplus `component` or `front`, and on a quantity
+/// that does not exist in this dimension.
 pub fn history(
     scope: &Scope,
     deck: &Deck,
