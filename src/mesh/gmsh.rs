@@ -619,8 +619,8 @@ impl<'a> Cursor<'a> {
             .map_err(|_| self.fault(format!("must be a whole number, is {}", excerpt(word))))
     }
 
-    /// Read a number of entries of version 2. The number is text even in binary files. In binary files, the
-    /// rest of the line is skipped too.
+    /// Read the number of entries of a section in a file of version 2. The number is text even in binary
+    /// files. In binary files, the rest of the line is skipped too.
     fn count_line(&mut self) -> Result<i64> {
         let count = self.text_number()?;
         if matches!(self.encoding, Encoding::Binary { .. }) {
