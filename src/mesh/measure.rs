@@ -24,7 +24,7 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate with this value along an axis.
+    /// Return the reference coordinate along `axis`, which has the value `value`.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
