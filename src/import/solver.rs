@@ -239,7 +239,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Log the keys of a static solver that the new deck does not contain.
+/// Log those keys of a static solver that have no counterpart in the new deck.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
