@@ -23,8 +23,9 @@ const MOST_BODIES: usize = 256;
 /// # Errors
 /// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
 /// the material does not support, an invalid number or shape, or a body without exactly one source of points.
-/// On a missing spacing, and on a key that does not belong to the source of points. If two bodies request the
-/// same rows or elements of a file, or name different columns of the same file.
+/// On a missing spacing, an unknown ending of the name of a mesh file, and a key that does not belong to the
+/// source of points. If two bodies request the same rows or elements of a file, or name different columns of
+/// the same file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -192,8 +193,8 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
 /// faces normal to this axis. The sides of a prism or polygon are bounded by the smallest and the largest
-/// coordinate of the corners. A union has the lowest and the highest of the faces of its parts. A difference
-/// has the faces of its first part.
+/// coordinate of the corners. A union has the lowest and the highest of the faces of its parts, and no flat
+/// faces if a part has none. A difference has the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
@@ -316,8 +317,8 @@ fn point_source(
             let edges = &spacing[..scope.dimension];
             let longest = edges.iter().copied().fold(0.0, f64::max);
             if let (Some(number), true) = (&body.horizon, longest > horizon) {
-                // If the horizon of the grid contains the mean spacing, `horizon::resolve` has given its
-                // value to the body, with the byte range of the key in `[grid]`.
+                // If the horizon of the grid contains the mean spacing, `horizon::resolve` has stored the
+                // value of this horizon in the body, with the byte range of the value in `[grid]`.
                 let key = if number.span() == grid.horizon.span() {
                     "[grid]"
                 } else {

@@ -15,8 +15,7 @@ use crate::problem::{self, Action, Depth, Selector};
 ///
 /// # Errors
 /// On an unknown set, an invalid expression or file, a table without values, or a table with both a
-/// file and expressions. On a velocity in a run that begins with a method that computes equilibria,
-/// and on a file in a deck with `[refinement]`.
+/// file and expressions. On a velocity in a run that begins with a method that computes equilibria.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,
@@ -88,8 +87,8 @@ fn initial_file(scope: &Scope, file: &grammar::Text, key: &str) -> Result<proble
 ///
 /// # Errors
 /// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth` or
-/// `normal` that is missing or has no effect. If only some of the bodies that may have points in the set need
-/// a `depth`, a missing `depth` is not reported here. The solver then checks the points of the set.
+/// `normal` that is missing or has no effect. A missing `depth` is not reported here if only some bodies need
+/// it and the set may have no points of these bodies. The solver then checks the points of the set.
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,

@@ -17,8 +17,9 @@ const FREE_KEYS: [&str; 1] = ["time.end"];
 /// Keys of `[history]` that set the interval of rows.
 const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
 
-/// Return the differences in the physics of two decks: one line per key, with its old and new value. A key
-/// that only one deck has is compared with its default.
+/// Return the differences in the physics of two decks: one line per key with its old and new value, and one
+/// line per section whose tables have another order. A key that only one deck has is compared with the
+/// default of the key.
 ///
 /// # Errors
 /// If a deck does not follow the grammar, or its parameters or tables are invalid.

@@ -15,8 +15,9 @@ use crate::problem::{self, Field, Interval};
 /// Validate the content and interval of the history; `horizon` is the horizon of the grid, m.
 ///
 /// # Errors
-/// On an unknown set or field, or an invalid position, number or name. On an entry that is named twice, and
-/// on a quantity that does not exist in this dimension.
+/// On an unknown set, field or component, or an invalid position, number or name. On an empty list `of`, and
+/// on an entry that a list names twice. On a missing or surplus `component` or `front`, and on a quantity
+/// that does not exist in this dimension.
 pub fn history(
     scope: &Scope,
     deck: &Deck,
@@ -163,8 +164,8 @@ fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
     Ok(fields[find(scope.source, name, names, key)?])
 }
 
-/// Return the component or invariant that a table requests. The default is the scalar, or the magnitude of
-/// a vector; a tensor without `component` is an error.
+/// Return the component or invariant that a table requests. The default is the only component of a scalar
+/// field, and the magnitude of a vector field; a tensor field without `component` is an error.
 fn component(
     scope: &Scope,
     key: &str,
@@ -386,7 +387,7 @@ fn j_integral(
     })
 }
 
-/// Largest cosine of the angle between the crack front and the direction of growth.
+/// Largest absolute value of the cosine of the angle between the crack front and the direction of growth.
 const LARGEST_COSINE: f64 = 1e-6;
 
 /// Return the direction of the crack front for a J integral in 3-D, `None` in plane problems.

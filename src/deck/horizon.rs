@@ -24,7 +24,8 @@ const SPACING: &str = "spacing";
 ///
 /// # Errors
 /// If the horizon of the grid contains the mean spacing, although all bodies have their own horizon. On an
-/// invalid horizon, mesh or point file. The error is the same on all ranks.
+/// invalid dimension, spacing, horizon, source of points, mesh or point file. The error is the same on all
+/// ranks.
 pub fn resolve(scope: &mut Scope, deck: &Deck, comm: &dyn Communicator) -> Result<Option<Deck>> {
     let in_grid = &deck.grid.get_ref().horizon;
     let of_grid = contains_spacing(scope, in_grid);

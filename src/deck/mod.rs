@@ -58,9 +58,8 @@ pub struct Deck {
     with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
-/// Read a deck. `set` has pairs of a name and a value or expression. The name is that of a parameter, or a
-/// key with its section, such as `time.safety`. Keys outside of all sections, such as `thickness`, have no
-/// section.
+/// Read a deck. `set` has pairs of a name and a value or expression. The name is that of a parameter, a key
+/// with its section, such as `time.safety`, or a key outside of all sections, such as `thickness`.
 ///
 /// # Errors
 /// If the file cannot be read, its text does not follow the grammar, or an entry of `set` has an unknown name

@@ -167,7 +167,8 @@ fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Re
 /// Validate the settings of the rebalancing. Return `None` for a deck without `[balance]`.
 ///
 /// # Errors
-/// If `imbalance` is below 1: the slowest rank always takes at least the mean time.
+/// If `imbalance` is below 1. Points are rebalanced when the time of the slowest rank, divided by the mean
+/// time of all ranks, exceeds `imbalance`; this ratio is never below 1.
 pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<problem::Balance>> {
     let rule = |table: &Spanned<Balance>| {
         let table = table.get_ref();

@@ -21,7 +21,8 @@ const RISE: f64 = 1.0;
 /// Validate the refinement. Return `None` for a deck without `[refinement]`.
 ///
 /// # Errors
-/// On bodies that cannot be refined, and on invalid levels, ratios m, factors, regions or triggers.
+/// If no body is given as a shape, or a body has Gauss points. On invalid levels, ratios m, factors, regions
+/// or triggers.
 pub fn refinement(
     scope: &Scope,
     deck: &Deck,

@@ -30,7 +30,7 @@ pub struct Scope<'a> {
     pub tables: IndexMap<String, Arc<Table>>,
     /// Number of components of a vector.
     pub dimension: usize,
-    /// Section and name of the tables that [`Self::find_used`] has looked up or that expressions use.
+    /// Section and name of each table that [`Self::find_used`] has looked up or that an expression uses.
     pub used: RefCell<IndexSet<(&'static str, String)>>,
 }
 

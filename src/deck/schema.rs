@@ -54,8 +54,8 @@ fn remove_null(schema: &mut Value) {
     }
 }
 
-/// Join a choice of tables with one key each into one table that allows one of the keys. Editors can then
-/// complete the keys, and the messages of editors point to the key with the mistake.
+/// Join a choice of tables with one key each into one table that has exactly one of the keys. Editors can
+/// then complete the keys, and the messages of editors point to the key with the mistake.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {
         let mut properties = serde_json::Map::new();

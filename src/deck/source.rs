@@ -15,10 +15,10 @@ const LONGEST: u64 = 1 << 28;
 /// Approximate largest number of characters of an error, unless the path is very long.
 const MOST_SHOWN: usize = 790;
 
-/// Largest number of characters of the message of an error.
+/// Largest number of characters of the message of an error or warning, without location and excerpt.
 const MOST_SAID: usize = 600;
 
-/// Smallest and largest number of characters of an excerpt of a line.
+/// Limits of the width to which the excerpt of a line is cut, in characters. A shorter line is not cut.
 const SHOWN_OF_LINE: [usize; 2] = [24, 160];
 
 /// The path and the text of a deck.
@@ -56,9 +56,9 @@ impl Source {
         source
     }
 
-    /// Return the path and text of the file that a span comes from, and the span in this file. The last entry
-    /// is then empty. For a span that comes from no file, return the path of the deck, the merged text, the
-    /// unchanged span and [`CHANGED`].
+    /// Return the path and text of the file that `span` comes from, the span in this file, and an empty note.
+    /// For a span that comes from no file, return the path of the deck, the merged text, the unchanged span
+    /// and the note [`CHANGED`].
     fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
         let Some(origins) = &self.origins else {
             return (&self.path, &self.text, span, "");
@@ -124,7 +124,7 @@ impl Source {
     }
 
     /// Format file, line, column and message, then the line with carets below the bytes of `span`. The result
-    /// has at most about 800 characters.
+    /// has at most about 800 characters, unless the path is very long.
     fn marked(&self, span: Range<usize>, message: &str) -> String {
         let message = shortened(message, MOST_SAID);
         let (path, text, span, note) = self.place(span);

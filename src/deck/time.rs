@@ -57,8 +57,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         end,
         step: time.step.as_ref(),
         safety: &time.safety,
-        // With stages, keys without effect in a relaxation may be intended for other stages, so validate
-        // these keys as for explicit steps.
+        // With stages, `step` and `adaptive` may be for explicit stages even if the method of `[time]` is
+        // quasi-static, so validate these keys as for explicit steps.
         method: if deck.stage.is_empty() {
             method
         } else {
@@ -75,8 +75,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
 /// Validate the stages of the run, whose time axis is `whole`.
 ///
 /// # Errors
-/// On a missing or invalid end of a stage, unknown names, invalid numbers, and tables of a method that the
-/// stage does not use.
+/// On a missing or invalid end of a stage, an unknown name, an invalid number, a stage with both `on` and
+/// `off`, and a key of a method that the stage does not use.
 pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;
@@ -323,7 +323,7 @@ impl TimeSegment<'_> {
         })
     }
 
-    /// Return the settings of Newton's method; `shared` supplies the values of missing keys.
+    /// Return the settings of Newton's method; `shared` supplies missing `load_steps` and `tolerance`.
     fn newton(
         &self,
         scope: &Scope,

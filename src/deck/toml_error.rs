@@ -63,7 +63,7 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
         let colon = if key.is_empty() { "" } else { ": " };
         source.error(span.clone(), format!("{key}{colon}{words}"))
     };
-    // An unknown key of [output] is parsed as the name of a further output.
+    // An unknown key of [output] is parsed as the name of a further result.
     if let ([section, key], Some(value)) = (&place.path[..], place.value)
         && section == "output"
         && !OUTPUT_KEYS.contains(&key.as_str())

@@ -72,8 +72,8 @@ const BY_ENERGY: [&str; 3] = [
 const BOND_BASED: [&str; 1] = ["pmb"];
 
 /// Write the damage law of a body and return the name of the damage law. `horizon` is the horizon of the
-/// body, m. Return `None` if the material law breaks bonds by energy only and the elastic constants do not
-/// determine the fracture energy.
+/// body, m. Return `None` if the criterion is a stretch, the material law breaks bonds by energy only, and
+/// the elastic constants do not determine the fracture energy.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,
@@ -104,8 +104,8 @@ pub fn damage(
                 return None;
             };
             // State-based form of the relation of Silling & Askari (2005):
-            // G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)). For k = 5 G/3, this is the relation 9 k δ s0²/5 of
-            // bond-based solids.
+            // G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)) with the bulk modulus k and the shear modulus G. For
+            // k = 5 G/3, this is the relation G0 = 9 k δ s0²/5 of bond-based solids.
             let energy = stretch
                 * stretch
                 * horizon
@@ -126,8 +126,9 @@ pub fn damage(
             tension_only,
         } => {
             let bond_based = BOND_BASED.contains(&material.law);
-            // Bonds of a bond-based law break in tension only, so the damage law for such a body differs from
-            // that for other bodies.
+            // In Fissure, bonds of a bond-based law break in tension only. A damage model that also breaks
+            // compressed bonds therefore becomes two damage laws: one for bond-based bodies, and one for
+            // other bodies.
             let name = if bond_based && !tension_only {
                 translation.name("damage", &format!("{} of bonds", model.read))
             } else {

@@ -5,7 +5,8 @@ use super::translation::Translation;
 use super::tree::Node;
 use crate::error::Result;
 
-/// Largest cosine between bottom edge and normal that counts as perpendicular.
+/// Largest cosine of the angle between bottom unit vector and normal at which the two count as perpendicular,
+/// and largest sine at which they count as parallel.
 const SLANT: f64 = 1e-9;
 
 /// Write a pre-crack for each bond filter of a table.

@@ -33,7 +33,7 @@ pub enum Value {
     Text(String),
     /// Whole numbers.
     Ids(Vec<u64>),
-    /// Other values in order.
+    /// A list of values.
     List(Vec<Value>),
     /// An inline table.
     Table(Vec<(String, Value)>),
@@ -195,7 +195,7 @@ impl Draft {
         &mut self.sections[index]
     }
 
-    /// Test whether a section exists.
+    /// Test whether the deck has a section with a header; a section that is left out does not count.
     pub fn has(&self, header: &str) -> bool {
         self.sections.iter().any(|section| section.is(header))
     }
@@ -217,7 +217,8 @@ impl Draft {
         self.sections.push(section);
     }
 
-    /// Return the text of the deck. It starts with the comments of `heading` and the list of keys.
+    /// Return the text of the deck, which starts with comments: the lines of `heading`, then the outcomes
+    /// `entries` of the keys.
     pub fn text(&self, heading: &[String], entries: &[Entry]) -> String {
         let mut text = String::new();
         let comment = |text: &mut String, line: &str| {

@@ -210,7 +210,7 @@ impl Log {
         self.note(node, Fate::Taken, note);
     }
 
-    /// Log that the new deck has a similar meaning.
+    /// Log that the new deck has a meaning similar to that of a node.
     pub(super) fn approximated(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Approximated, note);
     }

@@ -79,7 +79,7 @@ impl Import {
             .count()
     }
 
-    /// Return the keys that are left out and change the results.
+    /// Return the lines of the keys that are left out and change the results.
     pub fn losses(&self) -> Losses {
         Losses::of(&self.entries)
     }
@@ -89,8 +89,8 @@ impl Import {
 /// relative to the folder of the new deck. Without `code`, the code is detected from the text.
 ///
 /// # Errors
-/// If the file cannot be read, the code is unknown, or the deck lacks data that a run needs. The message
-/// gives file and line.
+/// If the file cannot be read or parsed, the code is unknown, or data that a run needs are missing or wrong.
+/// The message gives the file, and the line except if the file cannot be read.
 pub fn import(path: &Path, code: Option<Code>, target: &Path) -> Result<Import> {
     translate(&Source::read(path)?, code, target)
 }

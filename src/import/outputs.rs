@@ -77,7 +77,7 @@ const ALWAYS: [(&str, &str); 8] = [
     ("Deformed Coordinates", "coordinates and displacement"),
 ];
 
-/// Global variables that the history always contains.
+/// Global variables that the history always contains, with their notes for the log.
 const GLOBALS: [(&str, &str); 3] = [
     (
         "Global Kinetic Energy",
@@ -182,7 +182,7 @@ impl Outputs {
     }
 
     /// Read a table of computed quantities. The name of a quantity is its key `Output Label`, or else the
-    /// name of its table.
+    /// name of its table. `bodies` has pairs of the name of a block and the name of the body of this block.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.
@@ -214,7 +214,7 @@ impl Outputs {
     /// Read the variables of an output, and the interval if the output has one.
     ///
     /// # Errors
-    /// If the frequency is not a whole number above 0.
+    /// If the frequency or the number of outputs is not a whole number above 0.
     pub fn output(&mut self, translation: &Translation, node: &Node) -> Result<()> {
         let log = &translation.log;
         let (mut has_fields, mut has_globals) = (false, false);
@@ -294,7 +294,7 @@ impl Outputs {
     }
 
     /// Return the largest interval of the outputs; outputs with fields take precedence. Other intervals are
-    /// logged.
+    /// logged. Return `None` if no output has an interval.
     fn interval(&self, translation: &Translation) -> Option<Interval> {
         let with_fields = self.intervals.iter().any(|frequency| frequency.has_fields);
         let candidates = self.intervals.iter();
@@ -316,7 +316,7 @@ impl Outputs {
     }
 
     /// Return the smallest interval of the outputs that contain only columns of the history. Other intervals
-    /// are logged.
+    /// are logged. Return `None` if no such output has an interval.
     fn history_interval(&self, translation: &Translation) -> Option<Interval> {
         let all = self.history_intervals.iter();
         let smallest = all.reduce(|a, b| if is_longer(a, b) { b } else { a })?;

@@ -57,7 +57,8 @@ pub fn is_script(text: &str) -> bool {
     })
 }
 
-/// Split a script into commands. Replace each variable or formula after a `$` by its value at this command.
+/// Split a script into commands. In each command, replace the variables and formulas after a `$` by the
+/// values that they have at this command.
 ///
 /// # Errors
 /// If a quote or bracket is not closed, a variable is not defined, a formula in `$(…)` is invalid or changes

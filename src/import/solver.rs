@@ -43,7 +43,7 @@ pub struct Stage {
     pub end: f64,
     /// Solution method.
     pub method: Method,
-    /// Number of the step, to which conditions refer.
+    /// Number by which conditions refer to this solver step; `None` if the source deck gives no number.
     pub step_id: Option<u64>,
     /// Damping of the solver per step, divided by the time step, 1/s; `None` without damping or if the time
     /// step is unknown.
@@ -75,7 +75,8 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
 /// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
-/// If no solver is known, the end is missing or not after the start, or a key is not a number.
+/// If no solver is known, the end is missing or not after the start, a value is not a number, or the numbers
+/// of `Time Steps` do not rise.
 pub fn stage(
     translation: &Translation,
     node: &Node,
@@ -238,7 +239,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Log the keys of a static solver that the new deck does not contain.
+/// Log those keys of a static solver that have no counterpart in the new deck.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));

@@ -177,8 +177,8 @@ impl<'a> Translation<'a> {
         written
     }
 
-    /// Same as [`name`](Self::name), for a new table even if the source name is in use. Names of bodies are
-    /// unique in the section `set`, because bodies are also sets.
+    /// Same as [`name`](Self::name), for a new table even if the source name is in use. The section of a body
+    /// is given as `set`, because bodies are also sets, so a body and a set must not have the same name.
     pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
         let plain = slug(name);
         let taken = |written: &str| {

@@ -1,7 +1,7 @@
 //! Meshes of Gmsh: MSH 2.2 and 4.1, text or binary.
 //!
 //! Text and binary files of version 4.1 hold the same numbers in the same order, so one reader serves both.
-//! In version 2.2, only the elements differ between text and binary files.
+//! In version 2.2, only the numbers of the section `$Elements` have another order in binary files.
 
 use std::collections::hash_map::Entry;
 use std::path::Path;
@@ -359,7 +359,7 @@ impl File<'_> {
         })
     }
 
-    /// Append an element. `nodes` are in the order of the file.
+    /// Append an element. `nodes` are the indices of its nodes, in the order of the file.
     fn add_element(&mut self, (kind, order): &(Kind, Vec<usize>), number: u64, nodes: &[u32]) {
         let line = match self.cursor.encoding {
             Encoding::Text => self.cursor.line,
@@ -619,8 +619,8 @@ impl<'a> Cursor<'a> {
             .map_err(|_| self.fault(format!("must be a whole number, is {}", excerpt(word))))
     }
 
-    /// Read a number of entries of version 2. The number is text even in binary files. In binary files, the
-    /// rest of the line is skipped too.
+    /// Read the number of entries of a section in a file of version 2. The number is text even in binary
+    /// files. In binary files, the rest of the line is skipped too.
     fn count_line(&mut self) -> Result<i64> {
         let count = self.text_number()?;
         if matches!(self.encoding, Encoding::Binary { .. }) {

@@ -24,7 +24,7 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate with this value along an axis.
+    /// Return the reference coordinate along `axis`, which has the value `value`.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
@@ -178,7 +178,7 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
     rule
 }
 
-/// Signs of the corners of the square [−1, 1]².
+/// Corners of the square [−1, 1]².
 const SQUARE: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
 /// Compute the shape functions of all nodes at a position in the reference element.
@@ -320,8 +320,8 @@ fn shape_functions(kind: Kind, at: [f64; 3]) -> Vec<Dual> {
     }
 }
 
-/// Compute the linear or quadratic shape functions of a triangle or tetrahedron from its barycentric
-/// coordinates.
+/// Compute the linear or quadratic shape functions of a triangle or tetrahedron from the barycentric
+/// coordinates `weights` of a position.
 fn quadratic(weights: &[Dual], kind: Kind) -> Vec<Dual> {
     if kind.nodes == kind.corners() {
         return weights.to_vec();

@@ -1,6 +1,6 @@
 //! Meshes of finite elements in the formats of other programs. Elements become points.
 //!
-//! A reader compares a count in a file with the number of bytes before it allocates memory for the counted
+//! A reader compares a count in a file with the size of the file before it allocates memory for the counted
 //! entries, or reads the entries one by one. A damaged file therefore needs no more memory than a valid file
 //! of the same size.
 
@@ -80,8 +80,8 @@ pub struct Mesh {
     pub nodes: Vec<[f64; 3]>,
     /// The elements, in the order of the file.
     pub elements: Elements,
-    /// Volumes of single-node elements by the index of the element, in the units of the file. For all other
-    /// elements, the entry is 0 or missing at the end of the list.
+    /// Volumes that the file gives for single-node elements, by the index of the element, in the units of the
+    /// file. For an element without such a volume, the entry is 0, or missing at the end of the list.
     volumes: Vec<f64>,
     /// Named or numbered groups of elements and of nodes.
     pub groups: Vec<Group>,
@@ -104,7 +104,8 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// Append an element. `nodes` are indices in the order of [`kind`].
+    /// Append an element. `nodes` are the indices of its nodes, in the order that the module [`kind`]
+    /// defines.
     fn push(
         &mut self,
         kind: Kind,
@@ -225,7 +226,8 @@ impl fmt::Display for GroupKey {
 }
 
 impl Mesh {
-    /// Return the volume that the file gives for a single-node element; `None` if the file gives no volume.
+    /// Return the volume that the file gives for a single-node element; `None` if the file gives no volume,
+    /// and for other elements.
     pub fn volume(&self, element: usize) -> Option<f64> {
         self.volumes
             .get(element)

@@ -70,8 +70,8 @@ impl<'a> Netcdf<'a> {
             .shape()
             .iter()
             .try_fold(each, |all, length| all.checked_mul(*length as u64));
-        // Chunks that are not written take no bytes, and could make a valid dataset fail here. No mesh has
-        // only such chunks.
+        // Chunks that were never written take no bytes in the file. A valid dataset with almost only such
+        // chunks would fail here, but programs write all chunks of a mesh.
         if count.is_none_or(|count| count > (LARGEST_RATIO as u64).saturating_mul(size)) {
             return Err(format!("variable {name}: is larger than the file can hold"));
         }

@@ -1,4 +1,5 @@
-//! Unstructured grids of VTK in XML: text, inline binary and appended data, raw or compressed by zlib.
+//! Unstructured grids of VTK in XML: text, inline binary and appended data, uncompressed or compressed by
+//! zlib.
 
 use std::io::Read;
 use std::path::Path;
@@ -337,7 +338,7 @@ impl File<'_> {
         binary_numbers(kind, &bytes, self.is_big).map_err(words)
     }
 
-    /// Return the bytes of a binary array, without its header.
+    /// Return the decompressed bytes of a binary array, without its header.
     fn bytes(&self, mut source: Source) -> Fault<Vec<u8>> {
         if !self.is_compressed {
             let length = self.header_number(&mut source)?;

@@ -32,8 +32,8 @@ pub struct Body {
     /// not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<Spanned<Quadrature>>,
-    /// Horizon of this body in m; the horizon of `[grid]` if not given. In an expression, `spacing` is the mean
-    /// spacing of the points of this body.
+    /// Horizon of this body in m; the horizon of `[grid]` if not given. In an expression, `spacing` is the
+    /// mean spacing of the points of this body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub horizon: Option<Number>,
 }

@@ -25,9 +25,9 @@ pub struct Initial {
     pub file: Option<Text>,
 }
 
-/// A load, support or temperature of a set. It gives exactly one quantity, such as `displacement` or
-/// `pressure`: an expression of x, y, z and t for each component. A component of displacement or velocity
-/// with the string `"free"` is not prescribed.
+/// A condition on a set: a load, support or temperature. Each condition gives exactly one quantity, such as
+/// `displacement` or `pressure`: an expression of x, y, z and t for each component. A component of
+/// displacement or velocity with the string `"free"` is not prescribed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {

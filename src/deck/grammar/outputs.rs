@@ -308,7 +308,8 @@ pub struct Front {
     /// Length of the line in m; if not given, the line extends to the end of the bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length: Option<Number>,
-    /// Largest distance in m from the line at which points are evaluated; the horizon if not given.
+    /// Largest distance in m from the line at which points are evaluated; the horizon of `[grid]` if not
+    /// given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Name of an output field.

@@ -13,7 +13,7 @@ pub struct Section {
     pub path: &'static str,
     /// Form of the header.
     pub form: Form,
-    /// Tables of the section have an effect only where another section refers to them by name.
+    /// Whether a table of the section has an effect only where another section refers to it by name.
     pub referred_to: bool,
     /// Changes that a restart permits.
     pub restart: Restart,

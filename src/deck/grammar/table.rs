@@ -8,7 +8,7 @@ use crate::deck::number::{Number, default_number};
 use crate::deck::spanned::Spanned;
 
 /// A value over time, linear between rows. Expressions of `t` may use the name of the table. The rows come
-/// from a file or from this table.
+/// from a file, or from the keys `times` and `values`.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {

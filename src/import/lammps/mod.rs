@@ -28,7 +28,8 @@ struct Velocity {
     /// Node id of the command.
     node: usize,
     group: String,
-    /// Velocity components; `None` for a component that neither this command nor an earlier command sets.
+    /// Velocity components, also those from earlier commands for the same group or for all atoms; `None` for
+    /// a component that none of these commands sets.
     components: [Option<f64>; 3],
 }
 

@@ -11,7 +11,8 @@ use crate::import::tree::{Content, Node, is_key};
 /// Type of a condition that prescribes temperatures.
 const PRESCRIBED_TEMPERATURE: &str = "Prescribed Temperature";
 
-/// Write the initial values, loads and supports, then the stages. Return whether temperatures are prescribed.
+/// Write the initial values, loads, supports and temperatures, then the stages. `expanding` has the section
+/// headers of the materials with thermal expansion. Return whether temperatures are prescribed.
 pub(super) fn conditions<'n>(
     translation: &mut Translation,
     root: &'n Node,

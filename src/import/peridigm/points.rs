@@ -16,7 +16,7 @@ pub(super) enum Points {
     File(Value, Option<PointFile>),
     /// A mesh.
     Mesh(Value),
-    /// A box that is filled with the spacing of `[grid]`.
+    /// A box that is filled with points at the spacing of `[grid]`.
     Box(Value),
 }
 

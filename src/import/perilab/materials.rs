@@ -137,8 +137,8 @@ pub(super) fn write_material(
                     .log
                     .approximated(node, "the law has the Poisson's ratio of bonds");
             }
-            // PeriLab uses a Poisson ratio of 1/3 in plane stress and in plane strain. Therefore
-            // E = 3 (1 − 2ν) K = K.
+            // PeriLab uses a Poisson ratio ν of 1/3 in plane stress and in plane strain. Young's modulus
+            // E = 3 (1 − 2ν) K is therefore equal to the bulk modulus K.
             let factor = (translation.dimension == 2).then_some(1.0);
             model.constants.write_one(&mut section, factor)
         }

@@ -258,7 +258,8 @@ impl Reader {
         Ok(Runs::new(members))
     }
 
-    /// Find the members of a set by its name, in `known` or among the groups of the mesh.
+    /// Find the members of a set by its name, in `known` or among the groups of the mesh. With `instance`,
+    /// find the set with this name in this instance, which is a group of the mesh.
     fn find_set(
         &self,
         of: MemberKind,
