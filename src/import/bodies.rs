@@ -136,7 +136,12 @@ pub fn damage(
             };
             let header = format!("damage.{name}.energy");
             let note = format!("[{header}] fracture_energy with PeriLab's calibration");
-            translation.log.taken(&model.node, note);
+            if bond_based && !tension_only {
+                let note = format!("{note}; bonds of {} break in tension only", material.law);
+                translation.log.approximated(&model.node, note);
+            } else {
+                translation.log.taken(&model.node, note);
+            }
             let section = translation.draft.section(&header);
             section
                 .set("fracture_energy", energy.clone())

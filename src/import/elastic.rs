@@ -30,6 +30,10 @@ impl Constants {
         let mut given = Vec::new();
         for (name, key) in NAMES {
             if let Some(node) = material.get(name) {
+                if given.iter().any(|(other, ..)| *other == key) {
+                    translation.log.left_out(node, "is given twice");
+                    continue;
+                }
                 let value = translation.number(node, name)?;
                 given.push((key, value, translation.number_value(node, name)?));
                 translation

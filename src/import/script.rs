@@ -40,6 +40,9 @@ pub struct Script {
     pub commands: Vec<Command>,
 }
 
+/// Time step before the first `timestep`, s: the default of LAMMPS in SI units.
+const DEFAULT_STEP: f64 = 1e-8;
+
 /// State of variables and time step at a command of a script.
 #[derive(Debug, Default)]
 pub struct Variables {
@@ -252,7 +255,7 @@ impl Variables {
         if formula.trim().parse::<f64>().is_ok() {
             return Ok(formula.trim().to_owned());
         }
-        let text = self.formula(formula, 1e-3, 0)?;
+        let text = self.formula(formula, self.step.unwrap_or(DEFAULT_STEP), 0)?;
         let expression = Expression::of(&text).map_err(|error| error.message)?;
         let value = expression.as_constant();
         let value = value.ok_or_else(|| format!("`{formula}` changes with time"))?;
