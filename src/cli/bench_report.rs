@@ -218,7 +218,7 @@ impl Figures {
         }
     }
 
-    /// Return the figures as one JSON object; the names include the unit.
+    /// Return the figures as one JSON object. The name of a figure with a unit includes this unit.
     fn json(&self) -> String {
         let mut entries = Map::new();
         let mut add =

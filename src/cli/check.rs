@@ -16,10 +16,12 @@ use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
-/// Largest numbers of lattice cells, points and directed bonds for which `check` makes a dry run. A dry run
-/// of this size takes some seconds and 1 GB.
+/// Largest number of lattice cells for which `check` makes a dry run. With this number, [`MAX_POINTS`] and
+/// [`MAX_BONDS`], a dry run takes some seconds and 1 GB.
 const MAX_CELLS: f64 = 1e7;
+/// Largest number of points for which `check` makes a dry run.
 const MAX_POINTS: f64 = 2e6;
+/// Largest number of directed bonds for which `check` makes a dry run.
 const MAX_BONDS: f64 = 1.5e8;
 
 /// Validate the decks and print a report on each deck.
@@ -80,8 +82,8 @@ pub struct TimeEstimate {
     pub cost: Cost,
 }
 
-/// Return the report on a deck. Errors have spans (positions in the deck), which the caller converts to
-/// file and line.
+/// Return the report on a deck. An error can have a span (a position in the deck), which the caller converts
+/// to file and line.
 fn report(request: &Request) -> Result<String> {
     let problem = request.deck.problem()?;
     let ranks = request.ranks as usize;

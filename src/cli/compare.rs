@@ -81,7 +81,7 @@ impl<'a> Tolerances<'a> {
         found.map_or(self.general, |(_, value)| *value)
     }
 
-    /// Check that every named tolerance refers to a field or a column.
+    /// Check that every named tolerance refers to a field or a column that both results have.
     fn check(&self, comparison: &Comparison) -> Result<()> {
         let both = || comparison.fields.iter().chain(&comparison.columns);
         for (name, _) in &self.named {
@@ -171,8 +171,8 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// Format the comparison. First list what only one result has (fields, columns, outputs, points and rows);
-/// then append a table of the fields and a table of the columns.
+/// Format the comparison: the paths of the results, the numbers of compared outputs, points and rows, a list
+/// of what only one result has, a table of the fields and a table of the columns.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,
@@ -213,7 +213,8 @@ fn report(
 /// Largest number of names in a list. Of further names, only the number is given.
 const LONGEST_LIST: usize = 8;
 
-/// Append a line with the names that only one of the results has.
+/// Append a line with the entries of `list`, such as names of fields, which only the result `name` (A or B)
+/// has. Append nothing if the list is empty.
 fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     if !list.is_empty() {
         let shown = list[..list.len().min(LONGEST_LIST)].join(", ");

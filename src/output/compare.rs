@@ -81,7 +81,8 @@ impl Difference {
     }
 
     /// Test whether the largest difference is at most `tolerance` times the largest absolute value of the
-    /// first result. With a tolerance of 0, all values must be bit-identical.
+    /// first result. With a tolerance of 0, all values must be bit-identical. With an infinite tolerance, the
+    /// result is always true.
     pub fn is_within(&self, tolerance: f64) -> bool {
         self.unequal == 0
             || tolerance > 0.0
@@ -217,7 +218,8 @@ struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// Compare some of the fields, one block of points at a time. `fields` has their indices in `comparison`.
+    /// Compare some of the fields, one block of points at a time. `fields` has the indices of these fields in
+    /// `comparison.fields`.
     fn compare(&self, fields: &[usize], comparison: &mut Comparison) -> Result<()> {
         let counts = [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]));
         let mut next = [0; 2];
@@ -306,8 +308,8 @@ struct Block {
 }
 
 impl Block {
-    /// Match two ascending lists of ids. Stop at the end of a list, unless this list is the last list of its
-    /// result.
+    /// Match two ascending lists of ids, one list of each result. Stop at the end of a list, unless `last`
+    /// says that the result has no further ids.
     fn of(ids: &[Vec<u64>; 2], last: [bool; 2]) -> Self {
         let (mut pairs, mut used) = (Vec::new(), [0; 2]);
         loop {

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Path of the table, which has one row per sample.
+/// Path of the table. Each row has the quantities at one time.
 pub(super) const HISTORY: &str = "/history";
 
 /// Attribute with the names of the columns.

@@ -77,7 +77,8 @@ impl ResultReader {
     /// Open a result file.
     ///
     /// # Errors
-    /// If the file is missing, not a result of Fissure, locked by another program, or unreadable.
+    /// If the file is missing, not a result of Fissure, locked by another program, or unreadable, or if its
+    /// path is not UTF-8.
     pub fn open(path: &Path) -> Result<Self> {
         let problem = |text: &str| Err(Error::input(format!("{}: {text}", path.display())));
         if let Err(error) = std::fs::metadata(path) {
@@ -159,7 +160,7 @@ impl ResultReader {
         id.is_ok_and(|dataset| dataset.is_resizable())
     }
 
-    /// Return the times of the complete steps, s.
+    /// Return the times (s) of the complete steps. A step of a result is an output.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -167,7 +168,7 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Values"))
     }
 
-    /// Return the numbers of the complete steps.
+    /// Return the number of the time step of each complete step (output).
     ///
     /// # Errors
     /// If the file is damaged.

@@ -31,7 +31,7 @@ pub fn render(
 }
 
 /// The side-car of a growing result. The side-car is written with the first step and updated as the result
-/// grows, so it exists even if the process is killed. For one process.
+/// grows, so it exists even if the process is killed. One rank only has and writes the side-car.
 pub struct SideCar {
     path: PathBuf,
     file_name: String,
@@ -42,7 +42,7 @@ pub struct SideCar {
     times: Vec<f64>,
     /// Number of points of each step.
     points: Vec<usize>,
-    /// Time and duration of the last write.
+    /// End and duration of the last write.
     written: Option<(Instant, Duration)>,
 }
 

@@ -100,7 +100,8 @@ impl Pixels {
 
     /// Add a point to the pixels around it.
     fn add(&mut self, point: &Point) {
-        // Every cell has at least the pixel that contains its point.
+        // The cell of a point in the drawn plane extends at least to the centre of the pixel that contains
+        // the point.
         let least = std::f64::consts::FRAC_1_SQRT_2.max(point.depth.abs());
         let [reach, inside] = [REACH, REACH_INSIDE].map(|reach| (reach * point.size).max(least));
         let range = |k: usize| {

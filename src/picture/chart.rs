@@ -441,7 +441,7 @@ impl Chart<'_> {
     }
 }
 
-/// Create a scale with at most `most` + 1 ticks, and not more than 10 ticks.
+/// Create a scale with at most n + 1 ticks, where n is `most` limited to the range from 2 to 9.
 fn scale(low: f64, high: f64, unit: &str, most: f64) -> Scale {
     let magnitude = low.abs().max(high.abs()) / (1.0 + MARGIN);
     Scale::new(low, high, unit, magnitude, (most as usize).clamp(2, 9))
@@ -623,7 +623,7 @@ mod tests {
         // A curve crosses all corners of the frame, so the legend hides a part of the curve.
         let corners = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
         let svg = chart(&[series("a", &corners), series("b", &[])]).svg();
-        // The legend avoids the corner at the top right, which only the line between the two points crosses.
+        // The legend avoids the corner at the top right, which the line between the two points crosses.
         let line = chart(&[series("a", &[[0.0, 0.0], [1.0, 1.0]]), series("b", &[])]).svg();
         let box_left = |svg: &str| -> f64 {
             let end = svg.rfind("fill=\"#ffffff\"").unwrap();

@@ -149,7 +149,7 @@ pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
 }
 
 /// Read the picked values and their units from the history in a folder; `None` for a value that is not
-/// finite.
+/// finite, or if the history has no rows.
 ///
 /// # Errors
 /// If the history cannot be read or lacks a column.

@@ -234,7 +234,8 @@ impl<'a> ResultFile<'a> {
 }
 
 /// Prepare a file for a continuation in place: truncate the file to its retained part, and set its
-/// attributes. Return false, without a change, if the file cannot be continued in place. For one rank.
+/// attributes. Return false, without a change, if the file cannot be continued in place. To be called on one
+/// rank only.
 ///
 /// # Errors
 /// If a write fails.
