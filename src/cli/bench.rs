@@ -90,8 +90,8 @@ impl Family {
     }
 }
 
-/// Largest allowed fraction of the points that touch other points. This limit keeps the cracks more than a
-/// bond length apart.
+/// Largest allowed fraction of the points that touch other points. With this limit, the distance of adjacent
+/// cracks is larger than the horizon.
 const MOST_TOUCHING: f64 = 0.25;
 
 /// Initial strain of the block along x in a benchmark with contact. The strain presses the faces of each
@@ -113,7 +113,8 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 }
 
 /// Minimum memory traffic of the motion in 3-D per point and step, bytes. Displacement, velocity and force
-/// density are read and written, the block is read, and displacement is written once more for the bond loops.
+/// density are read and written, the number of the block is read, and displacement is written once more for
+/// the bond loops.
 const MOTION_BYTES: u64 = 170;
 /// Minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the bonds. Reference
 /// position, displacement and volume are read, and the force density is read and written.

@@ -66,8 +66,8 @@ pub struct Request<'a> {
     pub path: &'a Path,
     pub deck: &'a Deck,
     pub ranks: u32,
-    /// Measure the times of a step, a history row and the outputs. In a report as text, also compute the
-    /// separation energies.
+    /// Measure the times of a force evaluation, a history row and the outputs. In a report as text, also
+    /// compute the separation energy ratios.
     measure: bool,
     /// Print the report as one line of JSON.
     json: bool,
@@ -77,7 +77,7 @@ pub struct Request<'a> {
 pub struct TimeEstimate {
     /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
-    /// First time step (s) and number of steps of each stage.
+    /// First time step (s), and number of time steps or load steps, of each stage.
     pub steps: Vec<(f64, f64)>,
     pub cost: Cost,
 }

@@ -324,7 +324,7 @@ pub fn rigid(report: &mut Report, problem: &Problem) {
     }
 }
 
-/// Append the number of bonds that each crack cuts, and the point of each probe.
+/// Append the number of bonds that each crack cuts, and the point nearest to each probe.
 pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
     if !problem.cracks.is_empty() {
         report.heading("cracks");

@@ -208,7 +208,7 @@ impl Checkpoints {
     }
 }
 
-/// Return the indices (into the names) of the existing checkpoints, in the order in which to try the files.
+/// Return the indices (into [`NAMES`]) of the existing checkpoints, in the order in which to try the files.
 fn newest_first(folder: &Path) -> Result<Vec<u8>> {
     let mut found: Vec<(Option<u64>, u8)> = Vec::new();
     for (slot, name) in (0..).zip(NAMES) {

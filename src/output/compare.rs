@@ -80,9 +80,8 @@ impl Difference {
         }
     }
 
-    /// Test whether the largest difference is at most `tolerance` times the largest absolute value of the
-    /// first result. With a tolerance of 0, all values must be bit-identical. With an infinite tolerance, the
-    /// result is always true.
+    /// Test whether the largest difference is at most `tolerance` times [`Self::scale`]. With a tolerance of
+    /// 0, all values must be bit-identical. With an infinite tolerance, any difference is allowed.
     pub fn is_within(&self, tolerance: f64) -> bool {
         self.unequal == 0
             || tolerance > 0.0
@@ -300,8 +299,9 @@ impl Outputs<'_> {
     }
 }
 
-/// Points of a block of both results. `pairs` has the points with equal ids, as indices into the block of
-/// each result. `used` is the number of points of each result that need not be considered again.
+/// A block of consecutive points of each of two results. `pairs` has the points with equal ids, as indices
+/// into the block of each result. `used` is the number of points of each block that need not be considered
+/// again.
 struct Block {
     pairs: Vec<[usize; 2]>,
     used: [usize; 2],

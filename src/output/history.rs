@@ -19,7 +19,7 @@ pub(super) const HISTORY: &str = "/history";
 pub(super) const COLUMNS: &str = "columns";
 /// Attribute with the units of the columns.
 pub(super) const UNITS: &str = "units";
-/// Separator of names and units in these attributes.
+/// Separator of the names in [`COLUMNS`] and of the units in [`UNITS`].
 pub(super) const SEPARATOR: &str = ",";
 
 /// Description of a history.

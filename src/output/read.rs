@@ -38,7 +38,8 @@ pub struct StoredField {
     pub components: usize,
     /// Number type of the stored values.
     pub number: Number,
-    /// The field has values for each step: it changes with time, or each step has its own points.
+    /// The field has values for each step, because the field changes with time or each step has its own
+    /// points.
     pub dynamic: bool,
 }
 
@@ -176,8 +177,8 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// Return the rows of a range of points at a step. `offsets` is the path of the table that has the first
-    /// row of each step.
+    /// Return the range of rows of a dataset that belong to a range of points at a step. `offsets` is the
+    /// path of the table that has the first row of each step in the dataset.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);

@@ -167,7 +167,8 @@ fn is_surrounded(directions: u8) -> bool {
 mod tests {
     use super::*;
 
-    /// Return for each pixel of a frame the number of the point whose colour it has.
+    /// Return for each pixel of a frame the number of the point whose colour the pixel has; `None` for a
+    /// pixel outside of all cells. The points are given by centre, size and depth.
     fn shown(points: &[([f64; 2], f64, f64)]) -> Vec<Option<usize>> {
         let mut pixels = Pixels::new([10, 20], [40, 30]);
         for (number, (centre, size, depth)) in (0..).zip(points) {

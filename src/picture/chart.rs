@@ -46,8 +46,8 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the square that marks an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points of a curve. The samples tell which places of the legend
-/// the curve crosses.
+/// Number of samples on each line between two points of a curve. The samples tell which of the possible
+/// places of the legend the curve crosses.
 const LINE_SAMPLES: usize = 32;
 
 /// Distance in pixels below which consecutive points of a curve are drawn as one point.
@@ -355,7 +355,8 @@ impl Chart<'_> {
             }
         }
         if self.series.len() > 1 {
-            // A line between two distant points can cross a place of the legend, so each line is sampled.
+            // A line between two distant points can cross a possible place of the legend, so each line is
+            // sampled.
             let step = |ends: &[[f64; 2]], k: usize| {
                 let share = k as f64 / LINE_SAMPLES as f64;
                 [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))

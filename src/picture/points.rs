@@ -59,9 +59,9 @@ const TOLERANCE: f64 = 0.01;
 /// Height of the strip that represents a 1-D body, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Paint the cells of points: squares in flat views, cubes in orthographic views, full-height parts of the
-/// strip in 1-D. In flat views, a later point covers an earlier point. In orthographic views, a nearer point
-/// covers a farther point.
+/// Paint the cells of points: squares in flat views, cubes in orthographic views, and in 1-D rectangles with
+/// the height of the strip. In orthographic views, a nearer point covers a farther point. In the other views,
+/// a later point covers an earlier point.
 pub fn paint(
     image: &mut Image,
     marks: impl Iterator<Item = Mark> + Clone,

@@ -31,8 +31,8 @@ impl Camera {
     /// Create a camera. The azimuth is the angle of the camera from +x towards +y, and the elevation is the
     /// angle of the camera above the x-y plane, both in degrees. Positive z points up the picture.
     pub fn new(azimuth: f64, elevation: f64) -> Self {
-        // Sine and cosine are exact for multiples of 90 degrees, so that an axis parallel to the view has
-        // exactly the projected length 0.
+        // Sine and cosine are exact for multiples of 90 degrees, so that an axis parallel to the direction of
+        // view has exactly the projected length 0.
         let turn = |degrees: f64| match degrees.rem_euclid(360.0) {
             0.0 => [0.0, 1.0],
             90.0 => [1.0, 0.0],

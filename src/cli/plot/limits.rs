@@ -136,7 +136,7 @@ impl Limits {
         Some(limits)
     }
 
-    /// Return whether there are values beyond the ends of the colour bar.
+    /// Return whether the colour bar was determined by a rule that excludes values.
     pub fn is_cut(&self) -> bool {
         self.cut != Cut::Nothing
     }
@@ -162,8 +162,8 @@ impl Limits {
         }
     }
 
-    /// Format a note about values beyond the ends of the colour bar; empty if the colour bar covers all
-    /// values.
+    /// Format a note that gives the range of all values and the rule that excludes values from the colour
+    /// bar; empty without such a rule.
     pub fn note(&self, unit: &str) -> String {
         let colours = match self.cut {
             Cut::Nothing => return String::new(),

@@ -393,7 +393,8 @@ impl<'a> Painter<'a> {
     }
 
     /// Return the limits of the drawn values; `None` without usable values. For damage, the automatic range
-    /// covers all values: the few points with damage are not outliers. For a difference, 0 is in the middle.
+    /// covers all values: the few points with damage are not outliers. For a difference, the middle of the
+    /// colour bar is 0.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
         let limits = match self.range {
             range if self.arguments.log => Limits::logarithmic(values, range),

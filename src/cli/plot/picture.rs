@@ -35,7 +35,7 @@ pub struct PictureArguments {
     )]
     pub(super) deform: String,
 
-    /// Draw only the layer of points of a solid that is nearest to this plane, such as z=0.005 (m).
+    /// Draw only the layer of points of a solid at this plane, such as z=0.005 (m).
     #[arg(long, value_name = "AXIS=POSITION")]
     pub(super) slice: Option<String>,
 

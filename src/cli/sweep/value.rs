@@ -45,7 +45,7 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// Expected number for a picked value. `name` says for which value; `None` stands for the only value of the
+/// Expected number for a picked value. `name` is this value; `None` stands for the only picked value of the
 /// sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {

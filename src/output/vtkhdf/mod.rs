@@ -4,7 +4,7 @@
 //! /                      attributes: the run (deck, version, command line, …)
 //! /VTKHDF                Version, Type = UnstructuredGrid; Points, Types, Offsets, Connectivity:
 //!                        one vertex per point, at its reference position, written once
-//! /VTKHDF/PointData/f    a field f: [points] if static, else [steps × points]; and components
+//! /VTKHDF/PointData/f    a field f: one row per point, for each step unless f is static; columns: components
 //! /VTKHDF/Steps          NSteps; Values (times), Step (numbers of time steps), and offsets of a step's rows
 //! /history               table, one row per time; attributes: columns, units, comma-separated
 //! ```
@@ -393,7 +393,7 @@ impl<'a> ResultFile<'a> {
     }
 
     /// Append rows to the history; all ranks pass the same rows. On return, the rows are in the CSV file. The
-    /// next step also flushes the rows to the result file.
+    /// next [`write_step`](Self::write_step) also flushes the rows to the result file.
     ///
     /// # Errors
     /// If there is no history, or a row has the wrong length. If a write fails, for example because the disk
