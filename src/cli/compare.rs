@@ -16,8 +16,8 @@ use super::{Verbosity, outln, print, result_file};
 /// Compare two results, for example of two versions or machines.
 ///
 /// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
-/// largest difference, its ratio to the largest value in A, and where it occurs. Attributes, which describe
-/// the run, are not compared.
+/// largest difference, its ratio to the largest absolute value in A, and where it occurs. Attributes, which
+/// describe the run, are not compared.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -38,8 +38,8 @@ pub struct CompareArguments {
     #[arg(value_name = "B")]
     second: PathBuf,
 
-    /// Allowed difference, as a fraction of the largest value of the field or column in A. NAME=VALUE applies
-    /// to the field or column NAME. May be repeated [default: 0, bit-identical].
+    /// Allowed difference, as a fraction of the largest absolute value of the field or column in A. NAME=VALUE
+    /// applies to the field or column NAME. May be repeated [default: 0, bit-identical].
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }
