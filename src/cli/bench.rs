@@ -116,9 +116,9 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 /// density are read and written, the number of the block is read, and displacement is written once more for
 /// the bond loops.
 const MOTION_BYTES: u64 = 170;
-/// Estimate of the minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the bonds.
-/// Reference position, displacement and volume are read, and the sums of the pass are read and written. The
-/// estimate assumes that these sums are four numbers.
+/// Estimate of the minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the
+/// bonds. Reference position, displacement and volume are read, and the sums of the pass are read and
+/// written. The estimate assumes that these sums are four numbers.
 const PASS_BYTES: u64 = 120;
 
 /// Parse `N` or `X,Y,Z` into the edges of a block, in points.

@@ -38,8 +38,8 @@ pub struct CompareArguments {
     #[arg(value_name = "B")]
     second: PathBuf,
 
-    /// Allowed difference, as a fraction of the largest absolute value of the field or column in A. NAME=VALUE
-    /// applies to the field or column NAME. May be repeated [default: 0, bit-identical].
+    /// Allowed difference, as a fraction of the largest absolute value of the field or column in A.
+    /// NAME=VALUE applies to the field or column NAME. May be repeated [default: 0, bit-identical].
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }

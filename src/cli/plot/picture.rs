@@ -91,7 +91,7 @@ pub struct PictureArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
-    /// Logarithmic scale of the colours. Points with values of 0 or below are grey.
+    /// Logarithmic scale of the colours. Points with values up to 0 are grey (pale blue in the map grey).
     #[arg(long)]
     pub(super) log: bool,
 
