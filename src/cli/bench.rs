@@ -56,8 +56,9 @@ impl Law {
         }
     }
 
-    /// Return the number of floating-point operations per directed bond, without those that compute ξ and
-    /// |ξ|. With `failure`, include the test for failure. See docs/src/developers/performance.md.
+    /// Return the number of floating-point operations per directed bond and step, without the operations that
+    /// compute ξ and |ξ|. With `failure`, include the test for failure. See
+    /// docs/src/developers/performance.md.
     fn operations(self, failure: bool) -> u64 {
         match self {
             Self::Pmb => 23 + u64::from(failure),
@@ -89,8 +90,8 @@ impl Family {
     }
 }
 
-/// Largest allowed fraction of the points that touch other points. This limit keeps the cracks more than a
-/// bond length apart.
+/// Largest allowed fraction of the points that touch other points. With this limit, the distance of adjacent
+/// cracks is larger than the horizon.
 const MOST_TOUCHING: f64 = 0.25;
 
 /// Initial strain of the block along x in a benchmark with contact. The strain presses the faces of each
@@ -104,17 +105,20 @@ pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
     share.ok_or_else(|| format!("must be a number, 0 to {MOST_TOUCHING}"))
 }
 
-/// Return the number of cracks across x whose faces contain the requested fraction of the points.
+/// Return the number of cracks. The cracks are normal to x, and the points on their faces are about the
+/// requested fraction of all points.
 fn cracks(arguments: &BenchArguments) -> u64 {
     let share = arguments.contact.unwrap_or(0.0);
     (0.5 * share * arguments.points[0] as f64).round() as u64
 }
 
 /// Minimum memory traffic of the motion in 3-D per point and step, bytes. Displacement, velocity and force
-/// density are read and written, the block is read, and displacement is written once more for the bond loops.
+/// density are read and written, the number of the block is read, and displacement is written once more for
+/// the bond loops.
 const MOTION_BYTES: u64 = 170;
-/// Minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the bonds. Reference
-/// position, displacement and volume are read, and the force density is read and written.
+/// Estimate of the minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the
+/// bonds. Reference position, displacement and volume are read, and the sums of the pass are read and
+/// written. The estimate assumes that these sums are four numbers.
 const PASS_BYTES: u64 = 120;
 
 /// Parse `N` or `X,Y,Z` into the edges of a block, in points.
@@ -226,7 +230,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
     // `Speed::sent_without_overlap` counts only the exchange of displacements. Laws with two passes also
-    // exchange point numbers, so the measured time is multiplied by the ratio of all bytes to these bytes.
+    // exchange point numbers, so the measured time is multiplied by this ratio: all bytes of the steps,
+    // divided by the bytes of the displacements.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let mut phases = vec![
         phase("bonds", times.forces.bonds),

@@ -66,15 +66,15 @@ pub struct Figures {
     /// Memory of all ranks by name, bytes: the memory of the processes at several times, and the stored
     /// bonds. The last entry is the peak.
     pub memory: Vec<(&'static str, f64)>,
-    /// Bytes that all ranks send per step.
+    /// Bytes that all ranks send per step in halo exchanges.
     pub halo_bytes: f64,
     /// Communication time per step that does not overlap with computation, mean over the ranks, s.
     pub messages_time: f64,
     /// Communication time per step if nothing overlaps, mean over the ranks, s.
     pub messages_time_alone: f64,
-    /// Number of messages of all ranks per step.
+    /// Number of messages that all ranks send per step in halo exchanges.
     pub messages: f64,
-    /// Largest number of messages that one rank sends per step.
+    /// Largest number of messages that one rank sends per step in halo exchanges.
     pub most_messages: f64,
     /// Number of ghosts of all ranks.
     pub ghosts: f64,
@@ -218,7 +218,7 @@ impl Figures {
         }
     }
 
-    /// Return the figures as one JSON object; the names include the unit.
+    /// Return the figures as one JSON object. The name of a figure with a unit includes this unit.
     fn json(&self) -> String {
         let mut entries = Map::new();
         let mut add =

@@ -16,10 +16,12 @@ use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
-/// Largest numbers of lattice cells, points and directed bonds for which `check` makes a dry run. A dry run
-/// of this size takes some seconds and 1 GB.
+/// Largest number of lattice cells for which `check` makes a dry run. With this number, [`MAX_POINTS`] and
+/// [`MAX_BONDS`], a dry run takes some seconds and 1 GB.
 const MAX_CELLS: f64 = 1e7;
+/// Largest number of points for which `check` makes a dry run.
 const MAX_POINTS: f64 = 2e6;
+/// Largest number of directed bonds for which `check` makes a dry run.
 const MAX_BONDS: f64 = 1.5e8;
 
 /// Validate the decks and print a report on each deck.
@@ -64,8 +66,8 @@ pub struct Request<'a> {
     pub path: &'a Path,
     pub deck: &'a Deck,
     pub ranks: u32,
-    /// Measure the times of a step, a history row and the outputs. In a report as text, also compute the
-    /// separation energies.
+    /// Measure the times of a force evaluation, a history row and the outputs. In a report as text, also
+    /// compute the separation energy ratios.
     measure: bool,
     /// Print the report as one line of JSON.
     json: bool,
@@ -75,13 +77,13 @@ pub struct Request<'a> {
 pub struct TimeEstimate {
     /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
-    /// First time step (s) and number of steps of each stage.
+    /// First time step (s), and number of time steps or load steps, of each stage.
     pub steps: Vec<(f64, f64)>,
     pub cost: Cost,
 }
 
-/// Return the report on a deck. Errors have spans (positions in the deck), which the caller converts to
-/// file and line.
+/// Return the report on a deck. An error can have a span (a position in the deck), which the caller converts
+/// to file and line.
 fn report(request: &Request) -> Result<String> {
     let problem = request.deck.problem()?;
     let ranks = request.ranks as usize;

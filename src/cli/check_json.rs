@@ -113,7 +113,8 @@ fn heading(problem: &Problem, request: &Request, is_estimate: bool) -> Map<Strin
     }))
 }
 
-/// Return the data of the deck on a body, and the computed properties of the interior of the body.
+/// Return the name, the material, the horizon and the law of a body, and the computed properties of the
+/// interior of the body.
 fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map<String, Value> {
     let elastic = body.material.elastic;
     let laws = block_laws(problem, &Block::unrefined(body));

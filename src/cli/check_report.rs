@@ -19,7 +19,8 @@ use fissure::survey::{BodyFigures, Cost, Interior, Seconds, Survey};
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
-/// Append path, title, dimension and horizon of the deck; in 1-D, also the constraint across the bar.
+/// Append the path, the title, the dimension and the horizon of the deck; in 1-D, also the condition
+/// perpendicular to the bar.
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.heading(format_args!(
         "{} is a valid deck: {}",
@@ -41,7 +42,7 @@ pub fn warnings(report: &mut Report, deck: &Deck, warnings: &[Warning]) {
     }
 }
 
-/// Append the material and the laws of a body.
+/// Append the material, the laws and the horizon of a body.
 pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     report.heading(format_args!("body {}", body.name));
     report.line("material", &body.material_name);
@@ -72,8 +73,8 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("strength", si(law.strength, "Pa"));
                 }
             }
-            // Bonds that soften are broken by their material law, without a damage law. Damage by stress has
-            // no alpha.
+            // Bonds that break at the end of their softening need no damage in the deck. `damage` then
+            // follows from the material law and has no alpha. Damage by stress has no alpha either.
             if body.damage.is_some() && damage.stress_measure().is_none() {
                 report.line("alpha", damage.alpha());
             }
@@ -176,8 +177,8 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
     }
 }
 
-/// Append the separation energy ratios of a body with energy-based damage: for opening, and for sliding if
-/// compressed bonds can break.
+/// Append the separation energy ratios of a body with energy-based damage: for opening, and in 2-D and 3-D
+/// also for sliding if compressed bonds can break.
 pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
@@ -323,7 +324,7 @@ pub fn rigid(report: &mut Report, problem: &Problem) {
     }
 }
 
-/// Append the number of bonds that each crack cuts, and the point of each probe.
+/// Append the number of bonds that each crack cuts, and the point nearest to each probe.
 pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
     if !problem.cracks.is_empty() {
         report.heading("cracks");
@@ -411,7 +412,8 @@ pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
     report.line("stable step", si(stable, "s"));
 }
 
-/// Append the first step and the number of steps of each stage.
+/// Append the first time step and the number of time steps of each explicit stage, and the number of load
+/// steps of each other stage.
 pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     let stages = problem.all_stages();
     if let ([stage], [(step, steps)]) = (&stages[..], steps) {

@@ -16,8 +16,8 @@ use super::{Verbosity, outln, print, result_file};
 /// Compare two results, for example of two versions or machines.
 ///
 /// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
-/// largest difference, its ratio to the largest value in A, and where it occurs. Attributes, which describe
-/// the run, are not compared.
+/// largest difference, its ratio to the largest absolute value in A, and where it occurs. Attributes, which
+/// describe the run, are not compared.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -38,8 +38,8 @@ pub struct CompareArguments {
     #[arg(value_name = "B")]
     second: PathBuf,
 
-    /// Allowed difference, as a fraction of the largest value of the field or column in A. NAME=VALUE applies
-    /// to the field or column NAME. May be repeated [default: 0, bit-identical].
+    /// Allowed difference, as a fraction of the largest absolute value of the field or column in A.
+    /// NAME=VALUE applies to the field or column NAME. May be repeated [default: 0, bit-identical].
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }
@@ -81,7 +81,7 @@ impl<'a> Tolerances<'a> {
         found.map_or(self.general, |(_, value)| *value)
     }
 
-    /// Check that every named tolerance refers to a field or a column.
+    /// Check that every named tolerance refers to a field or a column that both results have.
     fn check(&self, comparison: &Comparison) -> Result<()> {
         let both = || comparison.fields.iter().chain(&comparison.columns);
         for (name, _) in &self.named {
@@ -171,8 +171,8 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// Format the comparison. First list what only one result has (fields, columns, outputs, points and rows);
-/// then append a table of the fields and a table of the columns.
+/// Format the comparison: the paths of the results, the numbers of compared outputs, points and rows, a list
+/// of what only one result has, a table of the fields and a table of the columns.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,
@@ -213,7 +213,8 @@ fn report(
 /// Largest number of names in a list. Of further names, only the number is given.
 const LONGEST_LIST: usize = 8;
 
-/// Append a line with the names that only one of the results has.
+/// Append a line with the entries of `list`, such as names of fields, which only the result `name` (A or B)
+/// has. Append nothing if the list is empty.
 fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     if !list.is_empty() {
         let shown = list[..list.len().min(LONGEST_LIST)].join(", ");

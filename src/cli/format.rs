@@ -3,7 +3,7 @@
 /// Absolute value from which on values are formatted without an SI prefix.
 const TOO_LARGE: f64 = 1e16;
 
-/// Format a value with an SI prefix and its unit, such as `50.0 µs`.
+/// Format a value with four digits, an SI prefix and its unit, such as `50.00 µs`.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 9] = [
         (1e12, "T"),
@@ -53,7 +53,8 @@ pub fn count(value: u64) -> String {
     text
 }
 
-/// Format a duration (s) in its two largest units, such as `3 h 20 min`.
+/// Format a duration (s) in its two largest units, such as `3 h 20 min`. Durations below a minute are
+/// formatted in seconds with an SI prefix.
 pub fn duration(seconds: f64) -> String {
     const UNITS: [(f64, &str); 4] = [
         (31_557_600.0, "a"),

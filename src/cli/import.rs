@@ -130,7 +130,8 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     Ok(())
 }
 
-/// Return the default path of the new deck.
+/// Return the default path of the new deck: `.toml` replaces the ending of a deck of Peridigm or PeriLab,
+/// such as `.yaml`, and is appended to any other path.
 fn default_target(deck: &Path) -> PathBuf {
     let endings = ["yaml", "yml", "xml", "peridigm"];
     let ending = deck.extension().and_then(|ending| ending.to_str());

@@ -15,7 +15,8 @@ use super::{errln, finish};
 /// Number of threads that is accepted on any host, whatever its number of cores.
 const ALWAYS_ALLOWED_THREADS: usize = 64;
 
-/// Start MPI, run `body` on all ranks and finalise MPI. `body` must return the same error on all ranks.
+/// Start MPI, run `body` on all ranks and finalise MPI. If `body` returns an error on one rank, `body` must
+/// return the same error on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
     // MPI may set the launcher's environment variables even for a single process that has no launcher, so
     // read the variables before MPI starts.

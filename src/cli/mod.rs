@@ -232,7 +232,7 @@ struct DeckArguments {
 /// Measure the speed of the time loop on a fixed problem, alone or under mpirun.
 ///
 /// The problem is a cubic lattice with 122 neighbours within the horizon, a fixed time step and no output.
-/// Prints the bond updates per second and core, the time by phase, the memory of the whole process and the
+/// Prints the bond updates per second and core, the time by phase, the memory of all processes and the
 /// halo traffic. Also measures the memory bandwidth and the arithmetic rate that the same threads can
 /// reach, and prints which fractions of these limits the time loop reaches.
 /// docs/src/developers/performance.md explains the numbers.

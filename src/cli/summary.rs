@@ -53,8 +53,9 @@ pub fn print(outcome: &Outcome, threads: usize) {
     );
 }
 
-/// Phases that are omitted if their time is 0.
+/// Name of the phase of contact. This phase is omitted if its time is 0.
 const CONTACT: &str = "contact";
+/// Name of the phase of refinement and rebalancing. This phase is omitted if its time is 0.
 const REGRIDDING: &str = "other points";
 
 /// Return the names and times (s) of the phases.

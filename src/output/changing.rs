@@ -1,4 +1,5 @@
-//! Points of a result with adaptive refinement: each step has its own points.
+//! Points of a result with adaptive refinement: each step has its own points. A step is an output here, as in
+//! VTKHDF.
 
 use hdf5_metno::H5Type;
 
@@ -103,8 +104,8 @@ impl ChangingPoints {
         Ok(())
     }
 
-    /// Copy the first `rows` points, which belong to `steps` steps, from the file `old` to `file`.
-    /// Collective.
+    /// Copy the points of the first `steps` steps from the file `old` to `file`; these steps have `rows`
+    /// points in total. Collective.
     pub fn copy(
         &mut self,
         old: &mut CollectiveFile<'_>,

@@ -121,7 +121,7 @@ impl Checkpoints {
     }
 
     /// Remove existing checkpoints and a leftover temporary file, because all these files belong to another
-    /// run. For rank 0.
+    /// run. To be called on one rank only.
     ///
     /// # Errors
     /// If a file cannot be removed.
@@ -171,7 +171,8 @@ impl Checkpoints {
     }
 
     /// Find the newest intact checkpoint of the folder. Return the checkpoints of the folder, and the path of
-    /// the found checkpoint. `warn` receives a message for each damaged checkpoint. Collective.
+    /// the found checkpoint. `warn` receives a message for each damaged checkpoint that was tried before.
+    /// Collective.
     ///
     /// # Errors
     /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint,
@@ -207,7 +208,7 @@ impl Checkpoints {
     }
 }
 
-/// Return the indices (into the names) of the existing checkpoints, in the order in which to try the files.
+/// Return the indices (into [`NAMES`]) of the existing checkpoints, in the order in which to try the files.
 fn newest_first(folder: &Path) -> Result<Vec<u8>> {
     let mut found: Vec<(Option<u64>, u8)> = Vec::new();
     for (slot, name) in (0..).zip(NAMES) {

@@ -13,8 +13,8 @@ use hdf5_metno::types::VarLenUnicode;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
-/// Upper bound on the space of an object without its rows, with its attributes and its group entry, bytes.
-/// The length of texts is added.
+/// Upper bound on the space of a group or dataset with its attributes and its group entry, bytes. The rows of
+/// datasets and the texts in attributes of groups are counted separately.
 const OBJECT_BYTES: u64 = 8192;
 
 /// An HDF5 file written collectively; without MPI, a serial file.
@@ -45,7 +45,8 @@ pub struct CollectiveFile<'a> {
     comm: &'a dyn Communicator,
     no_collective_cause: u32,
     usable: bool,
-    /// Upper bound on the file's size, bytes. HDF5 reports the file's size only until the first write.
+    /// Upper bound on the file's size, bytes. This size is counted here, because HDF5 reports the file's size
+    /// only until the first write.
     size: u64,
     /// Value of `size` at the last fsync.
     synced: u64,
@@ -59,8 +60,8 @@ impl<'a> CollectiveFile<'a> {
     ///
     /// # Errors
     /// If the file exists and `creation` is exclusive, if the file cannot be created, if
-    /// [`initialise`](super::transfer::initialise) was not called before MPI, or if several ranks are
-    /// threads.
+    /// [`initialise`](super::transfer::initialise) was not called before MPI, or if there are several ranks
+    /// that are threads instead of MPI processes.
     pub fn create(path: &Path, comm: &'a dyn Communicator, creation: Creation) -> Result<Self> {
         let raw = comm.raw();
         if raw.is_some() && !transfer::initialised_before_mpi() {

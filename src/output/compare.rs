@@ -80,8 +80,8 @@ impl Difference {
         }
     }
 
-    /// Test whether the largest difference is at most `tolerance` times the largest absolute value of the
-    /// first result. With a tolerance of 0, all values must be bit-identical.
+    /// Test whether the largest difference is at most `tolerance` times [`Self::scale`]. With a tolerance of
+    /// 0, all values must be bit-identical. With an infinite tolerance, any difference is allowed.
     pub fn is_within(&self, tolerance: f64) -> bool {
         self.unequal == 0
             || tolerance > 0.0
@@ -217,7 +217,8 @@ struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// Compare some of the fields, one block of points at a time. `fields` has their indices in `comparison`.
+    /// Compare some of the fields, one block of points at a time. `fields` has the indices of these fields in
+    /// `comparison.fields`.
     fn compare(&self, fields: &[usize], comparison: &mut Comparison) -> Result<()> {
         let counts = [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]));
         let mut next = [0; 2];
@@ -298,16 +299,17 @@ impl Outputs<'_> {
     }
 }
 
-/// Points of a block of both results. `pairs` has the points with equal ids, as indices into the block of
-/// each result. `used` is the number of points of each result that need not be considered again.
+/// A block of consecutive points of each of two results. `pairs` has the points with equal ids, as indices
+/// into the block of each result. `used` is the number of points of each block that need not be considered
+/// again.
 struct Block {
     pairs: Vec<[usize; 2]>,
     used: [usize; 2],
 }
 
 impl Block {
-    /// Match two ascending lists of ids. Stop at the end of a list, unless this list is the last list of its
-    /// result.
+    /// Match two ascending lists of ids, one list of each result. Stop at the end of a list, unless `last`
+    /// says that the result has no further ids.
     fn of(ids: &[Vec<u64>; 2], last: [bool; 2]) -> Self {
         let (mut pairs, mut used) = (Vec::new(), [0; 2]);
         loop {

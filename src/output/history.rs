@@ -12,14 +12,14 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Path of the table, which has one row per sample.
+/// Path of the table. Each row has the quantities at one time.
 pub(super) const HISTORY: &str = "/history";
 
 /// Attribute with the names of the columns.
 pub(super) const COLUMNS: &str = "columns";
 /// Attribute with the units of the columns.
 pub(super) const UNITS: &str = "units";
-/// Separator of names and units in these attributes.
+/// Separator of the names in [`COLUMNS`] and of the units in [`UNITS`].
 pub(super) const SEPARATOR: &str = ",";
 
 /// Description of a history.

@@ -38,7 +38,8 @@ pub struct StoredField {
     pub components: usize,
     /// Number type of the stored values.
     pub number: Number,
-    /// The field has values for each step: it changes with time, or each step has its own points.
+    /// The field has values for each step, because the field changes with time or each step has its own
+    /// points.
     pub dynamic: bool,
 }
 
@@ -77,7 +78,8 @@ impl ResultReader {
     /// Open a result file.
     ///
     /// # Errors
-    /// If the file is missing, not a result of Fissure, locked by another program, or unreadable.
+    /// If the file is missing, not a result of Fissure, locked by another program, or unreadable, or if its
+    /// path is not UTF-8.
     pub fn open(path: &Path) -> Result<Self> {
         let problem = |text: &str| Err(Error::input(format!("{}: {text}", path.display())));
         if let Err(error) = std::fs::metadata(path) {
@@ -159,7 +161,7 @@ impl ResultReader {
         id.is_ok_and(|dataset| dataset.is_resizable())
     }
 
-    /// Return the times of the complete steps, s.
+    /// Return the times (s) of the complete steps. A step of a result is an output.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -167,7 +169,7 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Values"))
     }
 
-    /// Return the numbers of the complete steps.
+    /// Return the number of the time step of each complete step (output).
     ///
     /// # Errors
     /// If the file is damaged.
@@ -175,8 +177,8 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// Return the rows of a range of points at a step. `offsets` is the path of the table that has the first
-    /// row of each step.
+    /// Return the range of rows of a dataset that belong to a range of points at a step. `offsets` is the
+    /// path of the table that has the first row of each step in the dataset.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);

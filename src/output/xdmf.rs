@@ -1,4 +1,5 @@
-//! The XDMF 3 side-car, with which ParaView before 5.12 opens a result file.
+//! The XDMF 3 side-car, with which ParaView before 5.12 opens a result file. A step is an output here, as in
+//! VTKHDF.
 
 use super::field::FieldDescription;
 use super::read::{Number, StoredField};
@@ -31,7 +32,7 @@ pub fn render(
 }
 
 /// The side-car of a growing result. The side-car is written with the first step and updated as the result
-/// grows, so it exists even if the process is killed. For one process.
+/// grows, so it exists even if the process is killed. Only one rank has a side-car.
 pub struct SideCar {
     path: PathBuf,
     file_name: String,
@@ -42,7 +43,7 @@ pub struct SideCar {
     times: Vec<f64>,
     /// Number of points of each step.
     points: Vec<usize>,
-    /// Time and duration of the last write.
+    /// End and duration of the last write.
     written: Option<(Instant, Duration)>,
 }
 

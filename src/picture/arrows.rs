@@ -91,8 +91,8 @@ struct Root {
     depth: f64,
 }
 
-/// Return at most one root for each square cell of the picture, at distances of at least `reach`. The edge
-/// `cell` of a cell and `reach` are in pixels, and `reach` is at most `cell`.
+/// Return at most one root for each square cell of the picture. The returned roots are at least `reach` away
+/// from each other. The edge `cell` of a cell and `reach` are in pixels, and `reach` is at most `cell`.
 ///
 /// Of each cell, only the root nearest to the camera is considered; among roots of equal depth, the root
 /// nearest to the centre of the cell. This root is left out if it is too close to the root of another cell.

@@ -8,7 +8,7 @@ use super::projection::{Bounds, Projection};
 use super::scale::Scale;
 use super::scene::Axis;
 
-/// Drawing state of annotations.
+/// Picture, fonts and text size, with which rulers, labels and outlines are drawn.
 pub struct Pen<'a> {
     /// The picture.
     pub image: &'a mut Image,
@@ -26,7 +26,7 @@ pub struct Ruler<'a> {
     pub to: [f64; 2],
     /// Unit vector towards the side of the labels.
     pub outward: [f64; 2],
-    /// The ticks.
+    /// The ticks, and the unit of their labels.
     pub scale: &'a Scale,
     /// Name of the quantity.
     pub name: &'a str,

@@ -11,8 +11,9 @@ use super::points::Colouring;
 use super::projection::Projection;
 use super::scene::Mark;
 
-/// Largest distance between a point and a pixel of its cell, in edges of a cube or square with the volume of
-/// the point. In comparison, the square cells of a lattice end 0.5 to 0.71 edges away from their points.
+/// Largest distance between a point and a pixel of its cell, divided by the size of the point (the edge of a
+/// cube with the volume of the point, or in 2-D of a square with its area). In comparison, the square cells
+/// of a lattice end at 0.5 to 0.71 times this size.
 const REACH: f64 = 0.6;
 
 /// Largest distance as in [`REACH`], for pixels that have points within this distance on all sides.
@@ -54,7 +55,7 @@ struct Point {
     centre: [f64; 2],
     /// Distance of the point from the drawn plane.
     depth: f64,
-    /// Edge of a cube or square with the volume of the point.
+    /// Edge of a cube with the volume of the point, or in 2-D of a square with the area of the point.
     size: f64,
     colour: Colour,
 }
@@ -100,7 +101,8 @@ impl Pixels {
 
     /// Add a point to the pixels around it.
     fn add(&mut self, point: &Point) {
-        // Every cell has at least the pixel that contains its point.
+        // The cell of a point in the drawn plane extends at least to the centre of the pixel that contains
+        // the point.
         let least = std::f64::consts::FRAC_1_SQRT_2.max(point.depth.abs());
         let [reach, inside] = [REACH, REACH_INSIDE].map(|reach| (reach * point.size).max(least));
         let range = |k: usize| {
@@ -166,7 +168,8 @@ fn is_surrounded(directions: u8) -> bool {
 mod tests {
     use super::*;
 
-    /// Return for each pixel of a frame the number of the point whose colour it has.
+    /// Return for each pixel of a frame the number of the point whose colour the pixel has; `None` for a
+    /// pixel outside of all cells. The points are given by centre, size and depth.
     fn shown(points: &[([f64; 2], f64, f64)]) -> Vec<Option<usize>> {
         let mut pixels = Pixels::new([10, 20], [40, 30]);
         for (number, (centre, size, depth)) in (0..).zip(points) {
@@ -219,7 +222,7 @@ mod tests {
 
     #[test]
     fn gaps_between_points_are_filled_and_borders_are_not() {
-        // Points on a ring with centre (30, 35) and radius 9 pixels, with cells of 10 pixels.
+        // Points on a ring with centre (30, 35) and radius 9 pixels; the size of each point is 10 pixels.
         let ring = |directions: std::ops::Range<u32>| {
             let point = |k: u32| {
                 let (sine, cosine) = (f64::from(k) * std::f64::consts::FRAC_PI_4 + 0.1).sin_cos();

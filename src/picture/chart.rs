@@ -46,8 +46,8 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the square that marks an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points of a curve. The samples tell which places of the legend
-/// the curve crosses.
+/// Number of samples on each line between two points of a curve. The samples tell which of the possible
+/// places of the legend the curve crosses.
 const LINE_SAMPLES: usize = 32;
 
 /// Distance in pixels below which consecutive points of a curve are drawn as one point.
@@ -355,7 +355,8 @@ impl Chart<'_> {
             }
         }
         if self.series.len() > 1 {
-            // A line between two distant points can cross a place of the legend, so each line is sampled.
+            // A line between two distant points can cross a possible place of the legend, so each line is
+            // sampled.
             let step = |ends: &[[f64; 2]], k: usize| {
                 let share = k as f64 / LINE_SAMPLES as f64;
                 [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))
@@ -441,7 +442,7 @@ impl Chart<'_> {
     }
 }
 
-/// Create a scale with at most `most` + 1 ticks, and not more than 10 ticks.
+/// Create a scale with at most n + 1 ticks, where n is `most` limited to the range from 2 to 9.
 fn scale(low: f64, high: f64, unit: &str, most: f64) -> Scale {
     let magnitude = low.abs().max(high.abs()) / (1.0 + MARGIN);
     Scale::new(low, high, unit, magnitude, (most as usize).clamp(2, 9))
@@ -623,7 +624,7 @@ mod tests {
         // A curve crosses all corners of the frame, so the legend hides a part of the curve.
         let corners = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
         let svg = chart(&[series("a", &corners), series("b", &[])]).svg();
-        // The legend avoids the corner at the top right, which only the line between the two points crosses.
+        // The legend avoids the corner at the top right, which the line between the two points crosses.
         let line = chart(&[series("a", &[[0.0, 0.0], [1.0, 1.0]]), series("b", &[])]).svg();
         let box_left = |svg: &str| -> f64 {
             let end = svg.rfind("fill=\"#ffffff\"").unwrap();

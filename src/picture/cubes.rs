@@ -22,12 +22,13 @@ const SMALL_CUBE: f64 = 10.0;
 /// Largest difference in depth between pixels whose brightness is averaged, in edges of a cube.
 const SAME_SURFACE: f32 = 2.0;
 
-/// Limit of the cosine of the angle between the view and the normal of a face. Below this limit, the larger
-/// cube behind a cube extends less along this normal. The limit is half the cosine in the isometric view.
+/// Limit of the cosine of the angle between the direction of view and the normal of a face. Below this limit,
+/// the larger cube behind a cube extends less along this normal. The limit is half the cosine in the
+/// isometric view.
 const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
 
-/// Smallest cosine of the angle between the view and the normal of a painted face. Faces with a smaller
-/// cosine are almost parallel to the view.
+/// Smallest cosine of the angle between the direction of view and the normal of a painted face. Faces with a
+/// smaller cosine are almost parallel to the direction of view.
 const LEAST_COSINE: f64 = 1e-3;
 
 /// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
@@ -36,7 +37,8 @@ pub struct Cubes<'a> {
     /// Vectors in the picture, to the right and down, of edges of a cube with an edge of 1. The edges are
     /// parallel to x, y and z, and start at the corner nearest to the viewer.
     edges: [[f64; 2]; 3],
-    /// Decrease of depth along each of these edges: the cosine of the angle between the view and the axis.
+    /// Decrease of depth along each of these edges: the cosine of the angle between the direction of view and
+    /// the axis.
     cosines: [f64; 3],
     /// Enlargement along x, y and z of the larger cube behind a cube with an edge of 1.
     growth: [f64; 3],
@@ -71,8 +73,8 @@ impl<'a> Cubes<'a> {
             }),
             cosines,
             growth: cosines.map(|cosine| {
-                // A face that is almost parallel to the view comes nearer by a large distance if it moves
-                // outwards, so the cube grows less in this direction.
+                // A face that is almost parallel to the direction of view comes nearer by a large distance if
+                // it moves outwards, so the larger cube extends less along the normal of this face.
                 let is_steep = (LEAST_COSINE..STEEP_COSINE).contains(&cosine);
                 let part = if is_steep { cosine / STEEP_COSINE } else { 1.0 };
                 part * (BACKING - 1.0)
@@ -104,7 +106,7 @@ impl<'a> Cubes<'a> {
 
     /// Paint the (up to three) visible faces of a cube, and of a larger cube behind it. `centre` is the
     /// position of the centre of the cube, `depth` the depth of this centre, and `edge` the edge of the cube,
-    /// all in pixels.
+    /// all in pixels. A cube with an edge below [`LEAST_CUBE`] is painted as a square.
     pub fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
         if edge < LEAST_CUBE {
             let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));

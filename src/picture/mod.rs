@@ -248,7 +248,7 @@ fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera)
 const LEAST_RULER: f64 = 3.0;
 
 /// Draw rulers along outer edges of the box, one for each axis, and the axis triad. An axis that is almost
-/// parallel to the view has no ruler.
+/// parallel to the direction of view has no ruler.
 fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
     let view = Projection::Orthographic(camera);
     let place = |corner| layout.pixel(view.project(bounds.corner(corner)));

@@ -1,4 +1,4 @@
-//! Painting the cells of the points.
+//! Painting of points as squares or, in orthographic views, as cubes; colours of values.
 
 use super::canvas::{Colour, Image};
 use super::colours::ColourMap;
@@ -48,19 +48,20 @@ impl Colouring {
     }
 }
 
-/// Enlargement of cells on each side in the first of two passes, pixels. Without this enlargement, a small
-/// strain would open gaps between cells, because their edges are rounded to pixels.
+/// Enlargement of cells on each side in the first of the two loops of [`paint`], pixels. Without this
+/// enlargement, a small strain would open gaps between cells, because their edges are rounded to pixels.
 pub const OVERLAP: f64 = 0.5;
 
-/// Enlargement of cells on each side in the last pass, pixels. This enlargement prevents gaps that result
-/// from the round-off of positions and sizes.
+/// Enlargement of cells on each side in the second loop of [`paint`], pixels. This enlargement prevents gaps
+/// that result from the round-off of positions and sizes.
 const TOLERANCE: f64 = 0.01;
 
 /// Height of the strip that represents a 1-D body, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Paint the cells of all points. In flat views, a later point covers an earlier point. In
-/// orthographic views, a nearer point covers a farther point.
+/// Paint the cells of points: squares in flat views, cubes in orthographic views, and in 1-D rectangles with
+/// the height of the strip. In orthographic views, a nearer point covers a farther point. In the other views,
+/// a later point covers an earlier point.
 pub fn paint(
     image: &mut Image,
     marks: impl Iterator<Item = Mark> + Clone,

@@ -24,15 +24,15 @@ pub struct Camera {
     towards: [f64; 3],
 }
 
-/// A unit vector counts as parallel to the view if its projected length is below this limit.
+/// A unit vector counts as parallel to the direction of view if its projected length is below this limit.
 const ALONG_VIEW: f64 = 1e-6;
 
 impl Camera {
     /// Create a camera. The azimuth is the angle of the camera from +x towards +y, and the elevation is the
     /// angle of the camera above the x-y plane, both in degrees. Positive z points up the picture.
     pub fn new(azimuth: f64, elevation: f64) -> Self {
-        // Sine and cosine are exact for multiples of 90 degrees, so that an axis parallel to the view has
-        // exactly the projected length 0.
+        // Sine and cosine are exact for multiples of 90 degrees, so that an axis parallel to the direction of
+        // view has exactly the projected length 0.
         let turn = |degrees: f64| match degrees.rem_euclid(360.0) {
             0.0 => [0.0, 1.0],
             90.0 => [1.0, 0.0],
@@ -48,7 +48,7 @@ impl Camera {
         }
     }
 
-    /// Return the isometric view: along the diagonal from +x, −y, +z.
+    /// Return the camera of the isometric view, in the direction (1, −1, 1) from the body.
     pub fn isometric() -> Self {
         Self::new(-45.0, 0.5_f64.sqrt().atan().to_degrees())
     }
@@ -61,11 +61,11 @@ impl Camera {
     /// Return the outer edge of a box for the ruler of an axis: the corner at the low end of the edge, and
     /// the unit vector in the picture (to the right and down) that points away from the box. The corner has
     /// one entry per axis, which is true at the high end of this axis. `None` if the axis is parallel to the
-    /// view.
+    /// direction of view.
     ///
     /// An outer edge belongs to one face that the camera sees and to one face that the camera does not see.
-    /// Of the two outer edges along an axis, the ruler is at the edge that is lower in the picture, or at the
-    /// left edge if both edges are upright.
+    /// Of the two outer edges along an axis, the ruler is at the edge that is lower in the picture. If the
+    /// edges rise by more than twice their width, the ruler is at the left edge.
     pub fn outer_edge(self, axis: Axis) -> Option<([bool; 3], [f64; 2])> {
         let step = |axis: Axis| {
             let index = axis.index();
@@ -86,8 +86,8 @@ impl Camera {
         for other in axis.others() {
             let [across, down] = step(other);
             let ahead = across * outward[0] + down * outward[1];
-            // An axis parallel to the view has no end that is farther out, so take the end farthest from the
-            // camera.
+            // If the other axis is parallel to the direction of view, neither end is farther out, so take the
+            // end that is farther from the camera.
             start[other.index()] = if ahead.abs() < ALONG_VIEW {
                 self.towards[other.index()] < 0.0
             } else {

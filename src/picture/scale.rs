@@ -41,8 +41,8 @@ impl Scale {
     /// Create a logarithmic scale from `low` to `high`, both above 0.
     ///
     /// If the range contains three or more powers of ten, the ticks are at powers of ten, and there are at
-    /// most `most` (at least 2) ticks. Otherwise, the ticks are at 1, 2 and 5 times powers of ten. If there
-    /// are fewer than two such ticks, the ticks are at round numbers, at most `most + 1`.
+    /// most max(`most`, 2) ticks. Otherwise, the ticks are at 1, 2 and 5 times powers of ten. If there are
+    /// fewer than two such ticks, there are at most `most + 1` ticks at round numbers.
     pub fn logarithmic(low: f64, high: f64, unit: &str, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, high);
         let factor = 10_f64.powi(-exponent);
@@ -141,7 +141,8 @@ const PREFIXES: [(i32, &str); 10] = [
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
 /// Return the exponent of a power of ten that suits numbers up to `magnitude`, and the unit with this power:
-/// with a prefix, such as "MPa", or with a factor, such as "×10⁻³ m²", if no prefix is possible.
+/// with a prefix, such as "MPa", or with a factor, such as "×10⁻³ m²", if no prefix is possible. A unit
+/// without prefix gets no factor if `magnitude` is from 0.01 to 10⁴.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     let size = magnitude.abs();
     if !(size.is_finite() && size > 0.0) {

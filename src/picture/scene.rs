@@ -28,7 +28,7 @@ impl Axis {
         ["x", "y", "z"][self.index()]
     }
 
-    /// Return the other two axes, in order.
+    /// Return the other two axes, in the order x, y, z.
     pub fn others(self) -> [Self; 2] {
         match self {
             Self::X => [Self::Y, Self::Z],
@@ -56,8 +56,8 @@ pub enum View {
 
 /// A point cloud with values, labels and view.
 ///
-/// The shortest of `positions`, `sizes` and `values` gives the number of points. Points with non-finite
-/// positions are omitted.
+/// The shortest of `positions`, `sizes` and `values` gives the number of points. A point is omitted if one of
+/// its coordinates is not finite or has an absolute value of 10¹⁰⁰ or more.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
     /// Dimension of the body: 1, 2 or 3.
@@ -66,8 +66,8 @@ pub struct Scene<'a> {
     pub positions: &'a [[f64; 3]],
     /// Edge length of the cell of each point (m).
     pub sizes: &'a [f64],
-    /// True for each scattered point, which is drawn as a Voronoi cell in flat views. Other points are drawn
-    /// as squares. Empty if no point is scattered.
+    /// True for each scattered point; empty if no point is scattered. In flat views, a scattered point is
+    /// drawn as a Voronoi cell, and any other point as a square.
     pub scattered: &'a [bool],
     /// Value of each point, which determines the colour; a point whose value is NaN is grey, or pale blue in
     /// the grey map.

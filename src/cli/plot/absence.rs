@@ -7,12 +7,12 @@ use super::blocks::blocks;
 use super::painter::Painter;
 
 impl Painter<'_> {
-    /// Check that at least one of these outputs has points to draw. If the scale is logarithmic, at least one
-    /// drawn value must be above 0.
+    /// Check that the options `--slice`, `--clip` and `--threshold` leave points to draw in at least one of
+    /// these outputs. With `--log`, at least one drawn value must be above 0. Also check that the result to
+    /// subtract has these outputs, with the same numbers of points.
     ///
     /// # Errors
-    /// If no points are drawn although the outputs have points, if the scale is logarithmic and no drawn
-    /// value is above 0, or if the result to subtract lacks an output or has another number of points there.
+    /// If a check fails, or if the result is damaged.
     pub fn check(&self, indices: &[usize]) -> Result<()> {
         if let Some(minus) = &self.minus {
             for index in indices {

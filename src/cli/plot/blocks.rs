@@ -1,4 +1,4 @@
-//! Reading of all points of an output, one block after another.
+//! Reading of all points of an output, in blocks of consecutive points.
 
 use std::ops;
 

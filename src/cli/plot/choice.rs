@@ -8,7 +8,7 @@ use fissure::output::StoredField;
 use fissure::picture::{Axis, Camera, ColourMap, View};
 
 /// Largest distance of a requested time before the first output or after the last output, as a fraction of
-/// the interval between outputs.
+/// the first or last interval between outputs.
 const TIME_REACH: f64 = 0.5;
 
 /// Fields that are drawn by default, in order of preference.

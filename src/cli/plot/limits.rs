@@ -85,7 +85,8 @@ enum Cut {
 
 impl Limits {
     /// Return the limits of some values for a requested range; `None` without values. For [`Range::Values`],
-    /// the limits are those of all values, because the painter applies the two numbers itself.
+    /// the limits are those of all values, because the painter applies the two numbers itself. The limits are
+    /// also those of all values if the two percentiles are equal.
     pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);
@@ -117,7 +118,8 @@ impl Limits {
         })
     }
 
-    /// Return the limits of the values above 0 on a logarithmic scale; `None` if no value is above 0.
+    /// Return the limits of the values above 0 on a logarithmic scale; `None` if no value is above 0. The
+    /// automatic range covers at most [`DECADES`] decades.
     pub fn logarithmic(mut values: Vec<f64>, asked: Range) -> Option<Self> {
         values.retain(|value| *value > 0.0);
         let range = match asked {
@@ -134,7 +136,7 @@ impl Limits {
         Some(limits)
     }
 
-    /// Return whether there are values beyond the ends of the colour bar.
+    /// Return whether the colour bar was determined by a rule that excludes values.
     pub fn is_cut(&self) -> bool {
         self.cut != Cut::Nothing
     }
@@ -160,8 +162,8 @@ impl Limits {
         }
     }
 
-    /// Format a note about values beyond the ends of the colour bar; empty if the colour bar covers all
-    /// values.
+    /// Format a note that gives the range of all values and the rule that excludes values from the colour
+    /// bar; empty without such a rule.
     pub fn note(&self, unit: &str) -> String {
         let colours = match self.cut {
             Cut::Nothing => return String::new(),

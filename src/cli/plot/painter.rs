@@ -203,8 +203,8 @@ impl<'a> Painter<'a> {
         Ok(values)
     }
 
-    /// Return whether a colour bar with a linear scale starts at 0: true for damage, which is never negative,
-    /// and false for a difference of damages.
+    /// Return whether a colour bar with a linear scale starts at 0: true for damage, which is never negative;
+    /// false for a difference of damages and for all other fields.
     fn starts_at_zero(&self) -> bool {
         self.minus.is_none() && is_damage(&self.quantity.field)
     }
@@ -271,8 +271,8 @@ impl<'a> Painter<'a> {
         is_slice || !self.clips.is_empty() || self.threshold.is_some()
     }
 
-    /// Return the values of the field of `--threshold-field`; `None` without this option, because the
-    /// threshold then applies to the drawn values.
+    /// Return the values that `--threshold-field` names, of consecutive points of output `index`; `None`
+    /// without this option, because the threshold then applies to the drawn values.
     pub(super) fn threshold_values(
         &self,
         index: usize,
@@ -286,8 +286,8 @@ impl<'a> Painter<'a> {
         Ok(Some(quantity.of(values)))
     }
 
-    /// Read the points of an output, block by block. Keep only the points in the slice, in the half spaces
-    /// and in the range of the threshold.
+    /// Read the points of an output, in blocks of consecutive points to limit the memory. Keep only the
+    /// points in the slice, in the half spaces and in the range of the threshold.
     pub(super) fn points(&self, index: usize) -> Result<Points> {
         let mut found = Points::default();
         let count = self.result.points(index);
@@ -392,8 +392,9 @@ impl<'a> Painter<'a> {
         Ok(bodies.iter().map(is_scattered).collect())
     }
 
-    /// Return the limits of the drawn values. For damage, the automatic range covers all values: the few
-    /// points with damage are not outliers.
+    /// Return the limits of the drawn values; `None` without usable values. For damage, the automatic range
+    /// covers all values: the few points with damage are not outliers. For a difference, the middle of the
+    /// colour bar is 0.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
         let limits = match self.range {
             range if self.arguments.log => Limits::logarithmic(values, range),
@@ -407,8 +408,8 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return the frame of an output: the box and the limits of its drawn points; `None` if no point is
-    /// drawn. A film uses the union of the frames of its outputs.
+    /// Return the frame of an output: the box of its drawn points, the limits of their values and the longest
+    /// arrow; `None` if no point is drawn. A film uses the union of the frames of its outputs.
     ///
     /// # Errors
     /// If the result is damaged, or has too many points for a picture.

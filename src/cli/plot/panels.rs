@@ -18,7 +18,8 @@ use crate::cli::{file_error, outln, result_file};
 ///
 /// # Errors
 /// If a file is not a result, if an argument is wrong, if a result lacks the field, if the results have
-/// different dimensions or quantities, or if the picture is too narrow or cannot be written.
+/// different dimensions or quantities, if no point is drawn, or if the picture is too narrow or cannot be
+/// written.
 pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity) -> Result<()> {
     if arguments.time == "all" {
         let message = "--time all: writes a picture of each output of one result; of several results, \

@@ -11,7 +11,8 @@ pub type Line = Vec<[f64; 2]>;
 
 /// Read lines from a CSV file with columns `x` and `y` (m), named in the first row.
 ///
-/// Consecutive rows with the same value of `branch` form a line. Without this column, all rows form one line.
+/// Consecutive rows with the same entry in the column `branch` form a line. Without this column, all rows
+/// form one line.
 ///
 /// # Errors
 /// If the file cannot be read, a column is missing, or a row has an invalid number or another number of
@@ -78,7 +79,8 @@ pub struct NearestPoints<'a> {
 }
 
 impl<'a> NearestPoints<'a> {
-    /// Begin a search for the lines of several files. `files` has one entry per file: the lines of this file.
+    /// Begin the search for the points nearest to the lines of several files. `files` has one entry per file:
+    /// the lines of this file.
     pub fn new(files: &'a [Vec<Line>]) -> Self {
         let files = files.iter().enumerate();
         let lines = files.flat_map(|(number, lines)| lines.iter().map(move |line| (number, line)));

@@ -35,7 +35,7 @@ pub struct PictureArguments {
     )]
     pub(super) deform: String,
 
-    /// Draw only the layer of points of a solid that is nearest to this plane, such as z=0.005 (m).
+    /// Draw only the layer of points of a solid at this plane, such as z=0.005 (m).
     #[arg(long, value_name = "AXIS=POSITION")]
     pub(super) slice: Option<String>,
 
@@ -91,7 +91,7 @@ pub struct PictureArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
-    /// Logarithmic scale of the colours. Points with values of 0 or below are grey.
+    /// Logarithmic scale of the colours. Points with values up to 0 are grey (pale blue in the map grey).
     #[arg(long)]
     pub(super) log: bool,
 

@@ -175,8 +175,9 @@ impl Design {
         axes.iter().map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// Return the folder name of each row: the label of the row, or `row_1`, `row_2`, … if the labels are not
-    /// distinct or a label has more than [`LONGEST_NAME`] bytes.
+    /// Return the folder name of each row: the label of the row, in which `_` replaces special characters.
+    /// Return `row_1`, `row_2`, … if these names are not distinct, or if a name has more than
+    /// [`LONGEST_NAME`] bytes.
     pub fn folders(&self) -> Vec<String> {
         let safe = |c: char| c.is_ascii_alphanumeric() || "._+-=,".contains(c);
         let name = |row: &Vec<usize>| -> String {

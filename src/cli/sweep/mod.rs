@@ -144,7 +144,8 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
     design.rows.iter().zip(design.folders()).map(run).collect()
 }
 
-/// Run the chosen combinations that are not complete, and write the table and pictures of all combinations.
+/// Run the chosen combinations that are not complete; with `--overwrite`, run all chosen combinations. Write
+/// the table and pictures of all combinations.
 ///
 /// # Errors
 /// If the deck or an argument is wrong, a run fails, a file cannot be written, or a signal stops the sweep.

@@ -17,7 +17,7 @@ use crate::cli::file_error;
 /// File with the text that a run prints.
 pub const LOG: &str = "log.txt";
 
-/// File with the deck of a run and all defaults. Runs are the same if this file is the same.
+/// File with the deck of a run and all defaults. Two runs with equal files count as the same run.
 const DECK: &str = "deck_in_full.toml";
 
 /// File with the result of a run.

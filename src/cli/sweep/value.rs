@@ -45,7 +45,7 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// Expected number for a picked value. `name` says for which value; `None` stands for the only value of the
+/// Expected number for a picked value. `name` is this value; `None` stands for the only picked value of the
 /// sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
@@ -149,7 +149,7 @@ pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
 }
 
 /// Read the picked values and their units from the history in a folder; `None` for a value that is not
-/// finite.
+/// finite, or if the history has no rows.
 ///
 /// # Errors
 /// If the history cannot be read or lacks a column.

@@ -4,10 +4,12 @@
 //! /                      attributes: the run (deck, version, command line, …)
 //! /VTKHDF                Version, Type = UnstructuredGrid; Points, Types, Offsets, Connectivity:
 //!                        one vertex per point, at its reference position, written once
-//! /VTKHDF/PointData/f    a field f: [points] if static, else [steps × points]; and components
-//! /VTKHDF/Steps          NSteps; Values (times), Step (numbers), and offsets of a step's rows
-//! /history               table, one row per sample; attributes: columns, units, comma-separated
+//! /VTKHDF/PointData/f    a field f: one row per point, for each step unless f is static; columns: components
+//! /VTKHDF/Steps          NSteps; Values (times), Step (numbers of time steps), and offsets of a step's rows
+//! /history               table, one row per time; attributes: columns, units, comma-separated
 //! ```
+//!
+//! A step is an output here, as in VTKHDF.
 //!
 //! With adaptive refinement, each step is a separate VTK part. The points and static fields of all steps are
 //! then concatenated.
@@ -32,7 +34,7 @@ use std::path::Path;
 /// VTK's cell type of a single point.
 pub(super) const VTK_VERTEX: u8 = 1;
 
-/// The group of the time steps.
+/// The group of the steps (outputs).
 pub(super) const STEPS: &str = "/VTKHDF/Steps";
 
 /// Tables of the steps: name, columns, first value and counted quantity.
@@ -267,7 +269,8 @@ impl<'a> ResultFile<'a> {
         Ok(())
     }
 
-    /// Append a step: its time (s), its number and this rank's values of the moving fields.
+    /// Append an output: its time (s), the number `step` of the time step and this rank's values of the
+    /// moving fields.
     ///
     /// `values(k)` returns the values of moving field k. The step has been flushed when this method returns.
     ///
@@ -351,7 +354,8 @@ impl<'a> ResultFile<'a> {
         Ok(())
     }
 
-    /// Allocate space for a total number of steps, and fill the tables whose values are known in advance.
+    /// Allocate space for a total number of steps, and fill the tables whose values are known in advance. Do
+    /// nothing if each step has its own points.
     fn allocate_steps(&mut self, steps: u64) -> Result<()> {
         if steps <= self.capacity || self.changing.is_some() {
             return Ok(());
@@ -389,7 +393,7 @@ impl<'a> ResultFile<'a> {
     }
 
     /// Append rows to the history; all ranks pass the same rows. On return, the rows are in the CSV file. The
-    /// next step also flushes the rows to the result file.
+    /// next [`write_step`](Self::write_step) also flushes the rows to the result file.
     ///
     /// # Errors
     /// If there is no history, or a row has the wrong length. If a write fails, for example because the disk
@@ -407,7 +411,7 @@ impl<'a> ResultFile<'a> {
         self.file.no_collective_cause()
     }
 
-    /// Close the file. Free unused space, unless the run `will_resume`.
+    /// Close the file. Free unused space, unless the run will be resumed (`will_resume`).
     ///
     /// # Errors
     /// If this or an earlier operation fails, for example because the disk is full.
@@ -434,7 +438,7 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Truncate datasets to the given numbers of rows. For one rank.
+/// Truncate datasets to the given numbers of rows. The file must be open on one rank only.
 fn truncate(file: &mut CollectiveFile<'_>, lengths: &[(String, u64)]) -> Result<()> {
     for (path, rows) in lengths {
         let mut dataset = file.open_dataset(path)?;

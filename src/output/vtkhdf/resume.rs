@@ -162,8 +162,8 @@ impl<'a> ResultFile<'a> {
         finished
     }
 
-    /// Create the file `part` with the first steps of an old file. `times` (s) and `numbers` belong to these
-    /// steps.
+    /// Create the file `part` with the first steps of an old file. `times` (s) and `numbers` are the times
+    /// and the time step numbers of these steps.
     fn copy(
         old: &mut CollectiveFile<'a>,
         part: &Path,
@@ -195,8 +195,8 @@ impl<'a> ResultFile<'a> {
         result.record_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
     }
 
-    /// Write the times (s) and the numbers of the copied steps, and the number of steps. `points` has the
-    /// number of points of each step.
+    /// Write the times (s), the time step numbers (`numbers`) and the count of the copied steps. `points` has
+    /// the number of points of each copied step.
     fn record_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
         for ((time, number), points) in times.iter().zip(numbers).zip(points) {
             append_one(&mut self.file, &mut self.numbers, *number)?;
@@ -233,8 +233,9 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Prepare a file for a continuation in place: truncate the file to its retained part, and set its
-/// attributes. Return false, without a change, if the file cannot be continued in place. For one rank.
+/// Prepare a file for a continuation in place: truncate the times, the time step numbers and the history to
+/// the retained rows, and set the attributes. Return false, without a change, if the file cannot be continued
+/// in place. To be called on one rank only.
 ///
 /// # Errors
 /// If a write fails.
