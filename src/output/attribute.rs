@@ -19,6 +19,16 @@ pub enum Attribute<'a> {
     Ascii(&'a str),
 }
 
+impl Attribute<'_> {
+    /// Return the length of a text of any length, bytes; 0 for other values.
+    pub(super) fn text_length(self) -> u64 {
+        match self {
+            Self::Text(text) => text.len() as u64,
+            Self::Integer(_) | Self::Integers(_) | Self::Ascii(_) => 0,
+        }
+    }
+}
+
 /// Write an attribute; an existing attribute must have the same type and length.
 pub(super) fn set_attribute(
     object: &hdf5::Location,

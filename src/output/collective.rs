@@ -14,7 +14,7 @@ use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
 /// Upper bound on the space of a group or dataset with its attributes and its group entry, bytes. The rows of
-/// datasets and the texts in attributes of groups are counted separately.
+/// datasets and the texts in attributes are counted separately.
 const OBJECT_BYTES: u64 = 8192;
 
 /// An HDF5 file written collectively; without MPI, a serial file.
@@ -178,9 +178,7 @@ impl<'a> CollectiveFile<'a> {
     /// # Errors
     /// If the group is missing or the attribute cannot be written.
     pub fn set_attribute(&mut self, group: &str, name: &str, value: Attribute) -> Result<()> {
-        if let Attribute::Text(text) = value {
-            self.size += text.len() as u64;
-        }
+        self.size += value.text_length();
         let doing = format!("cannot write the attribute {name} of {group}");
         self.collectively(&doing, |file| {
             set_attribute(&*file.inner.group(group)?, name, value)
@@ -197,6 +195,7 @@ impl<'a> CollectiveFile<'a> {
         name: &str,
         value: Attribute,
     ) -> Result<()> {
+        self.size += value.text_length();
         let doing = format!("cannot write the attribute {name} of {}", dataset.path);
         self.collectively(&doing, |_| set_attribute(&dataset.inner, name, value))
     }

@@ -140,10 +140,7 @@ impl Table {
         } else {
             path.to_path_buf()
         };
-        let is_csv = path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
-        let columns = if is_csv {
+        let columns = if is_csv(&path) {
             read_csv(&path)?
         } else {
             ResultReader::open(&path)?.history()?
@@ -174,6 +171,12 @@ impl Table {
             ))
         })
     }
+}
+
+/// Test whether the name of a file ends with `.csv`, in lower or upper case.
+pub fn is_csv(path: &Path) -> bool {
+    let ending = path.extension();
+    ending.is_some_and(|ending| ending.eq_ignore_ascii_case("csv"))
 }
 
 /// Read a CSV file whose first row has names with units, such as `time [s]`.

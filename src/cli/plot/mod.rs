@@ -85,7 +85,7 @@ pub struct PlotArguments {
 /// If a file is not a result, an argument is wrong, the field, component or column is missing, or a picture
 /// cannot be written.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
-    let is_table = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "csv");
+    let is_table = |path: &PathBuf| curves::is_csv(path);
     let curves = !arguments.y.is_empty() || arguments.results.iter().any(is_table);
     if curves {
         return curves::plot(arguments, verbosity);
