@@ -226,7 +226,7 @@ impl<const D: usize> Kernel<D> for Stress {
     }
 }
 
-/// Kernel that sums [`Law::bond_stress_across`] over the intact bonds, Pa.
+/// Kernel that sums [`Law::bond_stress_across`] times ω Ṽ over the intact bonds, Pa.
 #[derive(Clone, Copy)]
 pub struct StressAcross {
     /// Law of point i.
@@ -330,7 +330,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
 /// (m⁵). The second sum is Σ ω|ξ|eṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
-    /// Whether ε is linear in η.
+    /// Whether e is linear in η.
     pub is_linear: bool,
 }
 

@@ -13,7 +13,8 @@ const SHORT_RANGE: f64 = 1.35;
 /// Upper limit of the contact distance of short-range forces, as a fraction of the reference distance.
 const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
 
-/// Stiffness of short-range forces relative to the bonds of a bond-based law (Macek & Silling 2007).
+/// Ratio of the stiffness of short-range forces to the stiffness of the bonds of a bond-based law (Macek &
+/// Silling 2007).
 const SHORT_RANGE_STIFFNESS: f64 = 15.0;
 
 /// Damping ratio of two points that stick by friction.

@@ -333,8 +333,9 @@ impl RigidBody {
     }
 
     /// Contribution of a point to the step limits; `None` if the point does not touch the body and will not
-    /// touch the body within a time (s) at its present approach speed. For a gap of more than the edge of the
-    /// point's cell, the result is `None` at any velocity.
+    /// touch the body within a time (s) at its present approach speed. The gap is the distance of the point
+    /// from the surface minus half the edge of the point's cell. If the gap exceeds the edge, the result is
+    /// `None` at any velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -375,8 +376,8 @@ impl RigidBody {
         Vector3::from(self.state.velocity) + spin.cross(&arm)
     }
 
-    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre; 0 for a driven
-    /// body.
+    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre, with the mass m
+    /// of the body and its moment of inertia I about any axis; 0 for a driven body.
     pub fn mobility(&self, reach: f64) -> f64 {
         if self.mass == 0.0 {
             return 0.0;

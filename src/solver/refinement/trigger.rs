@@ -36,9 +36,9 @@ const MOST_PLACES: f64 = 1e4;
 /// Check that a run supports the refinement of its problem.
 ///
 /// # Errors
-/// If the horizon contains too many spacings, or if loads or temperatures act on sets given by ids or by
-/// groups of meshes. If refinement is triggered during the run, also if strengths scatter, or if the run has
-/// load steps or an adaptive step.
+/// If the horizon contains too many spacings, if initial values are read from a file, or if loads or
+/// temperatures act on sets given by ids or by groups of meshes. If refinement is triggered during the run,
+/// also if strengths scatter, or if the run has load steps or an adaptive step.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
