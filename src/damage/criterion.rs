@@ -149,7 +149,7 @@ pub struct Ends<'a, L, P> {
     pub points: [&'a P; 2],
     /// Data of points i and j that only criteria read.
     pub limits: [&'a Limits; 2],
-    /// Influence times volume correction of the bonds.
+    /// Influence function times volume correction of the bonds.
     pub weights: Weights,
 }
 

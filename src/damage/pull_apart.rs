@@ -46,7 +46,7 @@ fn quadrature(dimension: i32, influence: Influence) -> [f64; 2] {
     let mut points = 0.0;
     for i in 0..DISTANCES {
         let distance = middle(i, DISTANCES);
-        // Per bond: the opening Δ at which it breaks for s0 = 1, ω r cos φ dV, and ω r² dV.
+        // Per bond of length r: the opening Δ at which the bond breaks for s0 = 1, ω r cos φ dV, and ω r² dV.
         let mut crossing = Vec::with_capacity((LENGTHS * ANGLES) as usize);
         for j in 0..LENGTHS {
             let r = distance + (1.0 - distance) * middle(j, LENGTHS);

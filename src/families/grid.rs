@@ -1,5 +1,5 @@
-//! The layout of the local points of a regular grid in memory: the neighbours at the same offset of points
-//! adjacent along x are adjacent in memory.
+//! The layout of the local points of a regular grid in memory. Points adjacent along x are adjacent in
+//! memory, and so are their neighbours at the same offset.
 //!
 //! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its

@@ -75,7 +75,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// Reduction of the lanes of a sum to one value per point.
+/// Operation that combines the lanes of a sum, and the sum and a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
     /// Sum.

@@ -410,7 +410,8 @@ impl RigidBody {
 /// Return `rotation`, followed by a rotation with an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
-    // (1 + ½ Δt ω) q needs no sine; the error of the angle is of third order in Δt.
+    // The result is (1 + ½ Δt w) q with the angular velocity w and the quaternion q of `rotation`. It needs
+    // no sine; the error of its angle is of third order in Δt.
     let turn = Quaternion::from_parts(1.0, half);
     UnitQuaternion::new_normalize(turn * rotation.quaternion())
 }

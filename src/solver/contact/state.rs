@@ -21,7 +21,7 @@ pub(super) struct StepDemand {
     /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
     /// squares of the angular frequencies.
     pub stiffness: f64,
-    /// Largest 2 Σ c/m, 1/s.
+    /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
     /// Number of consecutive steps that could have been longer.
     calm: u64,

@@ -103,8 +103,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if it has been
-    /// outside the horizons of triggering points and of points with broken bonds for the time in the deck.
-    /// Return the numbers of created and removed points; `None` if the grids do not change. Collective.
+    /// outside the horizons of triggering points and of points with broken bonds for the time
+    /// `coarsen_after`. Return the numbers of created and removed points; `None` if the grids do not change.
+    /// Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little

@@ -131,7 +131,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Select nodes to refine at the points within the horizon of a triggering point. Select nodes to coarsen
     /// at refined points that have been outside the horizons of triggering points, and of points with broken
-    /// bonds, for the time in the deck. Collective.
+    /// bonds, for the time [`Trigger::coarsen_after`]. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
         let pick = |block, position| self.grids.refining(block, position);
