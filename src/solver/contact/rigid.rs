@@ -170,7 +170,7 @@ impl RigidBody {
         })
     }
 
-    /// Advance to a time (s) by a step (s). A free body gets half a kick first.
+    /// Advance to a time (s) by a step (s). A free body first gets the first half kick of the step.
     pub fn drift(&mut self, time: f64, step: f64) {
         match &self.problem.motion {
             RigidMotion::Driven(displacement) => {
@@ -219,8 +219,8 @@ impl RigidBody {
     }
 
     /// Finish a step (s) that ends at a time (s): store the forces that the points exert, record the work of
-    /// these forces, and apply the second half kick. `sums` are the values of [`WrenchSums::flat`] over all
-    /// ranks.
+    /// these forces and of the prescribed force, and apply the second half kick. `sums` are the values of
+    /// [`WrenchSums::flat`] over all ranks.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
