@@ -37,7 +37,7 @@ pub enum Criterion {
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
     /// stress measures of its acting ends.
     Stress(f64, StressRule),
-    /// Same as [`Self::Stress`], with the smaller strength of points i and j.
+    /// Same as [`Self::Stress`], with the smaller stress threshold of points i and j.
     StressThresholds(StressRule),
 }
 

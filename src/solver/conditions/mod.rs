@@ -515,14 +515,14 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Compute the force densities of the loads that are due, see [`Load::is_due`].
+    /// Compute the force densities of the loads that are due, see `Load::is_due`.
     pub fn find_loads(&mut self) {
         for load in &mut self.on.loads {
             load.find(self.all.loads);
         }
     }
 
-    /// Update the external forces if any load is due, see [`Load::is_due`].
+    /// Update the external forces if any load is due, see `Load::is_due`.
     pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
         if !self.all.loads.iter().any(|load| load.is_due) {
             return;
