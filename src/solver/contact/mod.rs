@@ -237,7 +237,8 @@ impl<const D: usize> Contact<D> {
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
     /// friction and damping from the velocities in the middle of the step, and record the energy that they
     /// dissipate. Also apply the second half kick of rigid bodies. An evaluation that does not end a step
-    /// does not change friction and damping. If a position is not finite, nothing is added. Collective.
+    /// does not change friction and damping. If points can touch each other and a position is not finite,
+    /// nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
