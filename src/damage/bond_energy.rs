@@ -1,9 +1,9 @@
 //! Energy criterion: a bond breaks irreversibly when the work of its force states reaches w_c. By default
 //! only stretched bonds break.
 //!
-//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work on a linear bond is
-//! w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the plane, with the
-//! thickness h, G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
+//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. For force states that are linear
+//! in η, the work is w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the
+//! plane, with the thickness h, G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
 
 use std::f64::consts::PI;
 
@@ -35,7 +35,8 @@ pub enum Calibration {
 pub struct BondEnergy {
     /// Critical work w_c, J/m⁶.
     pub critical: f64,
-    /// α: effect of the smallest stretch of a point on the threshold of this point.
+    /// Factor α of the smallest stretch s_min of a point's intact bonds in the threshold of this point, see
+    /// [`Self::threshold`].
     pub alpha: f64,
     /// Critical stretch s0 for the same fracture energy; the threshold depends on α s_min/s0.
     pub stretch: f64,

@@ -24,10 +24,10 @@ pub enum Criterion {
     /// of both blocks, 0 for a block without critical stretch. A law that scales thresholds scales only these
     /// critical stretches, not the part of the threshold with α.
     Thresholds([f64; 2], Directions),
-    /// Same as [`Self::Stretch`], for critical stretches that belong to different horizons; ∞ for a block
-    /// without critical stretch.
+    /// Same as [`Self::Stretch`], with a separate critical stretch of each block; ∞ for a block without
+    /// critical stretch.
     StretchBetween([f64; 2], StretchConversion),
-    /// Same as [`Self::Thresholds`], for critical stretches that belong to different horizons.
+    /// Same as [`Self::Thresholds`], for thresholds that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
     /// Bonds break when the work of the force states of the acting ends reaches the sum of the shares of
     /// these ends in the critical work. The numbers are the shares of points i and j, J/m⁶.
@@ -37,30 +37,32 @@ pub enum Criterion {
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
     /// stress measures of its acting ends.
     Stress(f64, StressRule),
-    /// Same as [`Self::Stress`], with the smaller strength of points i and j.
+    /// Same as [`Self::Stress`], with the smaller stress threshold of points i and j.
     StressThresholds(StressRule),
 }
 
 /// Factors w_c/w of the critical work by direction, at points i and j; see [`ToughnessByDirection`]. `None`
-/// if both bodies have the same fracture energy in all directions. The factors multiply work thresholds;
+/// if the fracture energy of neither body depends on the direction. The factors multiply work thresholds;
 /// their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold or a stretch threshold to another horizon. Entry `[e][k]` converts
-/// the threshold of point k to the horizon of end e. All entries are 1 if both horizons are equal.
+/// the threshold of point k to the horizon of end e; the factor between equal horizons is 1.
 pub type HorizonRatios = [[f64; 2]; 2];
 
-/// Critical stretch of a bond between points whose critical stretches belong to different horizons.
+/// Conversion of the critical stretches of points i and j to the critical stretch of their bond, for ends
+/// with different horizons or different damage laws.
 ///
-/// An end e acts on the bond if the bond is within the horizon of e. The energy of this end is then ½ k_e s²
-/// |ξ|, with the stiffness k_e.
-/// If only end e acted, the bond would break at the stretch m_e = min_k t_k √(δ_k/δ_e), with the critical
-/// stretch t_k and the horizon δ_k of point k.
+/// An end e acts on the bond if the bond is within the horizon of e. The energy of the bond at this end is
+/// then ½ k_e s² |ξ|, with the stiffness k_e.
+/// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k, with the critical stretch
+/// t_k of point k and the factor r_ek of [`Self::ratios`].
 /// The bond breaks when the energies of the acting ends add up to the sum of their energies at the stretches
 /// m_e: s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
-    /// Entry `[e][k]` is √(δ_k/δ_e).
+    /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. r_ek is 1 if
+    /// t_k holds for any horizon, and ∞ if t_k does not limit m_e.
     pub ratios: HorizonRatios,
     /// Stiffnesses k_e, in any unit.
     pub stiffness: [f64; 2],
@@ -78,7 +80,8 @@ impl StretchConversion {
         ((critical_i * critical_i * k_i + critical_j * critical_j * k_j) / (k_i + k_j)).sqrt()
     }
 
-    /// Return a lower bound on the critical stretch of all bonds.
+    /// Return a lower bound on the critical stretches of all bonds, from the critical stretches of points i
+    /// and j.
     #[inline(always)]
     fn smallest(self, [i, j]: [f64; 2]) -> f64 {
         let of_end = |[from_i, from_j]: [f64; 2]| (i * from_i).min(j * from_j);
@@ -146,7 +149,7 @@ pub struct Ends<'a, L, P> {
     pub points: [&'a P; 2],
     /// Data of points i and j that only criteria read.
     pub limits: [&'a Limits; 2],
-    /// Influence times volume correction of the bonds.
+    /// Influence function times volume correction of the bonds.
     pub weights: Weights,
 }
 
@@ -250,7 +253,8 @@ impl Criterion {
         }
     }
 
-    /// Return one bit per bond that breaks; `work` (J/m⁶) is read only if [`Self::reads_work`].
+    /// Return one bit per bond, set if the bond meets the criterion. `work` (J/m⁶) is read only if
+    /// [`Self::reads_work`].
     #[inline(always)]
     pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
         &self,
@@ -410,9 +414,10 @@ impl WorkRule {
         self.family_correction > 0.0
     }
 
-    /// Return the critical work of bonds (J/m⁶) from the shares of points i and j in untruncated families;
-    /// only acting ends count. The sum is written out, because array methods are not always inlined. Without
-    /// inlining, all data of a bond stay in memory instead of registers.
+    /// Return the critical work of bonds (J/m⁶): the sum of the [corrected](Self::corrected) shares of the
+    /// acting ends. `i` and `j` are the shares of points i and j without this correction. The sum is written
+    /// out, because array methods are not always inlined. Without inlining, all data of a bond stay in memory
+    /// instead of registers.
     #[inline(always)]
     fn sum_of_acting<S: Simd, L, P>(
         self,
@@ -426,8 +431,8 @@ impl WorkRule {
         critical_i + critical_j
     }
 
-    /// Return the share of an end in the critical work (J/m⁶), from the share of this end in an untruncated
-    /// family.
+    /// Return the share of an end in the critical work (J/m⁶), corrected by [`Self::family_correction`].
+    /// `critical` is the share without this correction.
     #[inline(always)]
     fn corrected(self, critical: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {

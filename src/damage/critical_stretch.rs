@@ -20,13 +20,14 @@ use super::pull_apart::pull_apart;
 pub struct CriticalStretch {
     /// Critical stretch s0.
     pub critical: f64,
-    /// α: effect of the smallest stretch of a point on the threshold of this point.
+    /// Factor α of s_min in the threshold f s0 − α s_min of a point.
     pub alpha: f64,
 }
 
 impl CriticalStretch {
     /// Return s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio of
-    /// bond-based laws. In the table, c is the micromodulus of `pmb`, and A the cross-section (m²).
+    /// bond-based laws. In the table, K is the bulk modulus and E Young's modulus (Pa), c is the micromodulus
+    /// of `pmb`, and A the cross-section (m²).
     ///
     /// | dimension | s0 | source |
     /// |---|---|---|
@@ -154,8 +155,8 @@ mod tests {
 
     #[test]
     fn all_bonds_across_a_line_cost_the_fracture_energy() {
-        // Plane stress, per unit crack length and thickness: 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w ξ dφ dξ dz
-        // with w = c s0² ξ / 2, by the midpoint rule.
+        // Plane stress with the thickness h = 1, per area of the crack: 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w ξ dφ
+        // dξ dz with w = c s0² ξ / 2, by the midpoint rule.
         let glass = Isotropic {
             youngs_modulus: 72e9,
             poisson_ratio: 1.0 / 3.0,

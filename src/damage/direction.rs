@@ -5,9 +5,9 @@
 //!
 //! w_c(n) = w (p + q c^k).
 //!
-//! w is the critical work in an isotropic body with the fracture energy of cracks along a. Cracks along a
-//! have a normal perpendicular to a; cracks across a have the normal a. If cracks across a have the larger
-//! fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
+//! Cracks along a have a normal perpendicular to a; cracks across a have the normal a. w is the critical work
+//! of an isotropic body whose fracture energy equals the fracture energy of cracks along a. If cracks across
+//! a have the larger fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
 //!
 //! A crack with the normal N breaks all bonds that cross its plane. Its fracture energy is proportional to
 //! the mean of w_c(n) over all directions n with the weight |n·N|. The mean of c^k is a product over j = 1 …
@@ -31,7 +31,7 @@ use crate::lanes::{LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 
 /// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, the few
-/// tough bonds hold the faces of cracks together.
+/// bonds with a large critical work hold the faces of cracks together.
 const MOST_SQUARINGS: u32 = 1;
 
 /// Minimum of p.

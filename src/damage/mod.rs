@@ -28,8 +28,8 @@ pub enum DamageLaw {
 }
 
 impl DamageLaw {
-    /// Return the critical stretch, the critical work (J/m⁶) or the strength (Pa), without the effects of α
-    /// and of scatter.
+    /// Return the critical stretch, the critical work (J/m⁶) or the strength (Pa), without the effects of
+    /// [α](Self::alpha) and of scatter.
     pub fn critical(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.critical,
@@ -38,8 +38,8 @@ impl DamageLaw {
         }
     }
 
-    /// α: effect of the smallest stretch of a point on the threshold of this point; 0 for the stress
-    /// criterion.
+    /// Factor α of the smallest stretch of a point's intact bonds in the threshold of this point; 0 for the
+    /// stress criterion. See [`CriticalStretch::threshold`] and [`BondEnergy::threshold`].
     pub fn alpha(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.alpha,

@@ -23,7 +23,8 @@ const LENGTHS: u32 = 64;
 /// Number of angles φ per bond length in the quadrature of τ.
 const ANGLES: u32 = 64;
 
-/// Return b and τ in G0 = δ s0² (A b + κ τ), in `dimension` 2 or 3. The relative error of τ is about 10⁻³.
+/// Return b and τ in G0 = δ s0² (A b + κ τ), in two or three dimensions. The relative error of τ is about
+/// 10⁻³.
 ///
 /// The quadrature takes tens of milliseconds, so each result is stored for later calls.
 pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
@@ -45,7 +46,7 @@ fn quadrature(dimension: i32, influence: Influence) -> [f64; 2] {
     let mut points = 0.0;
     for i in 0..DISTANCES {
         let distance = middle(i, DISTANCES);
-        // Per bond: the opening at which it breaks for s0 = 1, ω r cos φ dV, and ω r² dV.
+        // Per bond of length r: the opening Δ at which the bond breaks for s0 = 1, ω r cos φ dV, and ω r² dV.
         let mut crossing = Vec::with_capacity((LENGTHS * ANGLES) as usize);
         for j in 0..LENGTHS {
             let r = distance + (1.0 - distance) * middle(j, LENGTHS);

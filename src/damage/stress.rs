@@ -94,8 +94,8 @@ pub(super) struct MeanStress {
 }
 
 impl MeanStress {
-    /// Copy the stress measures of points i and j (Pa), and for points i and j the bits of the bonds within
-    /// the horizon of the point.
+    /// Copy the stress measures of points i and j (Pa), and two masks of bonds: the bonds within the horizon
+    /// of point i, and the bonds within the horizon of point j.
     #[inline(always)]
     pub(super) fn new<S: Simd>(simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Self {
         Self {

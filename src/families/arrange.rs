@@ -7,10 +7,11 @@ use crate::partition::Domain;
 
 use super::grid::GridFrame;
 
-/// Number of lines per tile in y and in z; a tile and its neighbours fit in the cache.
+/// Number of lines per tile in y and in z. The points are sorted tile by tile; the points of a tile and their
+/// neighbours fit in the cache.
 const TILE: i64 = 8;
 
-/// A sort record of a grid point.
+/// Local index and sort keys of a grid point.
 #[derive(Clone, Copy)]
 struct GridPoint {
     cell: [i64; 3],

@@ -23,8 +23,8 @@ pub enum Fault {
         blocks: [usize; 2],
         /// Estimated number of neighbours; `None` if it is not known.
         neighbours: Option<f64>,
-        /// Ratio of the horizon to the spacing of the neighbours; `None` if the neighbours do not lie on a
-        /// lattice, or if the neighbours in all blocks were counted.
+        /// Ratio of the longest bond to the spacing of the neighbours; `None` if the neighbours in all blocks
+        /// were counted.
         spacings: Option<f64>,
     },
     /// Bonds that do not fit in memory.

@@ -1,4 +1,4 @@
-//! The families of a rank: lattices for two blocks on the same grid, lists for all others.
+//! The families of a rank: lattices for pairs of blocks on the same grid, lists for all other pairs.
 
 use std::sync::Arc;
 

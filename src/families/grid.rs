@@ -1,4 +1,5 @@
-//! The layout of the local points of a regular grid: adjacent points have adjacent neighbours.
+//! The layout of the local points of a regular grid in memory. Points adjacent along x are adjacent in
+//! memory, and so are their neighbours at the same offset.
 //!
 //! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
@@ -51,9 +52,9 @@ struct Run {
 /// A line of slots.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
-    /// Band, y and z.
+    /// Number of the band, and y and z of the cells.
     pub(super) at: [i64; 3],
-    /// x of the first slot.
+    /// x of the cell of the first slot.
     pub(super) first: i64,
     /// The first slot.
     pub(super) start: usize,
@@ -69,7 +70,7 @@ pub(super) struct Line {
 pub struct Grid {
     /// Origin, spacing and blocks of the grid.
     pub frame: GridFrame,
-    /// The lines by band, then z, then y.
+    /// The lines, sorted by band, then by z, then by y.
     pub(super) lines: Vec<Line>,
     /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
@@ -124,8 +125,8 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // Width of the padding. In each line of a band, the slot of any x of the band, plus or minus the
-        // longest bond, must be in bounds, even if the line does not contain this x.
+        // Width of the padding. A line is extended to all x of its band, and by the longest bond at both
+        // ends. The slots of the extended line must be in bounds.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];

@@ -41,8 +41,8 @@ pub struct BondLattice {
     vectors: Vec<Vector>,
     /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
-    /// Shift for each line of the grid and each line offset: the difference between the slots of points with
-    /// equal x in both lines.
+    /// Shift for each line of the grid and each line offset. The shift is added to the slot of a point in the
+    /// line, and gives the slot at the same x in the line at this offset.
     shifts: Vec<i32>,
     /// State of the bonds: a group of eight bonds for each lane group and offset.
     pub(super) store: Store,
@@ -241,8 +241,8 @@ impl BondLattice {
         &self.store.intact[vector * count..(vector + 1) * count]
     }
 
-    /// Call `visit(group, lane, [i, j])` as [`Self::for_each`] does, for each set bit of `bits`: the bits of
-    /// the bonds of the lane group with index `vector`, one byte per offset.
+    /// Call `visit(group, lane, [i, j])` as [`Self::for_each`] does, for each set bit of `bits`. `bits` has
+    /// one byte per offset, with one bit per bond of the lane group with index `vector`.
     fn for_each_of(
         &self,
         bits: impl Iterator<Item = u8>,
@@ -265,7 +265,8 @@ impl BondLattice {
         }
     }
 
-    /// Index of the lane group whose [`Self::points_of`] contain a point; `None` if there is none.
+    /// Index of the lane group whose [`Self::points_of`] contain a point; `None` if no lane group contains
+    /// the point.
     fn vector_of(&self, point: usize) -> Option<usize> {
         let k = self.vectors_below(point + 1).checked_sub(1)?;
         (point < self.points_of(k).end).then_some(k)

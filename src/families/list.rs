@@ -21,8 +21,8 @@ pub struct BondList {
     pub(super) points: Vec<u32>,
     /// Index of the first group of each row, followed by the total number of groups.
     pub(super) starts: Vec<usize>,
-    /// Local indices of the neighbours, sorted by global id in each row. Index i pads the last group of
-    /// a row.
+    /// Local indices of the neighbours, sorted by global id in each row. The local index of the row's point
+    /// pads the last group of the row.
     pub(super) neighbours: Neighbours,
     /// State of the bonds; the intact bits of padding are clear.
     pub(super) store: Store,
@@ -207,7 +207,7 @@ impl BondList {
         }
     }
 
-    /// Call `visit(j)` with the local index of every intact neighbour of a point.
+    /// See [`super::BlockBonds::for_each_neighbour`].
     pub fn for_each_neighbour(&self, point: usize, visit: &mut impl FnMut(usize)) {
         let Ok(row) = self.points.binary_search(&(point as u32)) else {
             return;
@@ -246,7 +246,7 @@ impl BondList {
         }
     }
 
-    /// Write a row to a checkpoint: for each group the intact bits, then the history.
+    /// Write a row to a checkpoint: group after group, each with its intact bits and then its history.
     pub fn save_row(&self, row: usize, bytes: &mut [u8]) {
         let width = self.store.history_bytes_per_bond();
         let groups = self.starts[row]..self.starts[row + 1];

@@ -1,8 +1,9 @@
 //! Families: the bonds between points.
 //!
-//! Bonds are stored per ordered pair of blocks, so one law applies to all bonds of a [`BlockBonds`].
-//! Lists are sorted by global id, lattices by offset. Therefore the sum over the bonds of a point has the
-//! same order of operations on any number of ranks.
+//! Bonds are stored per ordered pair of blocks, so all bonds ij of a [`BlockBonds`] have the same law at
+//! point i, and the same law at point j. The bonds of a point are sorted by the global id of the neighbour in
+//! lists, and by offset in lattices. Therefore the sum over the bonds of a point has the same order of
+//! operations on any number of ranks.
 
 mod arrange;
 mod fault;
@@ -52,7 +53,8 @@ macro_rules! with {
 }
 
 impl BlockBonds {
-    /// The blocks of i (the points that sum over these bonds) and of j.
+    /// Indices of two blocks: the block of the points i, which sum over these bonds, and the block of the
+    /// points j.
     pub fn blocks(&self) -> [usize; 2] {
         with!(self, bonds => [bonds.block_i, bonds.block_j])
     }
@@ -84,14 +86,14 @@ impl BlockBonds {
         with!(self, bonds => bonds.for_each_intact(visit));
     }
 
-    /// Call `visit(j)` with the local index of every intact neighbour of an owned point.
+    /// For each intact bond of an owned point, call `visit(j)` with the local index of the neighbour j.
     pub fn for_each_neighbour(&self, point: usize, visit: &mut impl FnMut(usize)) {
         with!(self, bonds => bonds.for_each_neighbour(point, visit));
     }
 
     /// The range of owned points whose bonds are computed together with the bonds of a point. In a lattice,
-    /// these are the points of its lane group, up to the last point with bonds. In a list, the range contains
-    /// this point only.
+    /// these are the points of its lane group, up to the last point with bonds. In a list, or for a point
+    /// without bonds, the range contains this point only.
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,

@@ -184,7 +184,7 @@ impl Group<'_> {
         }
     }
 
-    /// A base index and the eight offsets from it.
+    /// A base index, and the differences of the eight indices from the base index.
     #[inline(always)]
     pub fn base_and_offsets(self) -> (usize, [usize; WIDTH]) {
         match self {

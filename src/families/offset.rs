@@ -17,7 +17,7 @@ pub struct Offset {
     pub inverse_square: f64,
     /// [Weights](crate::material::bond::Weights) of the ends i and j.
     pub weights: [f64; 2],
-    /// Steps along x.
+    /// Number of steps of the offset along x.
     pub(super) x: i32,
     /// Index of the line offset (the steps along y and z).
     pub(super) line: u32,
@@ -30,8 +30,8 @@ pub(super) fn steps(cutoff: f64, spacing: f64, extent: f64) -> i64 {
     (cutoff / spacing).floor().min(limit) as i64
 }
 
-/// Estimate the largest number of neighbours within `cutoff` (m) on a lattice with these edges of the cells
-/// (m) and `cells` cells per direction.
+/// Estimate the largest number of neighbours within `cutoff` (m) on a lattice. `spacing` are the edges of the
+/// cells (m), and `cells` is the number of cells per direction.
 pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimension: usize) -> f64 {
     use std::f64::consts::PI;
     let reach = |k: usize| cutoff / spacing[k];

@@ -37,8 +37,9 @@ struct Order {
     local: Vec<u32>,
     /// Position in this order of the first point of each block, followed by the number of points.
     first: Vec<u32>,
-    /// Bins of the points of each block, by index relative to the block's first point. Each block has
-    /// separate bins, so points without bonds to the block do not search these points.
+    /// Bins of the points of each block. The bins contain indices in this order, counted from the block's
+    /// first point. Each block has separate bins, so the neighbour search of a point skips the blocks to
+    /// which the point has no bonds.
     bins: Vec<Bins>,
 }
 
@@ -97,7 +98,7 @@ struct Chunk {
 }
 
 /// Build the bond lists of a domain. `cutoffs` is the symmetric `blocks` × `blocks` matrix of longest
-/// bonds, m.
+/// bonds, m; 0 for a pair of blocks without bonds.
 ///
 /// # Errors
 /// If two points coincide, a point has too many neighbours, or memory is insufficient.

@@ -71,7 +71,7 @@ impl Store {
         }
     }
 
-    /// Copy the state that a step can change, for [`Self::undo`].
+    /// Copy the state that a step can change to `saved`, for [`Self::undo`].
     pub fn keep(&self, saved: &mut (Vec<u8>, Vec<Lanes>)) {
         saved.0.clone_from(&self.intact);
         saved.1.clone_from(&self.history);

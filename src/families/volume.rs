@@ -129,8 +129,8 @@ impl CellShare {
         }
     }
 
-    /// The table entry of an offset, and the offset in quarters of the edge; `None` if the table does not
-    /// contain it.
+    /// The table entry of an offset, and the offset in quarters of the edge; `None` if the table has no entry
+    /// for the offset.
     #[inline]
     fn multiple(&self, offset: [f64; 3]) -> Option<(&AtomicU64, [i64; 3])> {
         let quarters = offset.map(|x| x.abs() * self.per_resolution / QUARTER as f64);

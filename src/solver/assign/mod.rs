@@ -1,4 +1,4 @@
-//! Laws, failure criteria and weights of every family, from the problem.
+//! Laws, failure criteria and weights of the bonds between all pairs of blocks, from the problem.
 
 mod possible;
 
@@ -274,8 +274,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
 }
 
 /// Failure criterion of the bonds between two blocks, from the damage of both blocks; see [`Criterion`]. A
-/// block without damage sets no threshold. `ends` are the indices of both blocks. `per_point` says whether
-/// thresholds are stored per point.
+/// block without damage sets no threshold. `ends` are the indices of both blocks, and `of_ends` are the data
+/// of the ends of the bonds in these blocks. `per_point` says whether thresholds are stored per point.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],

@@ -11,9 +11,13 @@ use crate::problem::{
 /// of bodies.
 ///
 /// # Errors
-/// If a law does not support the dimension of the problem, or the damage, the thermal expansion or a horizon
-/// of a body; or if the bonds of a pair of bodies cannot have the damage of the pair. Most of these errors
-/// are found earlier, when the deck is read.
+/// - If a law does not support the dimension of the problem, or the damage, the thermal expansion or a
+///   horizon of a body.
+/// - If the damage of a body is incompatible with another setting, or with the damage of another body to
+///   which bonds may join this body.
+/// - If the bonds of a pair of bodies cannot have the damage of the pair.
+///
+/// Most of these errors are found earlier, when the deck is read.
 pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     for body in &problem.bodies {
         let law = &body.material.law;
@@ -128,7 +132,7 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
 /// Return an error if three conditions are met:
 ///
 /// - the material has thermal expansion;
-/// - its law has no potential (as with plasticity or softening);
+/// - the law of the material has no potential (as with plasticity or softening);
 /// - the strain perpendicular to the plane or bar is 0.
 ///
 /// The inelastic strain then depends on the stress in this direction, which the law does not compute.

@@ -28,14 +28,14 @@ pub struct Broken<const D: usize> {
     pub point: usize,
     /// Number of bonds of the point that broke.
     pub count: u64,
-    /// Energy that the point loses, J: its part of the energy of the broken bonds, and the change of its
+    /// Energy that the point loses, J: its part of the energy of the broken bonds, plus the decrease of its
     /// remaining energy.
     pub energy: f64,
     /// The point's part of the overshoot energy of the broken bonds, J: the energy of a bond above its
     /// criterion when it breaks.
     pub overshoot: f64,
-    /// Force density that the point loses, N/m³: the forces of the broken bonds, and the change of the forces
-    /// of other bonds.
+    /// Force density that the point loses, N/m³: the forces of the broken bonds, plus the decrease of the sum
+    /// of the forces of its other bonds.
     pub force: [f64; D],
 }
 
@@ -113,8 +113,8 @@ impl<const D: usize> Forces<D> {
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Recompute the point numbers of a range of points. Record the energy that the points lose by this
-    /// change, without the energy that plastic flow dissipates.
+    /// Recompute the point numbers of a range of points. Record the energy that points with broken bonds lose
+    /// by this change, without the energy that plastic flow dissipates.
     fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
         // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);
@@ -158,7 +158,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Send the new point numbers to the ranks with ghosts of these points. `own` are the owned points with
-    /// new point numbers. Return the owned points whose forces may change; points may occur twice.
+    /// new point numbers. Return the owned points whose forces may change; points may occur several times.
     /// Collective.
     fn send_numbers(
         &mut self,

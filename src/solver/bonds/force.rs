@@ -50,7 +50,7 @@ pub struct Force<L> {
     pub laws: [L; 2],
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether bond weights are values of the influence function instead of volume fractions.
+    /// Whether the weights of the bonds contain no volume correction, but only the influence function.
     pub influence: bool,
     /// Changes of the bond state.
     pub bond_update: BondUpdate,
@@ -74,8 +74,8 @@ impl<L> Force<L> {
     }
 
     /// Return the work of the force states of each bond, J/m⁶. `total` is the result of [`Self::weighted`].
-    /// Volume fractions do not reduce the work. The force state of a point does no work beyond the horizon of
-    /// the point. The result is 0 if the criterion does not read the work.
+    /// The volume correction does not reduce the work. The force state of a point does no work beyond the
+    /// horizon of the point. The result is 0 if the criterion does not read the work.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,
@@ -126,8 +126,8 @@ impl<L> Force<L> {
         }
     }
 
-    /// Return a bit for each bond that breaks by its history. Only the histories of ends that act on the bond
-    /// count.
+    /// Return one bit per bond, set if the bond breaks by its history. Only the histories of ends that act on
+    /// the bond count.
     #[inline(always)]
     fn worn_out<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> u8
     where
@@ -142,7 +142,7 @@ impl<L> Force<L> {
         law_i.is_worn_out(simd, history_i) & acts_i | law_j.is_worn_out(simd, history_j) & acts_j
     }
 
-    /// Return a bit for each bond that breaks.
+    /// Return one bit per bond, set if the bond breaks.
     #[inline(always)]
     fn breaks<S: Simd, const D: usize>(
         &self,

@@ -15,7 +15,7 @@ pub struct Interaction {
     pub laws: PairLaw,
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether bond weights are values of the influence function instead of volume fractions.
+    /// Whether the weights of the bonds contain no volume correction, but only the influence function.
     pub influence: bool,
 }
 
@@ -26,15 +26,15 @@ pub struct BlockLaws {
     pub law: AnyLaw,
     /// Damage law of the block; `None` for a block without damage.
     pub damage: Option<DamageLaw>,
-    /// Whether the law also breaks bonds by their history.
+    /// Whether the material law breaks bonds by their history.
     pub wears_out: bool,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
     /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
     /// all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Data of the block's points that criteria read for bonds to other bodies, if the pair of bodies has a
-    /// separate damage law.
+    /// Selection of the data of the block's points that the criteria of bonds to other bodies read. Only
+    /// pairs of bodies with a separate damage law count.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
@@ -42,8 +42,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Data of points that failure criteria read for bonds between two bodies with a separate damage law for
-/// these bonds.
+/// Selection of the point data that the failure criteria of bonds between two bodies read, for bodies with a
+/// separate damage law for these bonds.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.
@@ -75,7 +75,8 @@ impl BlockLaws {
         self.damage.is_some() || self.pairs.breaks || self.wears_out
     }
 
-    /// Whether thresholds differ between points and are stored per point.
+    /// Whether thresholds are stored per point, because they depend on scatter, on the direction of bonds or
+    /// on the smallest stretch.
     pub fn has_thresholds(&self) -> bool {
         self.weibull.is_some() || self.direction.is_some() || self.follows_smallest_stretch()
     }

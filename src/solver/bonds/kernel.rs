@@ -19,7 +19,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     /// Factor from force states to the force density: V_j/(1 + a), m³, where a is the thermal stretch of
     /// the bond.
     pub force_volume: Lanes,
-    /// Influence function or volume fraction of the bonds at each end.
+    /// Weights of the bonds at each end: influence function times volume correction.
     pub weights: Weights,
     /// Point numbers of points i.
     pub own: &'a K::Point,
@@ -35,11 +35,11 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub rotation_j: K::Rotation,
     /// Bond history for point i and for point j.
     pub history: [K::BondHistory; 2],
-    /// A bit for each bond that is intact.
+    /// One bit per bond, set if the bond is intact.
     pub intact: u8,
-    /// A bit for each bond, including broken bonds; only with [`Kernel::READS_BROKEN`].
+    /// One bit per lane, set if the lane has a bond, intact or broken; only with [`Kernel::READS_BROKEN`].
     pub whole: u8,
-    /// A bit for each bond that can break.
+    /// One bit per bond, set if the bond can break.
     pub breakable: u8,
 }
 
@@ -64,7 +64,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         }
     }
 
-    /// Multiply a quantity of each bond by V_j and the weight of point i.
+    /// Multiply a quantity of each bond by V_j and by the weight at point i.
     #[inline(always)]
     pub fn weighted_by_volume(&self, share: Lanes) -> Lanes {
         let share = share * self.volume;
@@ -75,7 +75,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// Reduction of the lanes of a sum to one value per point.
+/// Operation that combines the lanes of a sum, and the sum and a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
     /// Sum.
@@ -86,7 +86,8 @@ pub enum Combine {
 
 /// A sum over the bonds of points.
 pub trait Kernel<const D: usize>: Copy + Sync {
-    /// Sums, eight lanes per quantity. Each quantity is added to one column of the points.
+    /// Sums, eight lanes per quantity. Each quantity has one column over the points, with which its sums are
+    /// combined; see [`Self::COMBINE`].
     type Sums: LaneTuple;
 
     /// Sums over the bonds that break in this sweep, eight lanes per quantity. A sweep returns these sums
@@ -108,7 +109,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
 
-    /// Reduction of the lanes of the kernel's sums.
+    /// Operation that combines the sums with the columns, and the lanes of a sum if they belong to one point.
     const COMBINE: Combine = Combine::Add;
 
     /// Instruction sets for which the kernel's loops are compiled. The default, one version, is enough for
@@ -119,7 +120,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// [`Criterion::limit`]. x is defined in [`crate::material::bond`].
     const HAS_FAST_PATH: bool = false;
 
-    /// Whether to load a bit for each bond, including broken bonds.
+    /// Whether to load [`Group::whole`], which has the bits of intact and broken bonds.
     const READS_BROKEN: bool = false;
 
     /// Whether the kernel's criterion can read stresses of points i and j.
@@ -128,7 +129,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Quantities of the deformed bonds to compute.
     const WANTED: Wanted;
 
-    /// Whether the law is known only at run time. The compiler then does not know whether bonds are linear.
+    /// Whether the law is known only at run time. The compiler then does not know whether the law is linear.
     const ANY_LAW: bool = false;
 
     /// Whether the bonds have a linear law, see [`Bond`].
@@ -137,7 +138,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::WANTED.linear
     }
 
-    /// Return [`Self::WANTED`]. With [`Self::ANY_LAW`], `is_linear` says whether the bonds are linear.
+    /// Return [`Self::WANTED`]. With [`Self::ANY_LAW`], `is_linear` says whether the law of the bonds is
+    /// linear.
     #[inline(always)]
     fn wanted(is_linear: bool) -> Wanted {
         let mut wanted = Self::WANTED;
@@ -188,8 +190,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// May change the bond history.
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
 
-    /// Whether bonds within the series limit can neither break nor change their history. [`Self::add_fast`]
-    /// may then skip the criterion.
+    /// Whether bonds within the series limit (see [`Self::HAS_FAST_PATH`]) can neither break nor change their
+    /// history. [`Self::add_fast`] may then skip the criterion.
     #[inline(always)]
     fn may_skip_criterion(&self) -> bool {
         true

@@ -21,7 +21,7 @@ pub struct LimitsRead {
 }
 
 impl LimitsRead {
-    /// Collect the data that the damage laws of the blocks and of pairs of bodies read, in `D` dimensions.
+    /// Find out which data the damage laws of the blocks and of pairs of bodies read, in `D` dimensions.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());

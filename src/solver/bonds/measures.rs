@@ -140,8 +140,8 @@ fn add_tensor<S: Simd, const D: usize>(
 
 /// Kernel that sums D = Σ V_j C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
 /// zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both ends. An end whose law
-/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times I instead of
-/// n⊗n.
+/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times the
+/// identity I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -226,7 +226,7 @@ impl<const D: usize> Kernel<D> for Stress {
     }
 }
 
-/// Kernel that sums [`Law::bond_stress_across`] over the intact bonds, Pa.
+/// Kernel that sums [`Law::bond_stress_across`] times ω Ṽ over the intact bonds, Pa.
 #[derive(Clone, Copy)]
 pub struct StressAcross {
     /// Law of point i.
@@ -330,7 +330,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
 /// (m⁵). The second sum is Σ ω|ξ|eṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
-    /// Whether ε is linear in η.
+    /// Whether e is linear in η.
     pub is_linear: bool,
 }
 

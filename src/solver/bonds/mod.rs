@@ -59,7 +59,8 @@ pub use measure::Stored;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
 
-/// Maximum number of points for which sums over undeformed families are computed at once, to limit memory.
+/// Number of points for which sums over undeformed families are computed at once, to limit memory. The number
+/// is rounded up to whole lane groups.
 const FAMILY_SUMS: usize = 1 << 16;
 
 /// A sum over the bonds.
@@ -381,7 +382,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Call `found` with the local index of every intact neighbour of an owned point.
+    /// For each intact bond of an owned point, call `found(j)` with the local index of the neighbour j.
     pub fn for_each_neighbour(&self, point: usize, mut found: impl FnMut(usize)) {
         for interaction in &self.interactions {
             interaction.bonds.for_each_neighbour(point, &mut found);

@@ -19,7 +19,7 @@ pub struct StressInputs<'a, 'b, const D: usize> {
     pub blocks: &'a [BlockLaws],
     /// Plastic states of the owned points.
     pub plastic: &'a PlasticColumns<'b>,
-    /// Thermal stretches of the owned points; `None` in runs without temperatures.
+    /// Thermal stretches of the local points; `None` in runs without temperatures.
     pub thermal_stretch: Option<&'a [f64]>,
 }
 

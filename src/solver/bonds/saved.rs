@@ -19,7 +19,8 @@ impl<const D: usize> Forces<D> {
         lengths
     }
 
-    /// Serialize the bonds of all owned points, in the order of the points.
+    /// Serialize the bonds of all owned points, in the order of the points. `lengths` is the result of
+    /// [`Self::saved_lengths`].
     pub fn saved(&self, lengths: &[u32]) -> Vec<u8> {
         let (mut next, total) = starts(lengths);
         let mut bytes = vec![0; total];
@@ -54,7 +55,7 @@ impl<const D: usize> Forces<D> {
     }
 }
 
-/// Offset of each point's bytes, and the total number of bytes.
+/// Index of the first byte of each point, and the total number of bytes.
 fn starts(lengths: &[u32]) -> (Vec<usize>, usize) {
     let mut end = 0;
     let starts = lengths

@@ -1,7 +1,7 @@
 //! Running a kernel over the bonds of two blocks, on all threads.
 //!
-//! Each task owns some of the bonds and the results of their points, so no locks or atomics are needed. The
-//! sum of each point is the same sequence of operations for any division into tasks.
+//! Each task owns the bonds of some points i and the results of these points, so no locks or atomics are
+//! needed. The sum of each point is the same sequence of operations for any division into tasks.
 
 use std::ops::Range;
 
@@ -77,6 +77,7 @@ trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
     /// Run the kernel over a part; `base` is the local index of the point of the first entry of the results.
+    /// Return the sums over breaking bonds, by ascending point.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -93,8 +94,8 @@ trait Runner<P: Part>: Sync {
 /// over all owned points. Return the sums over breaking bonds, by ascending point.
 ///
 /// # Panics
-/// If an array that the kernel reads is too short for the bonds, or if the kernel is not implemented in `D`
-/// dimensions.
+/// If an array that the kernel reads is too short for the bonds, if the point data of a lattice belong to
+/// another grid, or if the kernel is not implemented in `D` dimensions.
 pub fn sweep<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,

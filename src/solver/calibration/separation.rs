@@ -39,7 +39,8 @@ const CHECK_INTERVAL: u32 = 20;
 ///
 /// - the body has no fracture energy, or is on no lattice;
 /// - the law or the damage of the body is not possible, or bonds break by stress;
-/// - the families are too large;
+/// - the families are too large, so the block would have more than `MAX_BONDS` bonds;
+/// - the simulation of the block cannot be set up;
 /// - the block does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;

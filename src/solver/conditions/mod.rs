@@ -54,10 +54,10 @@ pub struct OnPart<const D: usize> {
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// ½ (f₀ + f)·(u − u₀) V.
+    /// ½ (f₀ + f)·(u − u₀) V, with the present f and u.
     Trapezoid,
-    /// At the first of several equilibria: for supports, ½ (f₀ + f₁)·(u₁ − u₀) V; for loads, ½ (f₀ − f₁)·(u₁
-    /// − u₀) V.
+    /// At the first of several equilibria: for supports, ½ (f₀ + f₁)·(u₁ − u₀) V; for loads,
+    /// ½ (f₀ − f₁)·(u₁ − u₀) V.
     FirstEquilibrium,
     /// At the last of several equilibria: for supports, 0; for loads, f₁·(u₂ − u₀) V.
     LastEquilibrium,
@@ -296,8 +296,8 @@ impl<const D: usize> Conditions<D> {
         Ok(conditions)
     }
 
-    /// Add a load on some of the owned points, in ascending order. `fractions` are the fractions of the points
-    /// on which the load acts; `None` if all are 1.
+    /// Add a load on `points`, ascending local indices of owned points. The load acts on the fraction
+    /// `fractions[k]` of the point `points[k]`; `None` if all fractions are 1.
     fn add_load(
         &mut self,
         model: &Model<D>,
@@ -398,10 +398,10 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sum a weight over some owned points, for each condition with loads in this stage. `weight` is a
-    /// function of the local index of a point and of the force of the load on this point (N). `points` are
-    /// the sorted local indices of the points. Returns the indices of the conditions, and the sums of this
-    /// rank.
+    /// For each condition with loads in this stage, sum `weight(point, force)` over those of `points` on
+    /// which the loads act. `points` are sorted local indices of owned points. The arguments of `weight` are
+    /// the local index of a point and the force of a load on this point (N). Returns the indices of the
+    /// conditions, and the sums of this rank.
     pub fn load_sums(
         &self,
         model: &Model<D>,
@@ -428,9 +428,10 @@ impl<const D: usize> Conditions<D> {
         (conditions, sums)
     }
 
-    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) without work in the
-    /// trapezoidal rule. The sum has two parts: loads that act for one step on points at rest, and supported
-    /// components with prescribed velocity and acceleration.
+    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) and that the work
+    /// of the trapezoidal rule does not contain. The terms are upper estimates: for a load, the
+    /// energy that it gives points at rest in one step; for a supported component, the energy of its
+    /// velocity, and the energy that its prescribed acceleration gives a point at rest in one step.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density f of a point
     /// jumps, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without bound
@@ -514,14 +515,14 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Compute the force densities of the loads that may have changed.
+    /// Compute the force densities of the loads that are due, see `Load::is_due`.
     pub fn find_loads(&mut self) {
         for load in &mut self.on.loads {
             load.find(self.all.loads);
         }
     }
 
-    /// Update the external forces if any load may have changed.
+    /// Update the external forces if any load is due, see `Load::is_due`.
     pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
         if !self.all.loads.iter().any(|load| load.is_due) {
             return;

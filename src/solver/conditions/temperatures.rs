@@ -24,7 +24,7 @@ pub struct Heated {
 #[derive(Default)]
 pub struct Temperatures {
     each: Vec<Temperature>,
-    /// The time (s) of the last [`Self::set_time`].
+    /// The time (s) of the last [`Self::set_time`]; `None` before the first call and after [`Self::reset`].
     time: Option<f64>,
     /// Whether [`Self::apply`] must set the temperatures of the points.
     is_due: bool,

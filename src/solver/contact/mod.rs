@@ -51,14 +51,14 @@ pub use state::ContactState;
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Look-ahead, in steps. The stable step includes pairs that will touch within this time, so the step is
-/// shortened before they touch.
+/// Look-ahead: number of steps. The stable step takes account of pairs that will touch within these steps, so
+/// the step is shortened before they touch.
 const LOOK_AHEAD: f64 = 2.0;
 
 /// Contact on one rank.
 pub struct Contact<const D: usize> {
     dimension: Dimension,
-    /// Rule of each pair of blocks in both orders, row-major; `None` for blocks without contact.
+    /// Rule of each pair of blocks in both orders, row-major; `None` for pairs without contact.
     rules: Vec<Option<PairRule>>,
     /// Number of blocks.
     blocks: usize,
@@ -78,7 +78,8 @@ pub struct Contact<const D: usize> {
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
-    /// Whether the lists of pairs and their bonded flags must be rebuilt; the same on all ranks.
+    /// Whether the lists of pairs must be rebuilt, including the flags that mark pairs joined by an intact
+    /// bond; the same on all ranks.
     is_stale: bool,
     /// Limits that contact sets for the time step.
     demand: StepDemand,
@@ -236,7 +237,8 @@ impl<const D: usize> Contact<D> {
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
     /// friction and damping from the velocities in the middle of the step, and record the energy that they
     /// dissipate. Also apply the second half kick of rigid bodies. An evaluation that does not end a step
-    /// does not change friction and damping. If a position is not finite, nothing is added. Collective.
+    /// does not change friction and damping. If points can touch each other and a position is not finite,
+    /// nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,

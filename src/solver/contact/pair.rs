@@ -13,10 +13,11 @@ const SHORT_RANGE: f64 = 1.35;
 /// Upper limit of the contact distance of short-range forces, as a fraction of the reference distance.
 const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
 
-/// Stiffness of short-range forces relative to the bonds of a bond-based law (Macek & Silling 2007).
+/// Ratio of the stiffness of short-range forces to the stiffness of the bonds of a bond-based law (Macek &
+/// Silling 2007).
 const SHORT_RANGE_STIFFNESS: f64 = 15.0;
 
-/// Damping ratio of two points that stick by friction.
+/// Damping ratio of a contact that sticks by friction.
 const STICKING: f64 = 0.5;
 
 /// Contact rule for the points of two blocks.
@@ -38,7 +39,7 @@ pub(super) struct PairRule {
 pub(super) struct Response {
     static_friction: f64,
     kinetic_friction: f64,
-    /// Damping ratio of a collision of two points.
+    /// Damping ratio of a collision of two points, or of a point and a rigid body.
     damping_ratio: f64,
 }
 

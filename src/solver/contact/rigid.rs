@@ -170,7 +170,7 @@ impl RigidBody {
         })
     }
 
-    /// Advance to a time (s) by a step (s). A free body gets half a kick first.
+    /// Advance to a time (s) by a step (s). A free body first gets the first half kick of the step.
     pub fn drift(&mut self, time: f64, step: f64) {
         match &self.problem.motion {
             RigidMotion::Driven(displacement) => {
@@ -219,8 +219,8 @@ impl RigidBody {
     }
 
     /// Finish a step (s) that ends at a time (s): store the forces that the points exert, record the work of
-    /// these forces, and apply the second half kick. `sums` are the values of [`WrenchSums::flat`] over all
-    /// ranks.
+    /// these forces and of the prescribed force, and apply the second half kick. `sums` are the values of
+    /// [`WrenchSums::flat`] over all ranks.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
@@ -333,8 +333,9 @@ impl RigidBody {
     }
 
     /// Contribution of a point to the step limits; `None` if the point does not touch the body and will not
-    /// touch the body within a time (s) at its present approach speed. For a gap of more than the edge of the
-    /// point's cell, the result is `None` at any velocity.
+    /// touch the body within a time (s) at its present approach speed. The gap is the distance of the point
+    /// from the surface minus half the edge of the point's cell. If the gap exceeds the edge, the result is
+    /// `None` at any velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -375,8 +376,8 @@ impl RigidBody {
         Vector3::from(self.state.velocity) + spin.cross(&arm)
     }
 
-    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre; 0 for a driven
-    /// body.
+    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre, with the mass m
+    /// of the body and its moment of inertia I about any axis; 0 for a driven body.
     pub fn mobility(&self, reach: f64) -> f64 {
         if self.mass == 0.0 {
             return 0.0;
@@ -409,7 +410,8 @@ impl RigidBody {
 /// Return `rotation`, followed by a rotation with an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
-    // (1 + ½ Δt ω) q needs no sine; the error of the angle is of third order in Δt.
+    // The result is (1 + ½ Δt w) q with the angular velocity w and the quaternion q of `rotation`. It needs
+    // no sine; the error of its angle is of third order in Δt.
     let turn = Quaternion::from_parts(1.0, half);
     UnitQuaternion::new_normalize(turn * rotation.quaternion())
 }

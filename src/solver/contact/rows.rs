@@ -14,7 +14,7 @@ pub(super) struct Rows {
     others: Vec<u32>,
     /// Id of the other point of each pair.
     ids: Vec<u64>,
-    /// Whether an intact bond joins the two points of each pair. Such a pair has no contact.
+    /// Whether an intact bond joins the two points of each pair. A pair with such a bond has no contact.
     is_bonded: Vec<bool>,
 }
 

@@ -1,4 +1,4 @@
-//! Search of pairs that may touch, and of the bonds that exclude pairs from contact.
+//! Search for pairs that may touch, and for the bonds that exclude pairs from contact.
 
 use rayon::prelude::*;
 

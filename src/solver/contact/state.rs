@@ -12,16 +12,16 @@ use super::rigid::RigidState;
 const CALM: u64 = 100;
 
 /// Limits that contact sets for the time step, over all ranks. The limits include contacts that will begin
-/// within the next two steps (`LOOK_AHEAD`). k is the stiffness of a contact (N/m), and c is the damping coefficient of a
-/// contact (N s/m). 1/m is the inverse mass of a point, or the [mobility](super::rigid::RigidBody::mobility)
-/// of a rigid body (1/kg).
+/// within the look-ahead (`LOOK_AHEAD` steps). k is the stiffness of a contact (N/m), and c is the damping
+/// coefficient of a contact (N s/m). 1/m is the inverse mass of a point, or the
+/// [mobility](super::rigid::RigidBody::mobility) of a rigid body (1/kg).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
     /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
     /// squares of the angular frequencies.
     pub stiffness: f64,
-    /// Largest 2 Σ c/m, 1/s.
+    /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
     /// Number of consecutive steps that could have been longer.
     calm: u64,
@@ -32,7 +32,7 @@ pub(super) struct StepDemand {
 pub struct ContactState {
     rigid: Vec<RigidState>,
     demand: StepDemand,
-    /// Owned points of this rank that touch a rigid body or will do so within the look-ahead.
+    /// Owned points of this rank that touch a rigid body or will do so within the look-ahead (`LOOK_AHEAD`).
     at_rigid: Vec<u32>,
 }
 
@@ -86,7 +86,8 @@ impl<const D: usize> Contact<D> {
         self.at_rigid[0].clone_from(&state.at_rigid);
     }
 
-    /// Whether contact limits the step, at present or within the look-ahead.
+    /// Whether present contacts, or contacts that will begin within the look-ahead (`LOOK_AHEAD`), limit the
+    /// step.
     pub fn is_felt(&self) -> bool {
         self.demand.stiffness > 0.0
     }

@@ -87,8 +87,8 @@ impl Facets {
         any
     }
 
-    /// Whether the line segment between two positions (m) crosses a facet of `near`. For the line of a bond, `near`
-    /// must be the result of [`Self::near`] for one of its ends.
+    /// Whether the line segment between two positions (m) crosses a facet of `near`. For a bond, `near` must
+    /// be the result of [`Self::near`] for one of its ends.
     pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);
         facets.any(|facet| facet.is_crossed(from, to))
@@ -105,7 +105,7 @@ struct Facet {
 }
 
 impl Facet {
-    /// Whether the line between two positions (m) crosses the facet. Adjacent facets leave no gap.
+    /// Whether the line segment between two positions (m) crosses the facet. Adjacent facets leave no gap.
     fn is_crossed(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let axis = self.axis as usize;
         let [before, after] = [from, to].map(|place| place[axis] - self.centre[axis]);

@@ -79,7 +79,7 @@ struct GridState {
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Check that the bonds of new points can get a state.
+    /// Check that refinement during the run creates no bonds that need a history.
     ///
     /// # Errors
     /// If refinement can add points during the run, and bonds have a history; the error is the same on all
@@ -103,8 +103,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if it has been
-    /// outside the horizons of triggering points and of points with broken bonds for the time in the deck.
-    /// Return the numbers of created and removed points; `None` if the grids do not change. Collective.
+    /// outside the horizons of triggering points and of points with broken bonds for the time
+    /// `coarsen_after`. Return the numbers of created and removed points; `None` if the grids do not change.
+    /// Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
@@ -232,8 +233,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// Compute the state of the points of new grids from the present state. `pieces` are the points of the new
-    /// grids that this rank creates, and `left` are the present nodes that are removed. Collective.
+    /// Compute the state of the points of new grids from the present state. `pieces` are the points of the
+    /// new grids that this rank creates, and `left` are the present nodes that are removed. Collective.
     fn state_on(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> GridState {
         let comm = self.comm;
         let past = Past::new(self, grids, left);
@@ -266,8 +267,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Break the bonds that were broken before the refinement, and new bonds that cross facets. `rows` are
-    /// the rows of [`GridState`] of the owned points. `broken` contains the ids of the neighbours j of all broken
-    /// bonds, and `lengths` the number of these ids for each owned point. Collective.
+    /// the rows of [`GridState`] of the owned points. `broken` contains the ids of the neighbours j of all
+    /// broken bonds, and `lengths` the number of these ids for each owned point. Collective.
     fn inherit(
         &mut self,
         rows: &[f64],

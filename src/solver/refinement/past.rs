@@ -54,8 +54,8 @@ impl Past {
             column.resize(local, 0.0);
             simulation.forces.bring(comm, column);
         }
-        // The parents of new and removed points lie in cells that differ from an unrefined grid, before or
-        // after the refinement.
+        // The parents of new and removed points lie in level-0 cells in which the grid differs from an
+        // unrefined grid, before or after the refinement.
         let bodies = 0..problem.bodies.len();
         let changed =
             bodies.map(|body| [grids, &simulation.grids].map(|grids| grids.changed(body)));

@@ -36,9 +36,9 @@ const MOST_PLACES: f64 = 1e4;
 /// Check that a run supports the refinement of its problem.
 ///
 /// # Errors
-/// If the horizon contains too many spacings, or if loads or temperatures act on sets given by ids or by
-/// groups of meshes. If refinement is triggered during the run, also if strengths scatter, or if the run has
-/// load steps or an adaptive step.
+/// If the horizon contains too many spacings, if initial values are read from a file, or if loads or
+/// temperatures act on sets given by ids or by groups of meshes. If refinement is triggered during the run,
+/// also if strengths scatter, or if the run has load steps or an adaptive step.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
@@ -131,7 +131,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Select nodes to refine at the points within the horizon of a triggering point. Select nodes to coarsen
     /// at refined points that have been outside the horizons of triggering points, and of points with broken
-    /// bonds, for the time in the deck. Collective.
+    /// bonds, for the time [`Trigger::coarsen_after`]. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
         let pick = |block, position| self.grids.refining(block, position);
