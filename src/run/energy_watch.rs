@@ -14,7 +14,7 @@ use crate::solver::observers::HistoryRow;
 const WARNING_GAIN: f64 = 1.0;
 
 /// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows, or the last row
-/// of a stage, exceed this ratio.
+/// of the run, exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
 /// Ratio of energy gain to energy input. The run ends with an error at the first row above this ratio.
@@ -45,6 +45,7 @@ pub struct EnergyWatch {
     warned_of_breaking: bool,
     /// Whether the gain in the last row was above [`FATAL_GAIN`].
     suspected: bool,
+    /// Time step and stable step, as a text for messages.
     steps: String,
 }
 

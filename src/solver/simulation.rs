@@ -480,12 +480,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Take over what the saved state of `before` does not contain, after its points were distributed or
-    /// refined again.
+    /// Copy from `before` the data that a saved state does not contain. `before` is the same run before its
+    /// points were redistributed or refined.
     pub(super) fn take_over(&mut self, before: &Self) {
         self.times = before.times;
         self.bad = before.bad;
-        // Unlike the saved factors, these contain the hash of the requests.
+        // Unlike the saved load factors, the load factors of `before` contain the hash of the requests.
         self.progress
             .load_factors
             .clone_from(&before.progress.load_factors);

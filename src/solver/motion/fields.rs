@@ -159,8 +159,8 @@ fields! {
         birth: Birth::FoundAnew,
         output: Some(Field::Temperature),
     };
-    /// Thermal stretch along the bar, in the plane, or in space; owned points, then ghosts. None without
-    /// prescribed temperatures.
+    /// Thermal stretch: along the bar in 1-D, in the plane in 2-D, in all directions in 3-D. Owned points,
+    /// then ghosts; none without prescribed temperatures.
     thermal_stretch: Option<Vec<f64>> = Description {
         name: "thermal_stretch",
         unit: "1",
@@ -267,7 +267,7 @@ fields! {
         name: "external_work",
         ..ENERGY
     };
-    /// Power that viscous damping dissipates, r ρ V u̇², W; none without viscous damping.
+    /// Power that viscous damping at the rate r dissipates, r ρ V u̇², W; none without viscous damping.
     damping_power: Option<Vec<f64>> = Description {
         name: "damping_power",
         unit: "W",
@@ -698,8 +698,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// The columns of a field; `None` if decks cannot request the field, or if this run does not store it per
-    /// point.
+    /// The columns of a field for output; `None` if this run does not store the field. Fields such as the
+    /// damage are never stored, but computed for each output.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
             let there = !columns.is_empty() && description.output == Some(field);

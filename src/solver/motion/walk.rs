@@ -129,8 +129,8 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Write displacements and thermal stretches to the bond inputs, and zero the force sums of these
-    /// points.
+    /// Copy displacements and thermal stretches of the part's points to the bond inputs, and set the internal
+    /// forces on these points to 0.
     pub fn write_bond_inputs(&mut self) {
         let thermal_stretch = self.thermal_stretch.as_ref();
         self.bond_inputs.write_bond_inputs(

@@ -26,7 +26,7 @@ const NEARER: f64 = 0.9;
 /// spacing and their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
-/// Number of points that one task processes.
+/// Minimum number of points that one task processes; the last task may have fewer.
 const CHUNK: usize = 1 << 15;
 
 /// Two points of different bodies that are too near: nearer than their spacing, and nearer than 0.9 of their
@@ -48,7 +48,7 @@ pub struct Contact {
 
 /// Pairs of bodies that may come into contact.
 pub struct ContactWatch {
-    /// Pairs of bodies that no bond joins, or whose bonds can break.
+    /// All pairs of bodies if bonds can break in this run, otherwise the pairs that no bond joins.
     pairs: Vec<Pair>,
     /// Largest spacing of each body, m.
     spacing: Vec<f64>,
@@ -69,12 +69,13 @@ struct Meeting {
     pair: Pair,
     /// Largest distance of two points that is compared, m.
     radius: f64,
-    /// Corners of a box that contains all points of one body within `radius` of the other body, m.
+    /// Lower corner of a box that contains the points of each body within `radius` of the other body, m.
     lower: [f64; 3],
+    /// Upper corner of this box, m.
     upper: [f64; 3],
 }
 
-/// A point in messages to the ranks that compare it.
+/// A point in messages to the ranks that compare this point with points of the other body.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Candidate {
@@ -149,8 +150,8 @@ impl ContactWatch {
         agree_on_nearest(comm, nearest)
     }
 
-    /// Find the pairs of bodies whose bounding boxes overlap or are at most the mean of their spacings apart.
-    /// Collective.
+    /// Find the pairs of bodies whose bounding boxes overlap, or are at most the mean of the largest spacings
+    /// of the two bodies apart. Collective.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();

@@ -283,7 +283,8 @@ fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) ->
     }
 }
 
-/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa.
+/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa, with Young's modulus E,
+/// the coefficient of thermal expansion α, the temperature T and the reference temperature T₀.
 fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let Some(temperature) = &simulation.fields.temperature else {
         return 0.0;

@@ -11,7 +11,7 @@ use crate::solver::conditions::{members, not_empty};
 
 use super::row_fields::RowFields;
 
-/// Number of points that one task sums.
+/// Number of points that are summed one after the other, before sums are merged.
 const CHUNK: usize = 4096;
 
 /// The statistics of a field over a set.
