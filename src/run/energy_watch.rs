@@ -1,4 +1,7 @@
 //! Detection of unstable steps and of lost energy by the energy balance.
+//!
+//! The energy gain is [`Energies::error`](crate::solver::observers::Energies::error), without negative
+//! fracture energy. The energy input is `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -134,9 +137,9 @@ impl EnergyWatch {
         ))
     }
 
-    /// Check the last row of a run. Return a warning if the energy balance does not close, unless
-    /// [`Self::check`] has already reported this gain. `is_quasi_static`: whether the last stage has load
-    /// steps.
+    /// Check the last row of a run. Return a warning if the energy balance does not close, unless the error
+    /// is a gain and [`Self::check`] has already reported a gain. `is_quasi_static`: whether the last stage
+    /// has load steps.
     pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
         let error = row.energies.error;
         let largest = row.largest_energy().max(self.floor);

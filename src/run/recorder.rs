@@ -376,7 +376,7 @@ fn reason_for_new_result<const D: usize>(
         if !is_taken(path) {
             return Ok(Some("the result file is missing".to_owned()));
         }
-        // If the file is a link to a file system that is not mounted, this is an error, not damage.
+        // A link to a file system that is not mounted gives an error here, instead of counting as damaged.
         std::fs::metadata(path).map_err(|error| {
             let path = path.display();
             Error::run(format!("{path}: cannot read the result so far: {error}"))

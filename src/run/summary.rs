@@ -9,7 +9,7 @@ use crate::solver::refinement::Refined;
 /// Size and times of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Summary {
-    /// Number of points.
+    /// Number of points at the end.
     pub points: u64,
     /// Number of bonds at the end, intact or broken.
     pub bonds: u64,

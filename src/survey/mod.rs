@@ -282,7 +282,8 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Return the number of points of each set. Warn of sets by position that have very few points. Collective.
+/// Return the number of points of each set. Warn of sets by position that have fewer points than there are
+/// dimensions, unless the run has at most two points per dimension. Collective.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

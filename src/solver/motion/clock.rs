@@ -81,7 +81,7 @@ impl Clock {
         self.step = step;
     }
 
-    /// Return to the time before the last step, and continue from there with another step (s).
+    /// Return to the time before the last step, and continue from there with steps of `step` (s).
     pub fn retreat(&mut self, step: f64) {
         self.number -= 1;
         self.since = (self.before, self.number);

@@ -57,7 +57,7 @@ pub struct CoarseGrid<const D: usize> {
     /// Index difference of cells that are adjacent along an axis.
     cell_strides: [usize; D],
     matrix: Banded,
-    /// Forces on the nodes in rounding units, one vector per task.
+    /// Forces on the nodes as multiples of a [`Unit`], one vector per task.
     parts: Vec<Vec<i64>>,
     /// Sums of `parts` over tasks and ranks.
     words: Vec<u64>,
@@ -362,7 +362,7 @@ fn pairs<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     (0..1 << D).flat_map(|q| (0..=q).map(move |p| (p, q)))
 }
 
-/// Number of cells along each axis, and the numbering of the nodes.
+/// Number of cells along each axis, and the numbering of nodes and cells as in [`CoarseGrid`].
 struct Shape<const D: usize> {
     cells: [usize; D],
     node_strides: [usize; D],

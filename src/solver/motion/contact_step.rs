@@ -5,10 +5,10 @@ use crate::problem::{Rigid, StepRule};
 use crate::solver::Simulation;
 use crate::solver::contact::Contact;
 
-/// Factor on a step that contact shortens, because the contact stiffness usually increases further.
+/// Factor on the step that contact allows, because the contact stiffness usually increases further.
 const CONTACT_RESERVE: f64 = 0.95;
 
-/// The step is lengthened only if it is below this fraction of the allowed step.
+/// A step could have been longer if it is below this fraction of the step that the stage and contact allow.
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {

@@ -26,7 +26,7 @@ pub struct Description {
 }
 
 /// Values of a field that a new point gets from its parents, and values that a removed point returns to its
-/// parents in equal parts.
+/// parents in equal parts. "The mean" is the mean of the parents' values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
@@ -138,7 +138,7 @@ const FORCE_DENSITY: Description = Description {
     ..STATE
 };
 
-/// Name of the field that has one column per further result.
+/// Name of the field [`Fields::newly_broken_of_further`], which has one column per further result.
 pub const NEWLY_BROKEN_OF_FURTHER: &str = "newly_broken_of_further";
 
 fields! {
@@ -204,7 +204,8 @@ fields! {
         output: Some(Field::BrokenBonds),
         ..STATE
     };
-    /// Number of bonds of a point that have broken since the last output; none without damage.
+    /// Number of bonds of a point that have broken since the last output of the main result; none without
+    /// damage.
     newly_broken_bonds: Option<Vec<f64>> = Description {
         name: "newly_broken_bonds",
         unit: "1",
@@ -246,8 +247,8 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density of the zero-energy control that the point would have if plastic flow did not reduce the
-    /// control, J/m³; none without plasticity.
+    /// Energy density of the zero-energy control (the forces that resist zero-energy modes) that the point
+    /// would have if plastic flow did not reduce the control, J/m³; none without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
@@ -683,15 +684,15 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds.
+    /// Reset the count of newly broken bonds of the main result to 0.
     pub fn forget_newly_broken(&mut self) {
         if let Some(new) = &mut self.newly_broken_bonds {
             new.fill(0.0);
         }
     }
 
-    /// Reset the count of newly broken bonds of a further result, given its index among the further results
-    /// with this count.
+    /// Reset the count of newly broken bonds of a further result to 0, given the index of this result among
+    /// the further results with such a count.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);

@@ -78,8 +78,8 @@ pub struct NewtonState {
     pub evaluations: u64,
     /// η of the next solution of a linear problem.
     forcing: f64,
-    /// Mean of the diagonal of K, divided by the mean of the fictitious density times the fraction of intact
-    /// bonds; NaN until it is computed.
+    /// Mean of the diagonal of K, divided by the mean of the product of fictitious density and fraction of
+    /// intact bonds; NaN until it is computed.
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,

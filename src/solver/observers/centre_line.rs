@@ -147,7 +147,7 @@ impl Ways {
 
 /// Connected points of one section.
 struct Part {
-    /// The part before this one, towards the start of the crack.
+    /// Index of the part before this one, towards the start of the crack; `None` where paths begin.
     parent: Option<usize>,
     members: Vec<usize>,
     /// Largest path length of the points of this part and of its descendants, m.

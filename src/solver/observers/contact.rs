@@ -3,8 +3,8 @@
 //! bodies whose bonds have broken, it finds points that are nearer than half their spacing.
 //!
 //! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks
-//! by spatial cells, so that each rank compares a part of the points. Points of the second body are sent to
-//! the ranks of all cells that are near enough.
+//! by spatial cells, so that each rank compares a part of the points. A point of the second body is sent to
+//! the ranks of all cells that can contain a point of the first body which is too near.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;

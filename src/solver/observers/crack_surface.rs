@@ -77,7 +77,7 @@ struct FrontPoint {
 }
 
 impl CrackSurface {
-    /// Create the crack, and find the points of the set in which it is searched. Collective.
+    /// Create the crack, and find the points of the set in which the crack is searched. Collective.
     ///
     /// # Errors
     /// If the set is empty; the error is the same on all ranks.
@@ -244,8 +244,8 @@ impl CrackSurface {
         damaged
     }
 
-    /// Sort the points of the front by id, and remove points that are too close to an earlier point. Such
-    /// points lie, for example, on the other face of the crack.
+    /// Sort the points of the front by id, and remove points that are closer than `front_spacing` to an
+    /// earlier point. Such points lie, for example, on the other face of the crack.
     fn thinned(&self, mut front: Vec<FrontPoint>) -> Vec<[f64; 3]> {
         front.sort_unstable_by_key(|point| point.id);
         if front.is_empty() {

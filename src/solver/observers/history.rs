@@ -55,8 +55,8 @@ pub struct HistoryObserver {
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     j_integrals: JIntegrals,
-    /// Sum of the energy balance in the first row (J), and number of bonds that were intact before any bond
-    /// could break, counted at both ends.
+    /// Sum of the energy balance in the first row (J), see [`Energies::error`], and number of bonds that were
+    /// intact before any bond could break, counted at both ends. `None` before the first row.
     start: Option<(f64, u64)>,
 }
 
@@ -80,9 +80,9 @@ pub struct Energies {
     /// Energy dissipated by viscous damping, plastic flow, softening, viscoelasticity, friction and contact
     /// damping.
     pub dissipated: f64,
-    /// Error of the energy balance kinetic + rigid + strain + contact + fracture + dissipated − work; 0 for
-    /// an exact integrator. The error is the change of this sum since the start. Energy that refinements and
-    /// changes of the density scale have added is subtracted.
+    /// Error of the energy balance: change of kinetic + rigid + strain + contact + fracture + dissipated −
+    /// work since the start, without the energy that refinements and changes of the density scale have added.
+    /// 0 for an exact integrator.
     pub error: f64,
 }
 
@@ -240,7 +240,7 @@ impl HistoryObserver {
         self.start = Some(start);
     }
 
-    /// Read the lengths of crack tips from earlier rows, for the speeds of the tips.
+    /// Read the lengths of cracks with a tracked tip from earlier rows, for the speeds of the tips.
     pub fn recall(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
@@ -627,7 +627,7 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
     columns
 }
 
-/// Name of the column with the length of a crack tip.
+/// Name of the column with the length of the crack that has this tip.
 fn length_of(tip: &str) -> String {
     format!("tip_{tip}_length")
 }

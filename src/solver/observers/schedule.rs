@@ -89,8 +89,8 @@ impl Schedule {
     }
 }
 
-/// Relative round-off of the clock: a step that falls short of a given time by less than this fraction
-/// reaches it.
+/// Relative round-off of the clock: a step that falls short of a given time by less than this fraction counts
+/// as reaching this time.
 const ROUNDING: f64 = 1e-12;
 
 /// Number of whole intervals of length `seconds` in `time` (s), up to round-off.

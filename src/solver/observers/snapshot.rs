@@ -170,7 +170,7 @@ fn cauchy_stress<const D: usize>(
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        // Thermal expansion is isotropic, so it is divided out of F.
+        // Thermal expansion is isotropic, so F is divided by the thermal stretch.
         let thermal = 1.0 + free_stretch(simulation, point);
         let gradient = gradient / thermal;
         let in_plane = determinant(&gradient);
