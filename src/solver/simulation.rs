@@ -650,8 +650,8 @@ fn pre_crack<const D: usize>(
     counts.into_iter().map(Cell::into_inner).collect()
 }
 
-/// Make the bonds of no-failure sets unbreakable. These sets belong to the damage of bodies, or to the damage
-/// of bonds between two bodies that have their own damage.
+/// Make the bonds of no-failure sets unbreakable. These sets belong to the damage of a body, or to the damage
+/// of the bonds between a pair of bodies.
 fn protect<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
