@@ -46,7 +46,7 @@ pub struct EnergyWatch {
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
-    /// Whether the gain in the last row was above [`FATAL_GAIN`].
+    /// Whether the ratio of energy gain to energy input in the last row was above [`FATAL_GAIN`].
     suspected: bool,
     /// Time step and stable step, as a text for messages.
     steps: String,
@@ -74,12 +74,12 @@ impl EnergyWatch {
         }
     }
 
-    /// Check the energy gain of a row of the history. Return a warning at the first row with a gain above
-    /// [`WARNING_GAIN`]. `is_last`: whether this is the last row of the run. The result is the same on all
-    /// ranks.
+    /// Check the ratio of energy gain to energy input in a row of the history. Return a warning at the first
+    /// row with a ratio above [`WARNING_GAIN`]. `is_last`: whether this is the last row of the run. The
+    /// result is the same on all ranks.
     ///
     /// # Errors
-    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
+    /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
     /// [`CERTAIN_GAIN`] in one row, or NaN.
     pub fn check(
         &mut self,

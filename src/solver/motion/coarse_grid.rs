@@ -298,7 +298,7 @@ impl<const D: usize> CoarseGrid<D> {
     }
 
     /// Stiffness matrices of a cell, divided by the volume of the cell: for the moduli λ = 1 and G = 0, and
-    /// for λ = 0 and G = 1. A row or column is a displacement component of a node of the cell.
+    /// for λ = 0 and G = 1. Each row and each column belongs to a displacement component of a node.
     fn reference_stiffness(&self) -> [Vec<f64>; 2] {
         let mut both = [0; 2].map(|_| vec![0.0; (CORNERS * D) * (CORNERS * D)]);
         let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
