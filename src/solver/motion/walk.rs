@@ -18,7 +18,7 @@ type Columns<'a, const N: usize> = [&'a mut [f64]; N];
 
 /// A part of the owned points with their fields.
 pub struct Part<'a, const D: usize> {
-    /// All local points and their constants.
+    /// All local points, and the properties of their blocks.
     pub model: &'a Model<D>,
     /// Local index of the first point of the part.
     pub first: usize,

@@ -1,4 +1,4 @@
-//! The history of a run: energies and other sums, probes, fronts, crack paths and crack tips.
+//! The history of a run: energies and other sums, probes, fronts, cracks, crack tips and J integrals.
 
 use std::ops::Range;
 
