@@ -320,7 +320,7 @@ fn probes<const D: usize>(
     problem.history.probes.iter().map(follow).collect()
 }
 
-/// Warn of points of different bodies at the same position. Contact cannot act between them.
+/// Warn of points of different bodies at the same position. Contact cannot act between such points.
 fn coincident<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let contact = simulation.contact.as_ref();
