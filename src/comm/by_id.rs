@@ -29,7 +29,7 @@ impl IdOrder {
         let size = comm.size() as u64;
         let border =
             |rank: u64| (u128::from(coarsest) * u128::from(rank) / u128::from(size)) as u64;
-        // The estimate can be too low, because the limits of the ranges are rounded down.
+        // `guess` can be too low, because the limits of the ranges are rounded down.
         let home = |id: u64| {
             let id = id % coarsest;
             let guess = (u128::from(id) * u128::from(size) / u128::from(coarsest)) as u64;

@@ -13,7 +13,7 @@ use super::{Communicator, During, PeerBuffers};
 pub struct Neighbour {
     /// The other rank.
     pub rank: usize,
-    /// Local indices of owned points that are ghosts of the other rank, in the order of its ghosts.
+    /// Local indices of owned points that are ghosts on the other rank, in the order of these ghosts.
     pub send: Vec<u32>,
     /// Local indices of the ghosts that the other rank owns.
     pub receive: Range<usize>,
@@ -40,7 +40,7 @@ pub struct Halo {
 }
 
 impl Halo {
-    /// Allocate buffers for `width` values per point. An exchange of more values enlarges them.
+    /// Allocate buffers for `width` values per point. An exchange of more values enlarges the buffers.
     pub fn new(neighbours: Vec<Neighbour>, width: usize) -> Self {
         let buffers = neighbours
             .iter()

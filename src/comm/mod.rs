@@ -29,7 +29,7 @@ pub struct PeerBuffers {
     pub rank: usize,
     /// Values to send.
     pub send: Vec<f64>,
-    /// Received values; its length is the expected message length.
+    /// Received values. The length of this vector is the expected number of values.
     pub receive: Vec<f64>,
 }
 

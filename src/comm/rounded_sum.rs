@@ -13,7 +13,9 @@ const MOST: i32 = 1000;
 /// The unit of the terms: a power of 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
+    /// Inverse of the unit.
     factor: f64,
+    /// The unit.
     size: f64,
 }
 

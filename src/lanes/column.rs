@@ -22,6 +22,7 @@ const LINE: usize = 8;
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,
+    /// Number of unused values before the first entry.
     lead: usize,
 }
 

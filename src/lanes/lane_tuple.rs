@@ -9,7 +9,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Number of quantities.
     const COUNT: usize;
 
-    /// Whether quantities without a column are 0. Otherwise, every quantity has a column.
+    /// Whether quantities may lack a column; such quantities are read as 0.
     const PADDED: bool = false;
 
     /// One column per quantity, to read.

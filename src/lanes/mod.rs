@@ -1,8 +1,8 @@
 //! Vectors of eight numbers: the same quantity of eight bonds or points.
 //!
-//! The operations are IEEE operations on plain arrays without contraction, and functions of `libm`.
-//! Therefore all instruction sets give bitwise the same results. Operations that depend on the instruction
-//! set, such as fused multiply-adds, are in [`simd`].
+//! The operations are IEEE operations on plain arrays, and functions of `libm`. The compiler does not fuse
+//! multiplications and additions. Therefore all instruction sets give bitwise the same results. Operations
+//! that depend on the instruction set, such as fused multiply-adds, are in [`simd`].
 
 mod column;
 pub mod instructions;

@@ -1,8 +1,8 @@
 //! Operations for which the compiler does not select vector instructions, or that depend on the machine.
 //!
-//! All other operations on [`Lanes`] are plain loops over eight numbers, which the compiler vectorizes. Every
-//! operation in this module is correctly rounded or only moves numbers. Therefore all implementations give
-//! bitwise the same results, except [`Portable`] without fused multiply-add.
+//! All other operations on [`Lanes`] are written lane by lane, and the compiler vectorizes them. Every
+//! operation in this module is correctly rounded, compares numbers, or moves numbers. Therefore all
+//! implementations give bitwise the same results, except [`Portable`] without fused multiply-add.
 
 use super::Lanes;
 
@@ -102,11 +102,13 @@ mod x86 {
 
     use super::{Lanes, Simd, Task};
 
-    /// AVX2 with fused multiply-add. Only [`Avx2::detect`] creates it.
+    /// Proof that this machine has AVX2, BMI2 and FMA. Only [`Avx2::detect`] and [`Avx512::avx2`] create the
+    /// proof.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub struct Avx2(());
 
-    /// AVX-512. Only [`Avx512::detect`] creates it.
+    /// Proof that this machine has AVX-512 (F, DQ, VL and BW), and the instructions of [`Avx2`]. Only
+    /// [`Avx512::detect`] creates the proof.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub struct Avx512(());
 
@@ -121,7 +123,8 @@ mod x86 {
     }
 
     impl Avx512 {
-        /// Create the proof if this machine has the instructions.
+        /// Return the proof that this machine has the instructions of [`Avx512`]; `None` if it lacks one of
+        /// them.
         pub fn detect() -> Option<Self> {
             let has = Avx2::detect().is_some()
                 && is_x86_feature_detected!("avx512f")

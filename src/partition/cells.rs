@@ -42,7 +42,7 @@ pub struct Cells {
 pub struct CellLoads {
     /// Measured computing time of the points of each cell, ns.
     pub costs: Vec<u64>,
-    /// For each cell, the highest rank that owns points of it; −1 if the cell has no points.
+    /// For each cell, the highest rank that owns points in the cell; −1 if the cell has no points.
     pub ranks: Vec<f64>,
 }
 

@@ -31,8 +31,9 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
     between(low, high).filter(move |other| *other != middle)
 }
 
-/// The index with the number `number` among the indices of a level in a level-0 cell, in steps of this level.
-/// Numbers count indices with x fastest. `origin`, the index of the centre of the cell, has number 0.
+/// The grid index with a given number in a level-0 cell. The indices of a level in the cell are numbered from
+/// 0, with x fastest, starting at `origin`, the index of the centre of the cell. All indices are in steps of
+/// the level.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)

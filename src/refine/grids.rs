@@ -32,7 +32,8 @@ struct BodyGrid<'a> {
     pattern: Pattern,
 }
 
-/// A node: body, level, and the three components of its grid index.
+/// A node: body, level, and the three components of its grid index. The index is in steps of the node's
+/// level, except in the result of [`Grids::coarsen`].
 pub type NodeKey = [i64; 5];
 
 /// Sort key of nodes, finer levels first.

@@ -1,4 +1,7 @@
 //! Detection of unstable steps and of lost energy by the energy balance.
+//!
+//! The energy gain is [`Energies::error`](crate::solver::observers::Energies::error), without negative
+//! fracture energy. The energy input is `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -14,7 +17,7 @@ use crate::solver::observers::HistoryRow;
 const WARNING_GAIN: f64 = 1.0;
 
 /// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows, or the last row
-/// of a stage, exceed this ratio.
+/// of the run, exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
 /// Ratio of energy gain to energy input. The run ends with an error at the first row above this ratio.
@@ -43,8 +46,9 @@ pub struct EnergyWatch {
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
-    /// Whether the gain in the last row was above [`FATAL_GAIN`].
+    /// Whether the ratio of energy gain to energy input in the last row was above [`FATAL_GAIN`].
     suspected: bool,
+    /// Time step and stable step, as a text for messages.
     steps: String,
 }
 
@@ -70,12 +74,12 @@ impl EnergyWatch {
         }
     }
 
-    /// Check the energy gain of a row of the history. Return a warning at the first row with a gain above
-    /// [`WARNING_GAIN`]. `is_last`: whether this is the last row of the run. The result is the same on all
-    /// ranks.
+    /// Check the ratio of energy gain to energy input in a row of the history. Return a warning at the first
+    /// row with a ratio above [`WARNING_GAIN`]. `is_last`: whether this is the last row of the run. The
+    /// result is the same on all ranks.
     ///
     /// # Errors
-    /// If the gain is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
+    /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
     /// [`CERTAIN_GAIN`] in one row, or NaN.
     pub fn check(
         &mut self,
@@ -133,9 +137,9 @@ impl EnergyWatch {
         ))
     }
 
-    /// Check the last row of a run. Return a warning if the energy balance does not close, unless
-    /// [`Self::check`] has already reported this gain. `is_quasi_static`: whether the last stage has load
-    /// steps.
+    /// Check the last row of a run. Return a warning if the energy balance does not close, unless the error
+    /// is a gain and [`Self::check`] has already reported a gain. `is_quasi_static`: whether the last stage
+    /// has load steps.
     pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
         let error = row.energies.error;
         let largest = row.largest_energy().max(self.floor);

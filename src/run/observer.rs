@@ -158,7 +158,8 @@ pub trait RunState {
     fn energies(&mut self) -> StateEnergies;
 
     /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. After a request
-    /// in [`Observer::row`], the run stops at this step; otherwise, it stops up to ten steps later.
+    /// in [`Observer::row`], the run stops at this step; otherwise, the run stops up to ten explicit steps or
+    /// iterations of load steps later.
     fn stop(&mut self);
 
     /// Return the factor of a load in the next step; 1 unless an observer has set the factor. `None` if no
@@ -274,7 +275,7 @@ impl Row<'_> {
         found.map(|position| self.row.values[position])
     }
 
-    /// Return the energies of the whole body, J.
+    /// Return the energies of all bodies, J.
     pub fn energies(&self) -> Energies {
         self.row.energies
     }

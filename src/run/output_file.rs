@@ -159,7 +159,7 @@ impl<'a> OutputFile<'a> {
     /// Close the file. With `will_resume`, unused space in the file is not freed. Collective.
     ///
     /// # Errors
-    /// If this write or an earlier write fails, for example because the disk is full.
+    /// If closing the file or an earlier write fails, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let comm = self.file.communicator();
         self.file.close(will_resume)?;

@@ -39,7 +39,9 @@ pub struct Recorder<'a> {
     files: Vec<OutputFile<'a>>,
     /// Folder of the crack files.
     folder: PathBuf,
+    /// Schedule of the history rows.
     rows: Schedule,
+    /// History rows that are not yet written.
     buffered: Vec<Vec<f64>>,
 }
 
@@ -255,7 +257,7 @@ impl<'a> Recorder<'a> {
     /// Close all result files. With `will_resume`, unused space in the files is not freed. Collective.
     ///
     /// # Errors
-    /// If this write or an earlier write fails, for example because the disk is full.
+    /// If closing a file or an earlier write fails, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let mut files = self.files.into_iter();
         files.try_for_each(|file| file.close(will_resume))
@@ -350,9 +352,11 @@ pub enum Continuation {
 }
 
 /// Return the reason why the result file of an output cannot be continued; `None` if the file can be
-/// continued. Reasons are a missing or damaged file, and other points, fields or columns. `outputs` is the
-/// number of outputs that the checkpoint counts. For the main result, `history` has the observer, the number
-/// of rows, and the changes of the column definitions. Collective.
+/// continued. Reasons are: the file is missing, damaged, or shorter than the checkpoint counts; the deck
+/// requests other points, fields, precision or history columns; adaptive refinement was switched on or off.
+/// `outputs` is the number of outputs that the checkpoint counts. For the main result, `history` has the
+/// observer, the number of rows that the checkpoint counts, and the changes of the column definitions.
+/// Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.
@@ -372,7 +376,7 @@ fn reason_for_new_result<const D: usize>(
         if !is_taken(path) {
             return Ok(Some("the result file is missing".to_owned()));
         }
-        // If the file is a link to a file system that is not mounted, this is an error, not damage.
+        // A link to a file system that is not mounted gives an error here, instead of counting as damaged.
         std::fs::metadata(path).map_err(|error| {
             let path = path.display();
             Error::run(format!("{path}: cannot read the result so far: {error}"))

@@ -15,9 +15,9 @@ use super::files::Files;
 const LONGEST_HEADING: u64 = 1 << 20;
 
 /// Find the further results, with their side-cars, and the tables of cracks that a run of this problem does
-/// not replace. A file with such a name is omitted if the earlier run has not written this file. The names of
-/// the earlier cracks are read from the history file, so the function is called on rank 0 before that file is
-/// replaced.
+/// not replace. Files that have names like these, but were not written by an earlier run, are omitted. The
+/// names of the earlier cracks are read from the history file, so the function is called on rank 0 before
+/// that file is replaced.
 ///
 /// # Errors
 /// If the folder cannot be read.

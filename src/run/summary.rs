@@ -9,7 +9,7 @@ use crate::solver::refinement::Refined;
 /// Size and times of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Summary {
-    /// Number of points.
+    /// Number of points at the end.
     pub points: u64,
     /// Number of bonds at the end, intact or broken.
     pub bonds: u64,
@@ -18,7 +18,7 @@ pub struct Summary {
     /// Number of steps of this run.
     pub steps: u64,
     /// Number of force evaluations: one per explicit step and per repeat of a step, one or more per iteration
-    /// of a load step, and one per restart and refinement.
+    /// of a load step, and one per refinement.
     pub evaluations: u64,
     /// Time step at the end of the run, or at the stop, s.
     pub step: f64,

@@ -18,8 +18,9 @@ const INTERVAL: f64 = 0.2;
 
 /// Fraction of the wall-clock limit reserved for the last checkpoint.
 const RESERVED_FRACTION: f64 = 0.05;
-/// Bounds of the reserved time, s.
+/// Smallest reserved time, s.
 const MIN_RESERVE: f64 = 0.5;
+/// Largest reserved time, s.
 const MAX_RESERVE: f64 = 60.0;
 
 /// Common decision of all ranks after an iteration of the time loop.
@@ -106,9 +107,12 @@ pub enum Reason {
 pub struct Watch<'a> {
     signals: Option<&'a Signals>,
     rule: CheckpointRule,
+    /// Schedule of checkpoints by steps or simulated time; `None` for checkpoints by wall-clock time.
     schedule: Option<Schedule>,
+    /// Start and duration (s) of the wall-clock limit.
     limit: Option<(Instant, f64)>,
     last_checkpoint: Instant,
+    /// Longest time that a checkpoint has taken.
     cost: Duration,
     /// Number of iterations of the time loop.
     iterations: u64,

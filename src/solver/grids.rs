@@ -32,8 +32,8 @@ struct Cells {
 /// bond, m. The result is empty if the deck requests lists. Collective.
 ///
 /// # Errors
-/// If the deck requests lattices and the points of a body do not lie on a regular grid or have different
-/// volumes; the error is the same on all ranks.
+/// If the deck requests lattices, and the points of a body do not lie on a regular grid or do not all have
+/// the volume of a cell. The error is the same on all ranks.
 pub fn grids(
     problem: &Problem,
     comm: &dyn Communicator,

@@ -32,7 +32,7 @@ pub struct Model<const D: usize> {
     pub coarsest: u64,
 }
 
-/// Thermal expansion along the bar, in the plane, or in space.
+/// Thermal expansion: along the bar in 1-D, in the plane in 2-D, in all directions in 3-D.
 #[derive(Debug, Clone, Copy)]
 pub struct Expansion {
     /// Free thermal stretch per kelvin, 1/K.

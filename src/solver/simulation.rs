@@ -55,7 +55,7 @@ pub struct Simulation<'a, const D: usize> {
     pub stages: Stages<D>,
     /// Quantities of the undeformed bodies.
     pub undeformed: Undeformed,
-    /// Time and step of the present stage.
+    /// Time, time step and number of steps of the run.
     pub clock: Clock,
     /// Integrator of the present stage; `None` while it advances the simulation.
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
@@ -433,8 +433,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Set the displacements of supported points at `time` (s). `step` is the length of the last step (s), 0
-    /// at the start.
+    /// Set the displacements of supported points at `time` (s). `step` is the length of the step that ends at
+    /// this time (s); 0 if there is no such step.
     pub(super) fn apply_displacements(&mut self, time: f64, step: f64) {
         self.conditions.set_displacements(time, step);
         self.walk(|part, here| {
@@ -480,12 +480,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Take over what the saved state of `before` does not contain, after its points were distributed or
-    /// refined again.
+    /// Copy from `before` the data that a saved state does not contain. `before` is the same run before its
+    /// points were redistributed or refined.
     pub(super) fn take_over(&mut self, before: &Self) {
         self.times = before.times;
         self.bad = before.bad;
-        // Unlike the saved factors, these contain the hash of the requests.
+        // Unlike the saved load factors, the load factors of `before` contain the hash of the requests.
         self.progress
             .load_factors
             .clone_from(&before.progress.load_factors);
@@ -650,8 +650,8 @@ fn pre_crack<const D: usize>(
     counts.into_iter().map(Cell::into_inner).collect()
 }
 
-/// Make the bonds of no-failure sets unbreakable. These sets belong to the damage of bodies, or to a separate
-/// damage of two bodies.
+/// Make the bonds of no-failure sets unbreakable. These sets belong to the damage of a body, or to the damage
+/// of the bonds between a pair of bodies.
 fn protect<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

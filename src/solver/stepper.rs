@@ -169,7 +169,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         }
     }
 
-    /// The points and their constants.
+    /// The points, and the properties of their blocks.
     pub fn model(&self) -> &Model<D> {
         &self.simulation.model
     }

@@ -135,7 +135,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
 }
 
 /// Largest r Δt of an automatic step with viscous damping at a rate r. The error of the energy balance is
-/// at most (r Δt)²/4 of the damped kinetic energy.
+/// then at most (r Δt)²/4 of the kinetic energy that damping removes.
 const DAMPED: f64 = 0.5;
 
 /// Largest allowed r Δt; with a larger value, viscous damping reverses the velocity in each step.

@@ -282,7 +282,8 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Return the number of points of each set. Warn of sets by position that have very few points. Collective.
+/// Return the number of points of each set. Warn of sets by position that have fewer points than there are
+/// dimensions, unless the run has at most two points per dimension. Collective.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;
@@ -319,7 +320,7 @@ fn probes<const D: usize>(
     problem.history.probes.iter().map(follow).collect()
 }
 
-/// Warn of points of different bodies at the same position. Contact cannot act between them.
+/// Warn of points of different bodies at the same position. Contact cannot act between such points.
 fn coincident<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let contact = simulation.contact.as_ref();

@@ -32,9 +32,10 @@ pub struct Speed {
     pub whole: Duration,
     /// Time of the phases of the steps.
     pub times: Times,
-    /// Messages of the steps.
+    /// Number, bytes and time of the messages of the steps.
     pub sent: Traffic,
-    /// Messages of one exchange of displacements per step, without overlap of messages and computation.
+    /// Number, bytes and time of the messages of one exchange of displacements per step, without overlap of
+    /// messages and computation.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,

@@ -27,8 +27,8 @@ impl<const D: usize> Integrator<D> for AdaptiveVerlet {
     }
 }
 
-/// Relative tolerance: if a step is shorter than the rest of the stage by less than this fraction, the step
-/// is lengthened to end the stage.
+/// If the rest of the stage exceeds the next step by less than this fraction of the step, the step is
+/// lengthened to the end of the stage.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
 /// State of the adaptive rule between steps; the same on all ranks.
@@ -48,7 +48,7 @@ pub struct StepControl {
 }
 
 impl StepControl {
-    /// Start a stage. `step` (s) is the first step that was chosen for the stage.
+    /// Start the rule for a stage. `step` (s) is the first step of the stage without the rule.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);

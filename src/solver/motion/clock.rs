@@ -54,7 +54,7 @@ impl Clock {
         self.before
     }
 
-    /// Length of the step, s.
+    /// Present time step, s.
     pub fn step(&self) -> f64 {
         self.step
     }
@@ -81,7 +81,7 @@ impl Clock {
         self.step = step;
     }
 
-    /// Return to the time before the last step, and continue from there with another step (s).
+    /// Return to the time before the last step, and continue from there with steps of `step` (s).
     pub fn retreat(&mut self, step: f64) {
         self.number -= 1;
         self.since = (self.before, self.number);
@@ -111,8 +111,8 @@ impl Clock {
     }
 }
 
-/// Number of steps of length `step` (s) in `time` (s), rounded up; a fraction of a step that is only
-/// round-off does not count. At least 1.
+/// Number of steps of length `step` (s) in a duration `time` (s), rounded up, but at least 1. A fraction of a
+/// step that is only round-off does not count.
 pub fn steps_to(time: f64, step: f64) -> f64 {
     let steps = time / step;
     let whole = if (steps - steps.round()).abs() < 1e-9 * steps {

@@ -1,8 +1,8 @@
 //! The coarse grid of a preconditioner, for the long waves of the displacement of a body.
 //!
-//! A grid of box cells covers all bodies. Each edge is at least one horizon long, unless all bodies together
-//! are shorter along this axis. Displacements are defined at the nodes and are linear along each axis within
-//! a cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
+//! A grid of box cells covers all bodies. Each edge of a cell is at least one horizon long, except along an
+//! axis with a single cell. Displacements are defined at the nodes and are linear along each axis within a
+//! cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
 //! averages over its points by volume. Each point contributes its constants times its fraction of intact
 //! bonds. A supported component of a point acts as a spring at the position of the point in its cell. Forces
 //! on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
@@ -29,11 +29,11 @@ const EDGE: f64 = 1.0;
 /// Factor by which edges grow until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Number of multiply-adds per material point that are allowed to solve with the factored matrix: about as
-/// many as a force evaluation with few bonds needs.
+/// Maximum number of multiply-adds to solve with the factored matrix, per point: about as many as a force
+/// evaluation needs for a point with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// Number of multiply-adds to solve with the factored matrix that is always allowed, even with few points.
+/// Number of multiply-adds to solve with the factored matrix that is allowed for any number of points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.
@@ -47,15 +47,17 @@ const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 
 /// The grid, and its stiffness matrix as a Cholesky factor.
 pub struct CoarseGrid<const D: usize> {
+    /// Lower corner of the grid, m.
     lower: [f64; D],
     /// Cells per length along each axis, 1/m.
     per_length: [f64; D],
     cells: [usize; D],
-    /// Index difference of nodes, and of cells, that are adjacent along an axis.
+    /// Index difference of nodes that are adjacent along an axis.
     node_strides: [usize; D],
+    /// Index difference of cells that are adjacent along an axis.
     cell_strides: [usize; D],
     matrix: Banded,
-    /// Forces on the nodes in rounding units, one vector per task.
+    /// Forces on the nodes as multiples of a [`Unit`], one vector per task.
     parts: Vec<Vec<i64>>,
     /// Sums of `parts` over tasks and ranks.
     words: Vec<u64>,
@@ -83,8 +85,8 @@ struct CellPosition<const D: usize> {
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Create a grid that covers all points. The edges of its cells are at least `horizon` (m), and long
-    /// enough that the matrix is small. Collective.
+    /// Create a grid that covers all points. The edges of its cells are at least `horizon` (m), except along
+    /// axes with a single cell, and long enough that the matrix is small. Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -124,7 +126,8 @@ impl<const D: usize> CoarseGrid<D> {
         }
     }
 
-    /// Assemble the stiffness matrix from the contributions of the owned points. Collective.
+    /// Assemble the stiffness matrix, and factor it. `of_point` returns the contribution of an owned point.
+    /// Collective.
     pub fn assemble(
         &mut self,
         comm: &dyn Communicator,
@@ -294,8 +297,8 @@ impl<const D: usize> CoarseGrid<D> {
         strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
     }
 
-    /// Stiffness matrices of a cell between the components of its nodes, for λ = 1 and for G = 1, divided by
-    /// the volume of the cell.
+    /// Stiffness matrices of a cell, divided by the volume of the cell: for the moduli λ = 1 and G = 0, and
+    /// for λ = 0 and G = 1. Each row and each column belongs to a displacement component of a node.
     fn reference_stiffness(&self) -> [Vec<f64>; 2] {
         let mut both = [0; 2].map(|_| vec![0.0; (CORNERS * D) * (CORNERS * D)]);
         let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
@@ -359,14 +362,14 @@ fn pairs<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     (0..1 << D).flat_map(|q| (0..=q).map(move |p| (p, q)))
 }
 
-/// Number of cells along each axis, and the numbering of the nodes.
+/// Number of cells along each axis, and the numbering of nodes and cells as in [`CoarseGrid`].
 struct Shape<const D: usize> {
     cells: [usize; D],
     node_strides: [usize; D],
     cell_strides: [usize; D],
     /// Number of rows of the stiffness matrix.
     size: usize,
-    /// Bandwidth of the stiffness matrix.
+    /// Number of entries of a row of the stiffness matrix left of the diagonal.
     band: usize,
 }
 

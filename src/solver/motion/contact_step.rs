@@ -5,15 +5,16 @@ use crate::problem::{Rigid, StepRule};
 use crate::solver::Simulation;
 use crate::solver::contact::Contact;
 
-/// Factor on a step that contact shortens, because the contact stiffness usually increases further.
+/// Factor on the step that contact allows, because the contact stiffness usually increases further.
 const CONTACT_RESERVE: f64 = 0.95;
 
-/// The step is lengthened only if it is below this fraction of the allowed step.
+/// A step could have been longer if it is below this fraction of the step that the stage and contact allow.
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
     /// Return a new step (s) if contact is too stiff for the present step, or if enough consecutive steps
-    /// could have been longer. The new step divides the rest of the stage evenly.
+    /// could have been longer. The new step divides the rest of the stage evenly. `None` if the step stays,
+    /// at the end of a stage, in a quasi-static stage, and in runs without contact.
     pub fn step_for_contact(&self) -> Option<f64> {
         if self.is_quasi_static() {
             return None;

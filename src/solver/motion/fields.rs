@@ -26,7 +26,7 @@ pub struct Description {
 }
 
 /// Values of a field that a new point gets from its parents, and values that a removed point returns to its
-/// parents in equal parts.
+/// parents in equal parts. "The mean" is the mean of the parents' values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
@@ -138,7 +138,7 @@ const FORCE_DENSITY: Description = Description {
     ..STATE
 };
 
-/// Name of the field that has one column per further result.
+/// Name of the field [`Fields::newly_broken_of_further`], which has one column per further result.
 pub const NEWLY_BROKEN_OF_FURTHER: &str = "newly_broken_of_further";
 
 fields! {
@@ -159,8 +159,8 @@ fields! {
         birth: Birth::FoundAnew,
         output: Some(Field::Temperature),
     };
-    /// Thermal stretch along the bar, in the plane, or in space; owned points, then ghosts. None without
-    /// prescribed temperatures.
+    /// Thermal stretch: along the bar in 1-D, in the plane in 2-D, in all directions in 3-D. Owned points,
+    /// then ghosts; none without prescribed temperatures.
     thermal_stretch: Option<Vec<f64>> = Description {
         name: "thermal_stretch",
         unit: "1",
@@ -204,7 +204,8 @@ fields! {
         output: Some(Field::BrokenBonds),
         ..STATE
     };
-    /// Number of bonds of a point that have broken since the last output; none without damage.
+    /// Number of bonds of a point that have broken since the last output of the main result; none without
+    /// damage.
     newly_broken_bonds: Option<Vec<f64>> = Description {
         name: "newly_broken_bonds",
         unit: "1",
@@ -246,8 +247,8 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density of the zero-energy control that the point would have if plastic flow did not reduce the
-    /// control, J/m³; none without plasticity.
+    /// Energy density of the zero-energy control (the forces that resist zero-energy modes) that the point
+    /// would have if plastic flow did not reduce the control, J/m³; none without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
@@ -267,7 +268,7 @@ fields! {
         name: "external_work",
         ..ENERGY
     };
-    /// Power that viscous damping dissipates, r ρ V u̇², W; none without viscous damping.
+    /// Power that viscous damping at the rate r dissipates, r ρ V u̇², W; none without viscous damping.
     damping_power: Option<Vec<f64>> = Description {
         name: "damping_power",
         unit: "W",
@@ -683,23 +684,23 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds.
+    /// Reset the count of newly broken bonds of the main result to 0.
     pub fn forget_newly_broken(&mut self) {
         if let Some(new) = &mut self.newly_broken_bonds {
             new.fill(0.0);
         }
     }
 
-    /// Reset the count of newly broken bonds of a further result, given its index among the further results
-    /// with this count.
+    /// Reset the count of newly broken bonds of a further result to 0, given the index of this result among
+    /// the further results with such a count.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);
         }
     }
 
-    /// The columns of a field; `None` if decks cannot request the field, or if this run does not store it per
-    /// point.
+    /// The columns of a field for output; `None` if this run does not store the field. Fields such as the
+    /// damage are never stored, but computed for each output.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
             let there = !columns.is_empty() && description.output == Some(field);

@@ -17,7 +17,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 const ROUND_OFF: f64 = 1e-9;
 
 /// Torques below this fraction of Σ |arm| |force| are ignored, because they rotate a piece by a small angle
-/// only.
+/// only. The arm of a point is its position relative to the centroid of the piece.
 const SMALL_TORQUE: f64 = 0.01;
 
 /// Loads on a piece along an axis in which no support holds the piece.

@@ -47,7 +47,7 @@ pub struct LoadStep {
     /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
     /// point. The residual is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
-    /// Damping c of a relaxation; NaN if all points are at rest.
+    /// Damping c of a relaxation, see [`super::relaxation`]; NaN if all points are at rest.
     pub(super) damping: f64,
     /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, N. The tolerance is relative to at least this
     /// norm, so the allowed ‖f‖ does not shrink when a body is unloaded or breaks.
@@ -306,8 +306,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// Check that the load step has not failed. Collective.
     ///
     /// # Errors
-    /// If the load step has failed. The message names a piece that has loads but no supports, or the residual
-    /// if there is no such piece.
+    /// If the load step has failed. In runs without contact, the message names a piece that is loaded along
+    /// an axis in which no support holds it. If there is no such piece, or in runs with contact, the message
+    /// names the residual, or says that forces are not finite.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.progress.load_step.has_failed {
             return Ok(());
@@ -342,7 +343,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Return a text for error messages that describes the point with the largest unbalanced force; empty if
-    /// no point has bonds. Collective.
+    /// no point has ever had an intact bond. Collective.
     fn worst_point(&self) -> String {
         let (model, fields) = (&self.model, &self.fields);
         let density = fields.fictitious_density.as_deref().unwrap_or_default();

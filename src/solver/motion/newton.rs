@@ -1,6 +1,7 @@
 //! Equilibria by an inexact Newton method with conjugate gradients.
 //!
-//! [`super::load_step`] defines the equilibrium and when bonds break. An iteration is
+//! [`super::load_step`] defines the equilibrium and when bonds break. Let u be the displacements, f the total
+//! forces on the points, K = −∂f/∂u the tangent stiffness, and x the correction of u. An iteration is
 //!
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation per v
@@ -11,18 +12,19 @@
 //! η follows Eisenstat & Walker 1996, and the differences of f follow Knoll & Keyes 2004. f includes the
 //! reactions, so f is 0 for supported components. All force evaluations use the history that an equilibrium
 //! at the displaced positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that
-//! yield. ε is chosen such that the largest displacement component changes by `SHIFT` times the shortest
-//! horizon. The relative error of the difference is then of the order of `SHIFT` for bonds that rotate, and
-//! of the order of (machine ε)/`SHIFT` from rounding.
+//! yield. ε is chosen such that the largest component of ε v is `SHIFT` times the shortest horizon. The
+//! relative error of the difference is then of the order of `SHIFT` for bonds that rotate, and of the order
+//! of (machine ε)/`SHIFT` from rounding.
 //!
 //! K is symmetric if the forces of the law derive from an energy. In a body that softens or buckles, K may
 //! not be positive definite. The conjugate gradients then stop at the first direction of negative curvature.
 //! The preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
 //! (`coarse_grid.rs`), for long waves.
 //!
-//! The first iteration of a load step linearizes about the last equilibrium in two cases: the size of the
-//! load step has changed, or bonds broke in the last load step. The change of the prescribed displacements is
-//! then part of x. Otherwise, the points first repeat their motion of the last load step.
+//! A load step begins with a prediction of the displacements. The points repeat their motion of the last load
+//! step if the load steps have the same size and no bond broke in the last load step. Otherwise, and in the
+//! first load step of a stage, the prediction is the solution of the problem that is linearized about the
+//! last equilibrium. The change of the prescribed displacements is then part of x.
 //!
 //! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. A load
 //! step in which bonds have broken is not repeated, because an equilibrium at its full load was then found. A
@@ -44,7 +46,7 @@ use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
 use super::load_step::{CHUNK, sums};
 
-/// Largest displacement component of a finite difference, divided by the shortest horizon.
+/// Largest component of the displacement ε v in a finite difference, divided by the shortest horizon.
 const SHIFT: f64 = 1e-6;
 
 /// Maximum number of conjugate gradient iterations per Newton iteration.
@@ -53,17 +55,19 @@ const MAX_CG_ITERATIONS: u64 = 500;
 /// Maximum number of step lengths that are tried along a direction.
 const MAX_LINE_SEARCH_STEPS: usize = 8;
 
-/// The line search ends when |x·f| is at most this fraction of its initial value.
+/// The line search ends when |x·f| is at most this fraction of x·f before the search.
 const LINE_SEARCH_TOLERANCE: f64 = 0.9;
 
-/// η of the first iteration of a run, and the largest η.
+/// η of the first solution of a linear problem in a run.
 const FIRST_FORCING: f64 = 0.01;
+
+/// Upper limit of later values of η.
 const MOST_FORCING: f64 = 0.1;
 
 /// Lower bound of the tolerance of the linear problem, as a fraction of the tolerance of the load step.
 const LINEAR_TOLERANCE_SHARE: f64 = 0.5;
 
-/// Lower bound of the fraction of intact bonds in the diagonal of the preconditioner.
+/// Lower bound of a point's fraction of intact bonds in the preconditioner.
 const LEAST_INTACT: f64 = 1e-3;
 
 /// State of Newton's method between iterations; the same on all ranks.
@@ -72,9 +76,10 @@ pub struct NewtonState {
     /// Number of force evaluations of the present load step, with any method; in explicit stages, of the
     /// present time step.
     pub evaluations: u64,
-    /// η of the next iteration.
+    /// η of the next solution of a linear problem.
     forcing: f64,
-    /// Mean of the diagonal of K divided by the fictitious density; NaN until it is computed.
+    /// Mean of the diagonal of K, divided by the mean of the product of fictitious density and fraction of
+    /// intact bonds; NaN until it is computed.
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,
@@ -170,8 +175,9 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
 
 /// Work vectors over the owned points.
 struct Vectors<const D: usize> {
-    /// Displacement u at which differences are computed (m), and force density f at u (N/m³).
+    /// Displacement u at which differences are computed, m.
     base: [Vec<f64>; D],
+    /// Total force density f at `base`, N/m³.
     force: [Vec<f64>; D],
     /// Correction x, m.
     correction: [Vec<f64>; D],
@@ -183,9 +189,10 @@ struct Vectors<const D: usize> {
     product: [Vec<f64>; D],
     /// Preconditioned residual, m.
     preconditioned: [Vec<f64>; D],
-    /// Inverse of the diagonal of K, m⁴/N; 0 for supported components and for points that have never had a
-    /// bond.
+    /// Estimated inverse of the diagonal of K, m⁴/N; 0 for supported components and for points that have
+    /// never had an intact bond.
     inverse_diagonal: [Vec<f64>; D],
+    /// Coarse grid of the preconditioner.
     coarse: CoarseGrid<D>,
     /// Whether the preconditioner must be computed: at first, and after bonds have broken.
     is_stale: bool,
@@ -228,7 +235,8 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Make the first iteration of a load step, linearized about the last equilibrium. Collective.
+    /// Predict the displacements of a load step by the problem that is linearized about the last equilibrium.
+    /// Collective.
     fn predict(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let owned = simulation.model.owned();
         let fields = &mut simulation.fields;
@@ -289,9 +297,10 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Improve x by conjugate gradients until ‖f − K x‖ is at most η times its initial value, or
-    /// `LINEAR_TOLERANCE_SHARE` times `allowed`, or until the iterations are used up. `allowed` is the norm
-    /// ‖f‖ (N) that is accepted as equilibrium. Returns ‖f − K x‖ before and after. Collective.
+    /// Improve x by conjugate gradients until ‖f − K x‖ is at most η times its initial value, or at most
+    /// `LINEAR_TOLERANCE_SHARE` times `allowed`. `allowed` is the norm ‖f‖ (N) that is accepted as
+    /// equilibrium. The method also stops at a direction of negative curvature, and after
+    /// `MAX_CG_ITERATIONS`. Returns ‖f − K x‖ before and after. Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
@@ -392,9 +401,10 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Move the points along x until |x·f| is at most 0.9 of its first value, and compute the residual at the
-    /// new positions. The search also ends if the residual is within the tolerance, if x·f is not positive at
-    /// first, or after `MAX_LINE_SEARCH_STEPS` step lengths. Returns ‖f‖, N. Collective.
+    /// Move the points along x until |x·f| is at most `LINE_SEARCH_TOLERANCE` times x·f at `base`, and
+    /// compute the residual at the new positions. The search also ends if the residual is within the
+    /// tolerance, if x·f at `base` is not positive, or after `MAX_LINE_SEARCH_STEPS` step lengths. Returns
+    /// ‖f‖ at the new positions, N. Collective.
     fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
         let at_base = dot(simulation, &self.force, &self.correction);
         let mut length = 1.0;
@@ -504,8 +514,8 @@ impl<const D: usize> Vectors<D> {
         });
     }
 
-    /// Estimate [`NewtonState::diagonal`]; it is 1 if the estimate is not positive. For a vector s of random
-    /// signs, s·K s approximates the trace of K (Hutchinson 1990). Collective.
+    /// Estimate [`NewtonState::diagonal`], and replace an estimate that is not positive by 1. For a vector s
+    /// of random signs, s·K s approximates the trace of K (Hutchinson 1990). Collective.
     fn measure_diagonal(&mut self, simulation: &mut Simulation<'_, D>) {
         let owned = simulation.model.owned();
         for d in 0..D {
@@ -568,7 +578,8 @@ struct Linear {
 }
 
 impl NewtonState {
-    /// Choose the next η from the new force norm `force` (N) and the norms of the linear problem.
+    /// Choose the next η from the norm `force` of the forces at the new positions (N), and from the norms of
+    /// the linear problem.
     fn adapt(&mut self, linear: Linear, force: f64) {
         let forcing = (force - linear.last).abs() / linear.first;
         if forcing.is_finite() {

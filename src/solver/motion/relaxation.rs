@@ -47,9 +47,12 @@ impl<const D: usize> Integrator<D> for DynamicRelaxation {
 /// Upper limit of the damping c; from c = 2 on, the velocity would change its sign.
 const MOST_DAMPING: f64 = 1.9;
 
-/// Sums of the velocities u̇ of an iteration, before the force evaluation: u̇·f and u̇·ρ u̇, J.
+/// Sums over this rank's points, with the velocities u̇ of an iteration and the forces f before this
+/// iteration.
 struct Before {
+    /// Σ V u̇·f, J.
     power: ExactSum,
+    /// Σ V ρ u̇², J.
     inertia: ExactSum,
 }
 
@@ -93,7 +96,7 @@ impl<const D: usize> Simulation<'_, D> {
         velocity.for_each(|component| component.fill(0.0));
     }
 
-    /// Move the points by one iteration. Returns the sums of the new velocities and the old forces.
+    /// Move the points by one iteration. Returns the sums with the new velocities and the old forces.
     fn drift(&mut self) -> Before {
         self.progress.load_step.iterations += 1;
         self.progress.load_step.since_breaking += 1;

@@ -38,7 +38,8 @@ pub fn stable_step<const D: usize>(
     step[0]
 }
 
-/// The largest eigenvalue of a symmetric matrix given as xx, yy, zz, xy, yz, xz.
+/// The largest eigenvalue of a symmetric matrix given as xx, yy, zz, xy, yz, xz; 0 if this eigenvalue is
+/// negative.
 pub(super) fn largest_eigenvalue(entries: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *entries;
     let matrix = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);

@@ -18,7 +18,7 @@ type Columns<'a, const N: usize> = [&'a mut [f64]; N];
 
 /// A part of the owned points with their fields.
 pub struct Part<'a, const D: usize> {
-    /// All local points and their constants.
+    /// All local points, and the properties of their blocks.
     pub model: &'a Model<D>,
     /// Local index of the first point of the part.
     pub first: usize,
@@ -129,8 +129,8 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Write displacements and thermal stretches to the bond inputs, and zero the force sums of these
-    /// points.
+    /// Copy displacements and thermal stretches of the part's points to the bond inputs, and set the internal
+    /// forces on these points to 0.
     pub fn write_bond_inputs(&mut self) {
         let thermal_stretch = self.thermal_stretch.as_ref();
         self.bond_inputs.write_bond_inputs(

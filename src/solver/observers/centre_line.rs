@@ -147,7 +147,7 @@ impl Ways {
 
 /// Connected points of one section.
 struct Part {
-    /// The part before this one, towards the start of the crack.
+    /// Index of the part before this one, towards the start of the crack; `None` where paths begin.
     parent: Option<usize>,
     members: Vec<usize>,
     /// Largest path length of the points of this part and of its descendants, m.
@@ -229,7 +229,7 @@ fn drop_stubs(parts: &mut [Part]) {
 /// Join the centroids of successive parts to branches.
 fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
     // The vertex of a part is its centroid. For a part without children, the vertex is moved along the line
-    // from the previous vertex, up to the farthest point of the part.
+    // from the previous vertex through the centroid, up to the farthest point of the part along this line.
     let place = |part: &Part, before: Vector| {
         let members = || part.members.iter().map(|member| &points[*member]);
         let (mut sum, mut weight) = (Vector::zeros(), 0.0);

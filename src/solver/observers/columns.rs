@@ -13,7 +13,7 @@ use super::tip::TipNow;
 pub struct GlobalState {
     /// Time and step of the run.
     pub clock: Clock,
-    /// Energies of the whole body.
+    /// Energies of all bodies.
     pub energies: Energies,
     /// Momentum by component, kg m/s.
     pub momentum: Vec<f64>,
@@ -53,7 +53,8 @@ pub struct GlobalState {
     pub statistics: Vec<Vec<f64>>,
     /// Position of each front, m.
     pub fronts: Vec<f64>,
-    /// Two values per crack: length (m) and number of branches in 2-D, area (m²) and reach (m) in 3-D.
+    /// Two values per crack: length (m) and number of branches in 2-D; area (m²) and reach (m), see
+    /// [`Surface::reach`](super::Surface::reach), in 3-D.
     pub cracks: Vec<[f64; 2]>,
     /// State of each crack tip.
     pub tips: Vec<TipNow>,

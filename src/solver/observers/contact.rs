@@ -3,8 +3,8 @@
 //! bodies whose bonds have broken, it finds points that are nearer than half their spacing.
 //!
 //! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks
-//! by spatial cells, so that each rank compares a part of the points. Points of the second body are sent to
-//! the ranks of all cells that are near enough.
+//! by spatial cells, so that each rank compares a part of the points. A point of the second body is sent to
+//! the ranks of all cells that can contain a point of the first body which is too near.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ const NEARER: f64 = 0.9;
 /// spacing and their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
-/// Number of points that one task processes.
+/// Minimum number of points that one task processes; the last task may have fewer.
 const CHUNK: usize = 1 << 15;
 
 /// Two points of different bodies that are too near: nearer than their spacing, and nearer than 0.9 of their
@@ -48,7 +48,7 @@ pub struct Contact {
 
 /// Pairs of bodies that may come into contact.
 pub struct ContactWatch {
-    /// Pairs of bodies that no bond joins, or whose bonds can break.
+    /// All pairs of bodies if bonds can break in this run, otherwise the pairs that no bond joins.
     pairs: Vec<Pair>,
     /// Largest spacing of each body, m.
     spacing: Vec<f64>,
@@ -69,12 +69,13 @@ struct Meeting {
     pair: Pair,
     /// Largest distance of two points that is compared, m.
     radius: f64,
-    /// Corners of a box that contains all points of one body within `radius` of the other body, m.
+    /// Lower corner of a box that contains the points of each body within `radius` of the other body, m.
     lower: [f64; 3],
+    /// Upper corner of this box, m.
     upper: [f64; 3],
 }
 
-/// A point in messages to the ranks that compare it.
+/// A point in messages to the ranks that compare this point with points of the other body.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Candidate {
@@ -149,8 +150,8 @@ impl ContactWatch {
         agree_on_nearest(comm, nearest)
     }
 
-    /// Find the pairs of bodies whose bounding boxes overlap or are at most the mean of their spacings apart.
-    /// Collective.
+    /// Find the pairs of bodies whose bounding boxes overlap, or are at most the mean of the largest spacings
+    /// of the two bodies apart. Collective.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();

@@ -36,7 +36,7 @@ pub fn spacings<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; 2] {
     [-smallest, largest].map(|volume| simulation.problem.dimension.edge(volume))
 }
 
-/// Distance up to which damaged points are connected, m, but at least `least` (m).
+/// Return the distance up to which damaged points are connected, m; this distance is at least `least` (m).
 pub fn link(problem: &Problem, least: f64) -> f64 {
     (LINK * problem.horizon).max(least)
 }

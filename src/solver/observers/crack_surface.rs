@@ -3,7 +3,7 @@
 //! Let H be 1 on one side of a crack and 0 on the other. The integral of |∇H| over the volume is the area of
 //! the crack. At point i, the gradient g of H is the gradient of a linear function fitted to H by least
 //! squares. The fit has the weights ω Ṽ. H is 1 at neighbours j with a broken bond ij, and 0 at the other
-//! neighbours. With the mean ξ̄ of the family,
+//! neighbours. With the weighted mean ξ̄ of the bond vectors ξ of the family,
 //!
 //! g = C⁻¹ Σ_broken (ξ − ξ̄) ω Ṽ,   C = Σ (ξ − ξ̄) ⊗ (ξ − ξ̄) ω Ṽ over all bonds,   area = Σ |g| V.
 //!
@@ -49,7 +49,7 @@ pub struct CrackSurface {
     points: Vec<u32>,
     /// Distance up to which damaged points are connected, m.
     link: f64,
-    /// Radius of the surroundings of a point, m; about one horizon.
+    /// Distance up to which damaged points count as around a point, m; at most one horizon.
     radius: f64,
     /// Minimum distance between points of the front, m.
     front_spacing: f64,
@@ -77,7 +77,7 @@ struct FrontPoint {
 }
 
 impl CrackSurface {
-    /// Create the crack, and find the points of the set in which it is searched. Collective.
+    /// Create the crack, and find the points of the set in which the crack is searched. Collective.
     ///
     /// # Errors
     /// If the set is empty; the error is the same on all ranks.
@@ -244,8 +244,8 @@ impl CrackSurface {
         damaged
     }
 
-    /// Sort the points of the front by id, and remove points that are too close to an earlier point. Such
-    /// points lie, for example, on the other face of the crack.
+    /// Sort the points of the front by id, and remove points that are closer than `front_spacing` to an
+    /// earlier point. Such points lie, for example, on the other face of the crack.
     fn thinned(&self, mut front: Vec<FrontPoint>) -> Vec<[f64; 3]> {
         front.sort_unstable_by_key(|point| point.id);
         if front.is_empty() {

@@ -15,8 +15,8 @@ pub struct Fragments {
     pub count: u64,
     /// Number of points without intact bonds.
     pub loose: u64,
-    /// Mass of the largest fragment, which has the most points, kg. If several fragments have the most
-    /// points, it is the fragment with the smallest id.
+    /// Mass of the largest fragment, kg. The largest fragment is the fragment with the most points; among
+    /// several such fragments, the one with the smallest id.
     pub largest_mass: f64,
     /// Momentum of the largest fragment by component, kg m/s.
     pub largest_momentum: Vec<f64>,

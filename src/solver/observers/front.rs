@@ -37,8 +37,8 @@ impl Front {
         })
     }
 
-    /// Position along the line (m) up to which the magnitude of the field exceeds the threshold; NaN if the
-    /// magnitude nowhere exceeds the threshold. Collective.
+    /// Position along the line (m) up to which the absolute value of the field's component exceeds the
+    /// threshold; NaN if no absolute value exceeds the threshold. Collective.
     pub fn position<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

@@ -1,4 +1,4 @@
-//! The history of a run: energies and other sums, probes, fronts, crack paths and crack tips.
+//! The history of a run: energies and other sums, probes, fronts, cracks, crack tips and J integrals.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ use super::snapshot::Snapshot;
 use super::statistics::{self, FieldStatistics};
 use super::tip::Tip;
 
-/// Number of points that one task sums.
+/// Number of points that are summed one after the other, before sums are merged.
 const CHUNK: usize = 4096;
 
 /// A point whose values the history contains.
@@ -42,6 +42,7 @@ struct Probe {
 /// The columns of the history, and the data for computing them.
 pub struct HistoryObserver {
     columns: Columns,
+    /// For each set of `reactions` in the deck, this rank's points of the set.
     reactions: Vec<Vec<u32>>,
     /// For each support force, this rank's points of the set, and the direction of the force component.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
@@ -54,12 +55,12 @@ pub struct HistoryObserver {
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     j_integrals: JIntegrals,
-    /// Sum of the energy balance in the first row (J), and number of bonds that were intact before any bond
-    /// could break, counted at both ends.
+    /// Sum of the energy balance in the first row (J), see [`Energies::error`], and number of bonds that were
+    /// intact before any bond could break, counted at both ends. `None` before the first row.
     start: Option<(f64, u64)>,
 }
 
-/// Energies of the whole body, J.
+/// Energies of all bodies, J.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Energies {
     /// ½ Σ ρ V u̇² of the points.
@@ -79,9 +80,9 @@ pub struct Energies {
     /// Energy dissipated by viscous damping, plastic flow, softening, viscoelasticity, friction and contact
     /// damping.
     pub dissipated: f64,
-    /// Error of the energy balance kinetic + rigid + strain + contact + fracture + dissipated − work; 0 for an
-    /// exact integrator. The error is the change of this sum since the start.
-    /// Energy that refinements and changes of the density scale have added is subtracted.
+    /// Error of the energy balance: change of kinetic + rigid + strain + contact + fracture + dissipated −
+    /// work since the start, without the energy that refinements and changes of the density scale have added.
+    /// 0 for an exact integrator.
     pub error: f64,
 }
 
@@ -96,15 +97,15 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Sum of the energy balance in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
-    /// Kinetic energy, J, that loads and prescribed motions can add in a step without work in the trapezoidal
-    /// rule.
+    /// Kinetic energy, J, that loads and prescribed motions can add in a step, and that the trapezoidal rule
+    /// does not count as work.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
 }
 
 impl HistoryRow {
-    /// Return the largest energy of the balance, J, including the energy at the start.
+    /// Return the largest absolute value among the energies of the balance and [`Self::first_energy`], J.
     pub fn largest_energy(&self) -> f64 {
         let Energies {
             kinetic,
@@ -239,7 +240,7 @@ impl HistoryObserver {
         self.start = Some(start);
     }
 
-    /// Read the lengths of crack tips from earlier rows, for the speeds of the tips.
+    /// Read the lengths of cracks with a tracked tip from earlier rows, for the speeds of the tips.
     pub fn recall(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
@@ -332,7 +333,7 @@ impl HistoryObserver {
 
         dissipated += contact.friction;
         dissipated += contact.damping;
-        // The order of additions is part of the bits of the results.
+        // The last bits of the results depend on the order of these additions, so the order must stay.
         let (mut kinetic, mut rigid_energy) = (own[0], 0.0);
         for (state, energy) in &contact.rigid {
             kinetic += energy;
@@ -626,7 +627,7 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
     columns
 }
 
-/// Name of the column with the length of a crack tip.
+/// Name of the column with the length of the crack that has this tip.
 fn length_of(tip: &str) -> String {
     format!("tip_{tip}_length")
 }

@@ -1,4 +1,5 @@
-//! Weight q of a J integral: 1 inside a box, falling to 0 over a layer inside the faces.
+//! Weight q of a J integral: 1 inside a box, falling to 0 over a layer inside the faces. As in
+//! `j_integral.rs`, e is the unit vector in the direction of crack growth.
 
 use std::ops::Range;
 
@@ -55,8 +56,8 @@ pub fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f
     spacing.unwrap_or([problem.dimension.edge(model.volume[point]); 3])
 }
 
-/// Return the length of a cell along a direction, m. The component of the direction along an axis that the
-/// problem does not have is 0.
+/// Return √Σ(a n)² as the length of a cell with the edges a along the direction n, m. The component of n
+/// along an axis that the problem does not have is 0.
 fn extent(edges: [f64; 3], direction: [f64; 3]) -> f64 {
     let squares = edges.iter().zip(direction);
     let squares = squares.map(|(edge, component)| (component * edge).powi(2));

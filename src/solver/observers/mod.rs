@@ -1,5 +1,5 @@
-//! Observed quantities of a run: fields for the result; sums, probes, fronts, crack paths and crack tips
-//! for the history.
+//! Observed quantities of a run: fields for the result; sums, probes, fronts, cracks, crack tips and J
+//! integrals for the history.
 
 mod centre_line;
 mod columns;

@@ -65,10 +65,11 @@ impl Course {
     /// result is bitwise the same for any number of ranks. Collective.
     ///
     /// The search starts at the farthest point above the threshold; if several are equally far, at the one
-    /// with the smallest id. The next points are the nearest points ahead of this point, within one horizon.
-    /// The value is interpolated linearly between this point and the next points to find the threshold. If
-    /// several next points are equally near, the largest value is used. When values grow, the position
-    /// therefore grows without jumps, even when the next point exceeds the threshold.
+    /// with the smallest id. The next points are the nearest points ahead of this point along the line,
+    /// within one horizon of this point. The values are interpolated linearly between the farthest and the
+    /// next points to find the threshold. If several of these points are equally far, the largest value is
+    /// used. When values grow, the position therefore grows without jumps, even when the next point exceeds
+    /// the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

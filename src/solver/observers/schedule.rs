@@ -89,8 +89,8 @@ impl Schedule {
     }
 }
 
-/// Relative round-off of the clock: a step that falls short of a given time by less than this fraction
-/// reaches it.
+/// Relative round-off of the clock: a step that falls short of a given time by less than this fraction counts
+/// as reaching this time.
 const ROUNDING: f64 = 1e-12;
 
 /// Number of whole intervals of length `seconds` in `time` (s), up to round-off.
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn given_times() {
-        // Output is due at the first step that reaches a given time, and once per step.
+        // Output is due at the first step that reaches a given time; once if a step reaches several times.
         assert_eq!(
             due(None, &[0.3, 0.55, 0.58, 0.7], 0.1, 10),
             [0, 3, 6, 7, 10]

@@ -170,7 +170,7 @@ fn cauchy_stress<const D: usize>(
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        // Thermal expansion is isotropic, so it is divided out of F.
+        // Thermal expansion is isotropic, so F is divided by the thermal stretch.
         let thermal = 1.0 + free_stretch(simulation, point);
         let gradient = gradient / thermal;
         let in_plane = determinant(&gradient);
@@ -283,7 +283,8 @@ fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) ->
     }
 }
 
-/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa.
+/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa, with Young's modulus E,
+/// the coefficient of thermal expansion α, the temperature T and the reference temperature T₀.
 fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let Some(temperature) = &simulation.fields.temperature else {
         return 0.0;

@@ -11,7 +11,7 @@ use crate::solver::conditions::{members, not_empty};
 
 use super::row_fields::RowFields;
 
-/// Number of points that one task sums.
+/// Number of points that are summed one after the other, before sums are merged.
 const CHUNK: usize = 4096;
 
 /// The statistics of a field over a set.
@@ -115,8 +115,8 @@ impl FieldStatistics {
         chunks.reduce(|| Totals::EMPTY, |a, b| a.merge(&b))
     }
 
-    /// Compute the values of all columns, one list per statistics. The values are bitwise the same for any
-    /// number of ranks and threads. Collective.
+    /// Compute the values of all columns, one list per entry of `all`. The values are bitwise the same for
+    /// any number of ranks and threads. Collective.
     pub fn values<const D: usize>(
         all: &[Self],
         simulation: &mut Simulation<'_, D>,

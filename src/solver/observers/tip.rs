@@ -82,12 +82,12 @@ impl Tip {
         }
     }
 
-    /// Take over the past lengths from an earlier observer of the same tip.
+    /// Move the past lengths of the crack from an earlier observer of the same tip to this one.
     pub fn take_past(&mut self, earlier: &mut Self) {
         std::mem::swap(&mut self.growth, &mut earlier.growth);
     }
 
-    /// Add a length (m) of an earlier row at a time (s).
+    /// Record the length of the crack (m) in an earlier row at a time (s).
     pub fn recall(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);
     }
