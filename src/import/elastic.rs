@@ -27,7 +27,7 @@ impl Constants {
     /// # Errors
     /// If a constant is not a number.
     pub fn read(translation: &Translation, material: &Node) -> Result<Self> {
-        let mut given = Vec::new();
+        let mut given: Vec<(&str, f64, Value)> = Vec::new();
         for (name, key) in NAMES {
             if let Some(node) = material.get(name) {
                 if given.iter().any(|(other, ..)| *other == key) {

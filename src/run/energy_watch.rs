@@ -48,8 +48,6 @@ pub struct EnergyWatch {
     warned_of_breaking: bool,
     /// Whether the ratio of energy gain to energy input in the last row was above [`FATAL_GAIN`].
     suspected: bool,
-    /// Time step and stable step, as a text for messages.
-    steps: String,
 }
 
 impl EnergyWatch {
@@ -62,7 +60,6 @@ impl EnergyWatch {
             let material = &problem.block(usize::from(*block)).body.material;
             stiffness[0].add(material.elastic.youngs_modulus * volume);
         }
-        let (step, stable) = (simulation.clock.step(), simulation.undeformed.stable_step);
         Self {
             floor: ROUNDOFF_STRAIN * ROUNDOFF_STRAIN * reduce(comm, &mut stiffness)[0],
             input: 0.0,
@@ -70,13 +67,12 @@ impl EnergyWatch {
             max_freed: 0.0,
             warned_of_breaking: false,
             suspected: false,
-            steps: format!("time step {step:.3e} s, stable {stable:.3e} s"),
         }
     }
 
     /// Check the ratio of energy gain to energy input in a row of the history. Return a warning at the first
-    /// row with a ratio above [`WARNING_GAIN`]. `is_last`: whether this is the last row of the run. The
-    /// result is the same on all ranks.
+    /// row with a ratio above [`WARNING_GAIN`]. `stable` is the stable step of the present stage, s. `is_last`:
+    /// whether this is the last row of the run. The result is the same on all ranks.
     ///
     /// # Errors
     /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
@@ -85,6 +81,7 @@ impl EnergyWatch {
         &mut self,
         row: &HistoryRow,
         clock: &Clock,
+        stable: f64,
         is_last: bool,
     ) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
@@ -103,10 +100,11 @@ impl EnergyWatch {
                 self.input,
             )
         };
+        let steps = format!("time step {:.3e} s, stable {stable:.3e} s", clock.step());
         let fatal = relative_gain > FATAL_GAIN;
         let certain = relative_gain.is_nan() || relative_gain > CERTAIN_GAIN;
         if certain || (fatal && (self.suspected || is_last)) {
-            let message = format!("{}; reduce the time step ({})", text(), self.steps);
+            let message = format!("{}; reduce the time step ({steps})", text());
             return Err(Error::run(message));
         }
         self.suspected = fatal;
@@ -114,7 +112,7 @@ impl EnergyWatch {
             return Ok(None);
         }
         self.warned = true;
-        Ok(Some(format!("{} ({})", text(), self.steps)))
+        Ok(Some(format!("{} ({steps})", text())))
     }
 
     /// Check the fracture energy of a row of the history. Return a warning at the first row in which breaking
@@ -198,7 +196,6 @@ mod tests {
             max_freed: 0.0,
             warned_of_breaking: false,
             suspected: false,
-            steps: String::new(),
         };
         let energies = |work: f64, error: f64| Energies {
             work,

@@ -352,7 +352,8 @@ impl<'a> Job<'a> {
                 if let (Some(energy), Some(row), false) =
                     (&mut energy, recorder.row_of(&clock), is_quasi_static)
                 {
-                    let growth = energy.check(row, &clock, complete);
+                    let stable = stepper.at_full_step().scaled_stable_step();
+                    let growth = energy.check(row, &clock, stable, complete);
                     let of_breaking = energy.check_breaking(row, &clock);
                     match growth {
                         Ok(text) => {

@@ -4,15 +4,13 @@ use std::collections::HashSet;
 
 use crate::comm::sum::reduce;
 use crate::comm::{ExactSum, total};
+use crate::component::AXES;
 use crate::error::Warning;
 use crate::expression::Expression;
 use crate::message::format_number;
 use crate::problem::{Action, Condition, Depth, Problem, Stage};
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
-
-/// Names of the components.
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Largest factor between the thickness of a loaded layer and the depth of the load. A warning is printed if
 /// the thickness is larger or smaller by more than this factor. A curved layer of one cell is up to π/2 cells

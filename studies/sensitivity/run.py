@@ -4,8 +4,9 @@
 Each row of the table or design is one run of the deck. The runs are executed in parallel on this machine or as
 a Slurm array. The same command continues an interrupted study: complete rows are kept, other rows restart from
 their checkpoints. After the runs, the outputs that the study file defines are collected from the histories into
-results.csv. For a Morris design, μ* (the mean of the absolute elementary effects) and σ (their standard
-deviation) of each parameter are computed and drawn. The crack paths of all runs are drawn in one picture.
+results.csv. For a Morris design, μ* (the mean of the absolute elementary effects) with its 95 % confidence
+interval, and σ (the standard deviation of the elementary effects), are computed, printed and drawn. The crack
+paths of all runs are drawn in one picture.
 """
 
 import argparse
@@ -541,10 +542,13 @@ def write_sensitivities(study, options, found):
     for (output, effects), (bars, plane) in zip(found.items(), axes):
         unit = study.outputs[output].get("unit")
         unit = f", {unit}" if unit else ""
-        mu_star, sigma = numpy.array(effects["mu_star"]), numpy.array(effects["sigma"])
+        mu_star, sigma, confidence = (numpy.array(effects[key]) for key in ("mu_star", "sigma", "mu_star_conf"))
         order = numpy.argsort(mu_star)
-        bars.barh([labels[k] for k in order], mu_star[order], xerr=sigma[order], color="#1b6ca8", ecolor="0.5")
-        bars.set_title(f"{output}: μ* and σ{unit}", fontsize=10)
+        bars.barh([labels[k] for k in order], mu_star[order], xerr=confidence[order], color="#1b6ca8", ecolor="0.5")
+        bars.set_title(f"{output}: μ* and its 95 % confidence interval{unit}", fontsize=10)
+        print(f"{output}{unit}: μ* ± half of its 95 % confidence interval, σ")
+        for k in order[::-1]:
+            print(f"  {study.names[k]:<20} {mu_star[k]:>10.4g} ± {confidence[k]:<10.3g} {sigma[k]:>10.4g}")
         bars.set_xlim(left=0)
         plane.scatter(mu_star, sigma, color="#d1495b", s=18)
         for k, label in enumerate(labels):

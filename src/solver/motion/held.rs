@@ -1,6 +1,7 @@
 //! Check that supports hold the loaded pieces of bodies in load steps.
 
 use crate::comm::sum::{ExactSum, reduce};
+use crate::component::AXES;
 use crate::error::{Error, Result};
 use crate::problem::{Method, Relaxation, Static, Time};
 use crate::solver::Simulation;
@@ -9,9 +10,6 @@ use crate::solver::model::Model;
 use super::Fields;
 use super::load_step::sums;
 use super::pieces::{Piece, Pieces};
-
-/// Names of the axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A sum of loads is round-off if it is below this fraction of the sum of their magnitudes.
 const ROUND_OFF: f64 = 1e-9;
