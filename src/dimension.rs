@@ -27,9 +27,9 @@ pub enum Dimension {
 /// Condition perpendicular to a bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Constraint {
-    /// No stress perpendicular to the bar: its modulus is E.
+    /// No stress perpendicular to the bar; the bar has the modulus E.
     UniaxialStress,
-    /// No strain perpendicular to the bar: its modulus is λ + 2G.
+    /// No strain perpendicular to the bar; the bar has the modulus λ + 2G.
     UniaxialStrain,
 }
 

@@ -24,8 +24,8 @@ impl Moving {
     }
 }
 
-/// Compute the change of the code's value when the time grows from t to t + `step`. `variables` are x, y, z
-/// and t.
+/// Compute the change of the code's value from the time t to t + `step`; `step` may be negative. `variables`
+/// are x, y, z and t.
 pub(super) fn increment(
     code: &[Instruction],
     tables: &[Arc<Table>],

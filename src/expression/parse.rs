@@ -33,7 +33,8 @@ pub(super) fn parse(text: &str, scope: &Scope) -> Result<Vec<Instruction>, Expre
     }
 }
 
-/// Return the names in the text that are neither functions nor constants, each once, in order.
+/// Return the names in the text that are neither functions nor constants, each once, in order. A name counts
+/// as a function if `(` follows.
 pub(super) fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
     let tokens = tokenize(text)?;
     let mut names: Vec<String> = Vec::new();
@@ -207,7 +208,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// Parse the arguments of a call of this function.
+    /// Parse the arguments of a call of the function `name`, and append the instruction of the function.
     fn call(&mut self, name: Token) -> Result<(), ExpressionError> {
         let function = self
             .scope

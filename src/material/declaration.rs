@@ -85,7 +85,7 @@ impl Declaration {
         }
     }
 
-    /// Test whether the law breaks bonds without a damage law.
+    /// Test whether the law has its own critical stretch, so that its bodies have no damage law.
     pub fn breaks_by_itself(&self) -> bool {
         self.own_critical_stretch.is_some()
     }
@@ -107,13 +107,14 @@ impl fmt::Debug for Declaration {
     }
 }
 
-/// Invariants of a law that hold after any motion.
+/// Invariants of a law: which of these statements hold for any motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Invariants {
     /// Forces are the gradient of the strain energy. This holds neither for laws that dissipate energy nor
     /// for `stress = "willberg2022"`.
     pub conservative: bool,
-    /// Rotating a motion rotates the forces.
+    /// Rotating a motion rotates the forces. [Linear](Declaration::linear) laws are excepted: their forces
+    /// keep the direction of ξ.
     pub objective: bool,
     /// The internal forces of a body have no resultant moment.
     pub angular_momentum: bool,
@@ -314,7 +315,7 @@ pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy(given.dimension, given.elastic, energy, given.horizon)
 }
 
-/// A law with the data that the loops over bonds do not read.
+/// A law and its influence function.
 pub struct Built {
     /// The law that the loops over bonds call.
     pub law: AnyLaw,

@@ -299,8 +299,8 @@ fn rounded(number: f64) -> String {
     digits.parse().map_or(digits, format_number)
 }
 
-/// Return the error message if bonds would break before they soften. With a long horizon, bonds at their
-/// strength store more than the fracture energy.
+/// Return the error message if sc is not above s0, so that bonds would break before they soften. With a long
+/// horizon, bonds at s0 store more than the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -445,7 +445,7 @@ impl SofteningPmb {
             .min(Lanes::splat(self.critical_stretch))
     }
 
-    /// Return the position of stretches between `from` and `to`, from 0 to 1.
+    /// Return (stretch − `from`)/(`to` − `from`), clamped to the range from 0 to 1.
     #[inline(always)]
     fn way(stretch: Lanes, from: f64, to: f64) -> Lanes {
         let way = (stretch - Lanes::splat(from)) * (1.0 / (to - from));

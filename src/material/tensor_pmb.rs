@@ -21,20 +21,20 @@ use super::symmetric::{Symmetric, mixed, quadratic_form, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
-/// Smallest eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are two or
-/// three points thick.
+/// Smallest allowed eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are
+/// two or three points thick.
 const SMALLEST: f64 = 0.2;
 
-/// Largest eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly in one
-/// plane, would be unbounded.
+/// Largest allowed eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly
+/// in one plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
 /// norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest ratio is 0.23 at a corner of a plate, 0.14 at a corner of a
-/// block, and 0.1 in a strip two points wide. The ratio is below 1e-4 in a slightly bent strip one point
-/// wide.
+/// For a horizon of 3 spacings, the smallest of these fractions is 0.23 at a corner of a plate, 0.14 at a
+/// corner of a cuboid, and 0.1 in a strip two points wide. It is below 1e-4 in a slightly bent strip one
+/// point wide.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
@@ -47,8 +47,8 @@ pub struct TensorPmb {
     micromodulus: f64,
     /// Shear modulus μ of the solid, Pa.
     shear_modulus: f64,
-    /// Whether the critical stretch is scaled with the micromodulus, because it follows from a fracture
-    /// energy.
+    /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with the
+    /// micromodulus.
     is_scaled: bool,
 }
 
@@ -219,8 +219,8 @@ impl<const D: usize> Law<D> for TensorPmb {
 mod tests {
     use super::*;
 
-    /// Return H of a point with neighbours at these offsets, all of the same volume, with a micromodulus that
-    /// suits a disc.
+    /// Return H of a point with neighbours of unit volume at these offsets. With the constants of this test,
+    /// H in the middle of a disc with a radius of 3 is of the order of I.
     fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
         let mut sums = [0.0; MONOMIALS];
         for [x, y] in offsets {

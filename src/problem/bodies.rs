@@ -245,12 +245,13 @@ pub struct Damage {
     pub rule: DamageRule,
     /// The toughness, from which the threshold follows.
     pub toughness: Toughness,
-    /// α in the criterion s ≥ s0 − α s_min.
+    /// α in the criterion s ≥ s0 − α s_min: a bond breaks if its stretch s reaches this threshold. s0 is the
+    /// critical stretch, and s_min the smallest stretch of the intact bonds of a point.
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
     /// Dependence of the fracture energy on the direction of the crack; `None` if all directions are equal.
-    /// Otherwise, `toughness` is the fracture energy of cracks along the axis.
+    /// Otherwise, `toughness` is the fracture energy of cracks along the axis a of [`ToughnessByDirection`].
     pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,

@@ -269,7 +269,8 @@ pub enum Field {
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.
     Temperature,
-    /// Fragment id: the smallest id of the points that intact bonds connect to the point.
+    /// Fragment id: the smallest id in the fragment of the point, which contains all points that chains of
+    /// intact bonds connect to the point.
     Fragment,
     /// The rank that owns the point.
     Rank,

@@ -75,7 +75,8 @@ pub enum Method {
 pub struct Static {
     /// Number of load steps.
     pub load_steps: u64,
-    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
+    /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
+    /// reactions.
     pub tolerance: f64,
     /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub max_iterations: u64,
@@ -118,7 +119,8 @@ impl Method {
 pub struct Relaxation {
     /// Number of load steps.
     pub load_steps: u64,
-    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
+    /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
+    /// reactions.
     pub tolerance: f64,
     /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub iterations: u64,

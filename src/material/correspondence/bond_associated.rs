@@ -112,8 +112,8 @@ impl Places {
         Self::direct::<D>() + D * D
     }
 
-    /// Return the index of the flag for a point without force: K is nearly singular, the intact part is too
-    /// stiff, or a bond has no stress.
+    /// Return the index of the flag for a point without force: K is nearly singular, the intact part of the
+    /// family is too stiff, or a bond has no stress.
     const fn singular<const D: usize>() -> usize {
         Self::inverse::<D>() + 2 * D
     }
@@ -176,8 +176,8 @@ impl<const D: usize> Law<D> for BondAssociated {
         }
     }
 
-    /// Return the trace of the shape tensor of an untruncated family, divided by the trace of K of this
-    /// family; 1 if K is nearly singular.
+    /// Return the trace of the shape tensor of an untruncated family, divided by the trace of K of the point;
+    /// 1 if K is nearly singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {

@@ -184,7 +184,8 @@ type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// Count of the point's own numbers: W − ½ P : H (J/m³), and the flag of a point without force.
+/// Count of the point's [own numbers](Law::OWN_NUMBERS): W − ½ P : H (J/m³), and the flag of a point without
+/// force.
 ///
 /// If a body yields and has a control, two more numbers follow. The first is ½ tr(B H K Hᵀ), the part of
 /// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is s at the start of the step.

@@ -7,18 +7,18 @@ use crate::material::monomials::{index_of, least_squares, multiplicity};
 use crate::material::symmetric::mixed;
 
 /// Smallest allowed σ/σ₀; bonds with σ ≤ 0 would repel when stretched. For a horizon of 3 spacings, the
-/// smallest σ/σ₀ at a corner of a block is about 0.4.
+/// smallest σ/σ₀ at a corner of a cuboid is about 0.4.
 const SMALLEST: f64 = 0.1;
 
 /// Largest allowed σ/σ₀. Without a limit and for a horizon of 3 spacings, σ/σ₀ reaches 1.8 at edges of a
-/// block, 12 in bars that are three points thick, and 30 in sheets of two layers.
+/// cuboid, 12 in bars that are three points thick, and 30 in sheets of two layers.
 const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
 /// norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two
-/// layers, and 0 in a single layer.
+/// For a horizon of 3 spacings, the smallest of these fractions is 0.08 at a corner of a cuboid, 0.007 in a
+/// sheet of two layers, and 0 in a single layer.
 const RANK: f64 = 5e-3;
 
 /// The exponents and the coefficient of a monomial of degree 2 in the components of n or N.
