@@ -204,7 +204,7 @@ impl Expression {
             tables,
         };
         let mut code = parse::parse(text, &scope)?;
-        // Drop unused tables, so that equality of expressions does not depend on these.
+        // Drop unused tables, so that equality of expressions does not depend on unused tables.
         let mut used: Vec<usize> = Vec::new();
         for instruction in &mut code {
             if let Instruction::Table(number) = instruction {

@@ -1,6 +1,6 @@
 //! Geometry of eight deformed bonds, without square roots and divisions at small strains.
 //!
-//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², the square of its length is
+//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², the square of its length |Y| is
 //! |Y|² = |ξ|² (1 + x).
 //! Laws need two functions of x:
 //!

@@ -155,7 +155,7 @@ impl Relaxation {
         let [gone, beta] = self.relaxed(step);
         let change = (*before - *back) * gone + (deviatoric - *before) * beta;
         let now = *back + change;
-        // Energy that the dashpot dissipates, with its force at the middle of the step.
+        // Energy that the dashpot dissipates, with the force of the dashpot at the middle of the step.
         let force = (*before - *back + deviatoric - now) * (0.5 * self.share);
         let taken = factor * force * change;
         [now, deviatoric, *loss + taken]

@@ -363,8 +363,8 @@ impl SofteningPmb {
         pulled * self.secant(pulled) + stretch.min(zero)
     }
 
-    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by its elastic stress at
-    /// the axial strain s0.
+    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by the elastic stress of
+    /// this body at the axial strain s0.
     pub fn largest_tension(&self, dimension: Dimension) -> f64 {
         let in_space = match dimension {
             Dimension::Line { .. } => return 1.0,

@@ -33,8 +33,8 @@ const LARGEST: f64 = 30.0;
 /// norm is used.
 ///
 /// For a horizon of 3 spacings, the smallest of these fractions is 0.23 at a corner of a plate, 0.14 at a
-/// corner of a cuboid, and 0.1 in a strip two points wide. It is below 1e-4 in a slightly bent strip one
-/// point wide.
+/// corner of a cuboid, and 0.1 in a strip two points wide. The fraction is below 1e-4 in a slightly bent
+/// strip one point wide.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
@@ -100,9 +100,9 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
-    // A row stands for several equal tensor components. Its weight is the square root of their number, so
-    // that the fit does not depend on the axes. Columns have the same weights; then the solution of smallest
-    // norm is independent of the axes, too.
+    // A row stands for several equal tensor components. The weight of the row is the square root of the
+    // number of these components, so that the fit does not depend on the axes. Columns have the same weights;
+    // then the solution of smallest norm is independent of the axes, too.
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
         let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
         let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();

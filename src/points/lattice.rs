@@ -11,7 +11,8 @@ use super::{MAX_PER_RANK, Point, distance_squared, shape};
 /// Binary logarithm of the maximum number of cells per rank. Testing this number of cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
-/// Number of candidate cells that are sampled to estimate the fraction of them that belongs to a body.
+/// Number of candidate cells that are sampled to estimate the fraction of candidate cells that belong to a
+/// body.
 const SAMPLES: u64 = 1 << 17;
 
 /// Step of a low-discrepancy sequence in [0, 1): the inverse of the golden ratio.
@@ -209,7 +210,7 @@ impl<'a> LatticeBody<'a> {
         let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);
         let mut within = 0;
         for k in 0..samples {
-            // With few cells, sample each one equally often. With many cells, sample some of them once.
+            // With few cells, sample each cell equally often. With many cells, sample some cells once.
             let index = if region.total() <= SAMPLES {
                 k % region.total()
             } else {

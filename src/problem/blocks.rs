@@ -18,7 +18,7 @@ pub enum Kind {
     Whole,
     /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,
-    /// Points with coarser points within their horizon. The horizon of these points is enlarged by
+    /// Points with coarser points within their horizon. The horizon of these points is multiplied by
     /// [`Refinement::interface_factor`](super::Refinement::interface_factor).
     AtCoarser,
 }

@@ -245,8 +245,9 @@ pub struct Damage {
     pub rule: DamageRule,
     /// The toughness, from which the threshold follows.
     pub toughness: Toughness,
-    /// α in the criterion s ≥ s0 − α s_min: a bond breaks if its stretch s reaches this threshold. s0 is the
-    /// critical stretch, and s_min the smallest stretch of the intact bonds of a point.
+    /// α in the threshold s0 − α s_min of the stretch. s0 is the critical stretch, and s_min the smallest
+    /// stretch of the intact bonds of a point. With [`DamageRule::Energy`], α changes the critical work in
+    /// the same way.
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,

@@ -40,7 +40,7 @@ pub struct Balance {
     pub imbalance: f64,
 }
 
-/// Settings of the main result file or a further one.
+/// Settings of the main result file or of a further result file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     /// Name of a further result; `None` for the main result.
@@ -53,7 +53,8 @@ pub struct Output {
     pub fields: Vec<Field>,
     /// Whether the fields are rounded to 4-byte numbers.
     pub single: bool,
-    /// Index of the set whose points the result contains, and the span of its name; `None` for all points.
+    /// Index of the set whose points the result contains, and the span of the set's name in the deck; `None`
+    /// for all points.
     pub set: Option<(usize, Range<usize>)>,
 }
 

@@ -27,8 +27,8 @@ pub struct Refinement {
 }
 
 /// Criteria of refinement during the run. A point that fulfils [`Self::energy`], [`Self::damage`] or
-/// [`Self::condition`], and also [`Self::only`], triggers refinement: all points within its horizon are
-/// refined, one level at a time. Criteria that are `None` are not used.
+/// [`Self::condition`], and also [`Self::only`], triggers refinement: all points within the horizon of this
+/// point are refined, one level at a time. Criteria that are `None` are not used.
 #[derive(Debug, Clone)]
 pub struct Trigger {
     /// Span in the deck.

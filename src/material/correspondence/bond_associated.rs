@@ -10,8 +10,7 @@
 //!
 //! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|², W = Σ w Ψ(F_ξ), w = ω Ṽ/Σ ω Ṽ,
 //!
-//! summed over the intact bonds. The force state is the derivative of W. With the stress P_ξ = ∂Ψ/∂F at F_ξ
-//! it is
+//! summed over the intact bonds. With the stress P_ξ = ∂Ψ/∂F at F_ξ, the derivative of W is the force state
 //!
 //! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ), Z = Σ w P_ξ (I − n⊗n).
 //!

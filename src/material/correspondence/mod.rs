@@ -197,8 +197,8 @@ const OWN_OF_ELASTIC: usize = 2;
 /// A, and the diagonal and mixed entries of B, N/m⁷.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
-/// Return A ξ + B η, N/m⁶. The rows are written out, because the compiler would not unroll a loop over them,
-/// and would keep all of its data in memory instead of registers.
+/// Return A ξ + B η, N/m⁶. The rows are written out, because the compiler would not unroll a loop over the
+/// rows, and would keep the data of such a loop in memory instead of registers.
 #[inline(always)]
 fn times_bond<S: Simd, const D: usize>(
     simd: S,

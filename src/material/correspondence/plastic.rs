@@ -492,8 +492,8 @@ mod tests {
             if state.equivalent > before.equivalent {
                 hardened += usize::from(state.yield_change > 0.0);
                 assert!(over > -tolerance, "{over}");
-                // The increment of the plastic strain is along the deviator; its length gives the increment
-                // of the equivalent strain.
+                // The increment of the plastic strain is along the deviator. The length of this increment
+                // gives the increment of the equivalent plastic strain.
                 let growth = state.equivalent - before.equivalent;
                 let wanted = deviator(&stress) * (1.5 * growth / equivalent(&stress));
                 assert!((flow - wanted).norm() < 1e-9 * growth);
