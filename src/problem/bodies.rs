@@ -246,8 +246,8 @@ pub struct Damage {
     /// The toughness, from which the threshold follows.
     pub toughness: Toughness,
     /// α in the threshold s0 − α s_min of the stretch. s0 is the critical stretch, and s_min the smallest
-    /// stretch of the intact bonds of a point. With [`DamageRule::Energy`], α changes the critical work in
-    /// the same way.
+    /// stretch of the intact bonds of a point. With [`DamageRule::Energy`], the critical work is multiplied
+    /// by ((s0 − α s_min)/s0)².
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
