@@ -60,7 +60,7 @@ impl Dimension {
         libm::pow(extent, 1.0 / self.count() as f64)
     }
 
-    /// Return the Poisson's ratio of bond-based laws. If [`Self::allows_any_poisson_ratio`] is true, these
+    /// Return Poisson's ratio of bond-based laws. If [`Self::allows_any_poisson_ratio`] is true, these
     /// laws also allow other values.
     pub fn bond_based_poisson_ratio(self) -> f64 {
         match self {

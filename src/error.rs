@@ -45,8 +45,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// Format a user's text for a message: in backticks, with escaped control characters. A text longer than
-/// `EXCERPT` characters is cut off there, and followed by `…`.
+/// Format a user's text for a message: in backticks, with escaped control characters. Of a longer text, the
+/// message contains only the first `EXCERPT` characters, followed by `…`.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {
@@ -71,7 +71,7 @@ impl Error {
         }
     }
 
-    /// Create an error about a wrong deck or wrong arguments.
+    /// Create an error about wrong input: a deck, a file that the deck names, or the command line.
     pub fn input(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Input, message)
     }

@@ -170,8 +170,8 @@ impl Scope<'_> {
     }
 }
 
-/// Return the part of an error message after the unknown name: a suggestion of the most similar name and a
-/// question mark, or a semicolon if no name is similar.
+/// Return the part of an error message after the unknown name: `; did you mean …?` with the most similar
+/// name, or `;` if no name is similar.
 fn suggestion(name: &str, names: &[&str]) -> String {
     let lower = name.to_lowercase();
     let tolerance = match lower.len() {

@@ -101,7 +101,8 @@ impl Parser<'_> {
         append(&mut self.code, instruction);
     }
 
-    /// Parse a value and the following operators that bind at least as tightly as `loosest`.
+    /// Parse a value, and the following operators that bind at least as tightly as `loosest`, with their
+    /// right operands.
     fn expression(&mut self, loosest: Precedence) -> Result<(), ExpressionError> {
         let first = self.peek();
         if self.nesting > DEEPEST_NESTING {

@@ -32,7 +32,7 @@ pub struct Declaration {
     /// combination is allowed.
     pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
     /// Return the elastic constants that follow from the law's own keys, if the deck gives these keys. Such a
-    /// deck must give no other elastic constants.
+    /// deck must give no other elastic constants. The field is `None` if no such keys exist.
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
     /// Whether the energy criterion can break bonds of this law.
     pub breaks_by_energy: bool,
@@ -132,7 +132,7 @@ impl Invariants {
 /// An error in the values of a law's keys.
 #[derive(Debug, Clone)]
 pub struct LawFault {
-    /// The wrong key; `None` if several keys are involved.
+    /// The wrong key; `None` if the error is not in a single key, for example if a key is missing.
     pub key: Option<&'static str>,
     /// Message: what is wrong, and what is allowed.
     pub message: String,
@@ -305,8 +305,9 @@ pub struct Given<'a> {
     pub horizon: f64,
     /// Values of the law's own keys; all required keys have a value.
     pub values: &'a Values,
-    /// Whether the critical stretch follows from a fracture energy; the law may then scale it by a factor per
-    /// bond. Otherwise the deck gives the critical stretch, and all bonds have this critical stretch.
+    /// Whether the critical stretch follows from a fracture energy; the law may then scale the critical
+    /// stretch by a factor per bond. Otherwise, the deck gives a critical stretch that holds for all bonds,
+    /// or the bonds have no damage.
     pub from_fracture_energy: bool,
 }
 

@@ -366,14 +366,16 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Test whether the law needs enough bonds in all directions. The intact bonds of a point are then
-    /// compared with all bonds of the point, including the bonds that pre-cracks cut.
+    /// Test whether the law needs enough bonds in all directions. The initial family of a point then includes
+    /// the bonds that pre-cracks cut, so that the law can compare the intact bonds with all bonds of the
+    /// point.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Test whether a point carries no force, because the law cannot use its intact bonds (too few or too
-    /// stiff), or because the law has no stress at the deformation of the point.
+    /// Test whether a point carries no force, because the law cannot use the intact bonds of the point (too
+    /// few or too stiff), or because the law has no stress at the deformation of the point or of one of its
+    /// bonds.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }

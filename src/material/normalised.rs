@@ -27,7 +27,8 @@ pub struct Normalised {
     /// `form = "diehl2016"`.
     pub energy: f64,
     /// Micromodulus c of an untruncated family, N/m⁶, for which the damage law has computed the critical
-    /// stretch; `None` if the deck gives the critical stretch, which then holds for all bonds.
+    /// stretch. `None` if the deck gives the critical stretch, which then holds for all bonds, or if the
+    /// bonds have no damage.
     pub reference: Option<f64>,
 }
 

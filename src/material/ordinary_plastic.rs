@@ -18,9 +18,9 @@
 //! After that, Mitchell's θ of the total extension e would not give a force that derives from the energy. The
 //! remaining plastic extensions would expand the family, and breaking bonds would add energy.
 //!
-//! ψ₀ follows from the yield stress σ_y in pure shear.
-//! A deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The point yields at
-//! ε:ε = σ_y²/(6G²).
+//! ψ₀ is calibrated in pure shear: the point yields where the equivalent stress of von Mises is σ_y.
+//! A deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent
+//! stress is σ_y at ε:ε = σ_y²/(6G²).
 //! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
 //! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
 //! With the thickness h, Mitchell's value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G,

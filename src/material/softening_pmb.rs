@@ -352,7 +352,7 @@ const PAST_LARGEST: f64 = 0.95;
 /// Largest number of samples in the search for the largest stress.
 const MOST_STRAINS: usize = 400;
 
-/// Bisection steps for the transverse strain.
+/// Number of bisection steps for the transverse strain.
 const ACROSS_ITERATIONS: usize = 25;
 
 impl SofteningPmb {

@@ -32,9 +32,9 @@ const LARGEST: f64 = 30.0;
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
 /// norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest of these fractions is 0.23 at a corner of a plate, 0.14 at a
-/// corner of a cuboid, and 0.1 in a strip two points wide. The fraction is below 1e-4 in a slightly bent
-/// strip one point wide.
+/// For a horizon of 3 spacings, the ratio of the smallest to the largest singular value is 0.23 at a corner
+/// of a plate, 0.14 at a corner of a cuboid, and 0.1 in a strip two points wide. The ratio is below 1e-4 in a
+/// slightly bent strip one point wide.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.

@@ -27,7 +27,7 @@ pub const LONGEST_ROW: u64 = 1 << 16;
 /// The columns of a point file, with the indices of the columns that are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns {
-    /// All columns of a row, by name.
+    /// Names of all columns of a row.
     pub names: Vec<String>,
     /// Columns of the coordinates.
     pub position: Vec<usize>,
@@ -101,7 +101,7 @@ impl Columns {
 /// Layout of the rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// Index of the column of each quantity.
+    /// Columns of each row.
     pub columns: Columns,
     /// Offset of the heading in the file, bytes; `None` if the file has no heading.
     pub heading: Option<u64>,

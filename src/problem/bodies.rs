@@ -395,7 +395,7 @@ impl Set {
 pub enum Selector {
     /// All points.
     All,
-    /// The points of a body, by index.
+    /// The points of the body with this index.
     Body(usize),
     /// Points whose reference position fulfils the condition.
     Where(Expression),

@@ -12,7 +12,7 @@ pub enum Interval {
     Seconds(f64),
     /// Number of time steps.
     Steps(u64),
-    /// Simulated time, checked only at steps that are multiples of a number.
+    /// Simulated time, checked only at steps whose number is a multiple of `steps`.
     SecondsAtSteps {
         /// Interval of simulated time, s.
         seconds: f64,
@@ -240,8 +240,8 @@ pub enum Field {
     /// Weighted volume m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
     /// Kirchhoff stress Σ T⊗Y Ṽ of the three-dimensional body, Pa: xx, yy, zz, xy, yz, xz. In plane strain,
-    /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 −
-    /// ν) xx.
+    /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain,
+    /// yy = zz = ν/(1 − ν) xx.
     Stress,
     /// Cauchy stress, Pa: Kirchhoff stress divided by the ratio of deformed to undeformed volume, in the same
     /// order.

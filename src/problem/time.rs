@@ -20,16 +20,16 @@ pub struct Time {
 /// Settings of a time step that adapts to the number of bonds that break in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
-    /// Largest number of bonds of one point that may break in a step. If more break, the step is repeated
-    /// with a smaller dt.
+    /// Largest number of bonds of one point that may break in a step. If more bonds break, the step is
+    /// repeated with a smaller Δt.
     pub most_broken: u64,
     /// Largest number of bonds of one point that break in a calm step.
     pub stable_broken: u64,
-    /// Number of consecutive calm steps before dt is raised.
+    /// Number of consecutive calm steps before Δt is raised.
     pub steps: u64,
-    /// Factor on dt if a step is repeated.
+    /// Factor on Δt if a step is repeated.
     pub reduce: f64,
-    /// Factor on dt after `steps` calm steps.
+    /// Factor on Δt after `steps` calm steps.
     pub raise: f64,
     /// The smallest step, s; `None` for 1/100 of the largest.
     pub smallest: Option<f64>,

@@ -95,7 +95,7 @@ impl Described for BondAssociated {
 /// bonds (m⁻³), H, and Z K⁻¹ (N/m⁷).
 type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
-/// Indices of the numbers of a point, see [`Point`]; K⁻¹ and a flag follow.
+/// Indices of the numbers of a point: the numbers of [`Point`], then K⁻¹, then a flag.
 struct Places;
 
 impl Places {

@@ -17,8 +17,8 @@ const LARGEST: f64 = 30.0;
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
 /// norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest of these fractions is 0.08 at a corner of a cuboid, 0.007 in a
-/// sheet of two layers, and 0 in a single layer.
+/// For a horizon of 3 spacings, the ratio of the smallest to the largest singular value is 0.08 at a corner
+/// of a cuboid, 0.007 in a sheet of two layers, and 0 in a single layer.
 const RANK: f64 = 5e-3;
 
 /// The exponents and the coefficient of a monomial of degree 2 in the components of n or N.
