@@ -4,8 +4,8 @@
 //! The micromodulus of an end is c n·H n, with the micromodulus c of an untruncated family, the direction n
 //! of the bond and a symmetric tensor H of the end.
 //! The elastic tensor of a family is ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ.
-//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d +
-//! 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
+//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here
+//! μ = 2 W₁/(d (d + 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
 //! H is the least-squares fit over all components of the elastic tensor. This fit is independent of the axes.
 //! In an untruncated family H is nearly I. Near a surface H is larger normal to the surface than along it.
 //!
@@ -183,8 +183,8 @@ impl<const D: usize> Law<D> for TensorPmb {
             * (0.5 * self.micromodulus)
     }
 
-    /// Return an upper bound on the spring constant of a bond: c/|ξ| times the largest absolute row sum of ½
-    /// H, which is at least the largest eigenvalue of ½ H.
+    /// Return an upper bound on the spring constant of a bond: c/|ξ| times the largest absolute row sum of
+    /// ½ H, which is at least the largest eigenvalue of ½ H.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;

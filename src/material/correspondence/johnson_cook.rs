@@ -6,9 +6,10 @@
 //!
 //! with the equivalent plastic strain ε̄, the temperature T, the initial temperature T₀, the melting
 //! temperature T_m, and the constants of [`JohnsonCook`].
-//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at the point where it is generated: T − T₀ = β w/(ρ
-//! c). Here w is the energy density that the point has dissipated, β the fraction of w that becomes heat, and
-//! ρ c the volumetric heat capacity. A step is computed with the temperature at the start of the step.
+//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at the point where it is generated:
+//! T − T₀ = β w/(ρ c). Here w is the energy density that the point has dissipated, β the fraction of w that
+//! becomes heat, and ρ c the volumetric heat capacity. A step is computed with the temperature at the start
+//! of the step.
 //!
 //! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of
 //! time uses this stored factor. Therefore a stress that has been returned to the yield surface does not flow

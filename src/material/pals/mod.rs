@@ -133,8 +133,8 @@ fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
 }
 
 impl<const D: usize> Law<D> for Pals {
-    /// Constants: Λ (1/m⁵), S (N/m⁷), and a spring constant (N/m⁷) that bounds the energy. Then k′θ − (1/d) Σ
-    /// σ|ξ| ε Ṽ (Pa) and θ/d.
+    /// Constants: Λ (1/m⁵), S (N/m⁷), and a spring constant (N/m⁷) that bounds the energy. Then
+    /// k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.

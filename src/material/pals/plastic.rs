@@ -7,8 +7,8 @@
 //!
 //! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G). This limit is twice the deviatoric energy density at which the
 //! equivalent stress of von Mises is the yield stress σ_y. Without surfaces, this is the yield condition of
-//! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with r² Σ σ ε_d² Ṽ =
-//! σ_y²/(3G). Plastic flow therefore does not change θ.
+//! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with
+//! r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore does not change θ.
 //!
 //! While all bonds are intact, ε_d is ε of [`Pals`]. If bonds are broken, ε = ε_d + c|ξ| with a number c of
 //! the point. Flow then reduces the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ. Therefore 1 − r
