@@ -42,7 +42,7 @@ pub struct Declaration {
     /// bonds.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
-    /// `None` if a damage law breaks the bonds.
+    /// The field is `None` for laws without such a stretch.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
     /// Whether the law breaks bonds because of their history, in addition to a damage law. Bonds of such a
     /// law also break without a damage law.

@@ -323,7 +323,7 @@ pub enum PointSource {
         scale: f64,
         /// Span of the file's name in the deck.
         span: Range<usize>,
-        /// Span of the group's name in the deck.
+        /// Span of the group's name in the deck, or of the file's name if the deck names no group.
         block_span: Range<usize>,
     },
 }
@@ -407,7 +407,7 @@ pub enum Selector {
         ids: Vec<u64>,
         /// The file that contains the ids; `None` if the deck contains them.
         file: Option<IdFile>,
-        /// Span of the largest id in the deck.
+        /// Span of the largest id in the deck, or of the name of the file that contains the ids.
         largest: Range<usize>,
     },
     /// Points of a group of the meshes from which bodies get their points.
