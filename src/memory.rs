@@ -92,13 +92,14 @@ fn free_swap() -> Option<u64> {
     kibibytes("/proc/meminfo", "SwapFree:")
 }
 
-/// Read the number of KiB after `name` from a file, and return the number of bytes. `None` without this
-/// entry.
+/// Read the number of KiB after `name` from a file, and return the number of bytes. `None` if the file cannot
+/// be read or has no such number.
 fn kibibytes(path: &str, name: &str) -> Option<u64> {
     entry(&fs::read_to_string(path).ok()?, name).map(|kibibytes| 1024 * kibibytes)
 }
 
-/// Return the number after `name` in the first line that starts with `name`; `None` without such a line.
+/// Return the number after `name` in the first line that starts with `name`; `None` without such a line or
+/// number.
 fn entry(text: &str, name: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()
