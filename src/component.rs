@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 /// Names of the components of a vector.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Names of the components of a symmetric tensor.
+/// Names of the components of a symmetric tensor, in the order of the result.
 const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
 /// Names of the components of a tensor, row by row.
@@ -40,8 +40,9 @@ pub fn names(components: usize) -> &'static [&'static str] {
     }
 }
 
-/// Return the index and name of each component that a field has in a problem of this dimension. A scalar has
-/// one component, without a name. Stress and strain have three normal components in any dimension.
+/// Return the index and name of each component that a field has in a problem of this dimension. `components`
+/// is the number of stored values per point. A scalar has one component, without a name. A symmetric tensor
+/// (stress or strain) has three normal components in any dimension.
 pub fn entries(
     components: usize,
     dimension: usize,

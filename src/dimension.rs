@@ -27,9 +27,9 @@ pub enum Dimension {
 /// Condition perpendicular to a bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Constraint {
-    /// No stress perpendicular to the bar: its modulus is E.
+    /// No stress perpendicular to the bar; the bar has the modulus E.
     UniaxialStress,
-    /// No strain perpendicular to the bar: its modulus is λ + 2G.
+    /// No strain perpendicular to the bar; the bar has the modulus λ + 2G.
     UniaxialStrain,
 }
 
@@ -60,7 +60,7 @@ impl Dimension {
         libm::pow(extent, 1.0 / self.count() as f64)
     }
 
-    /// Return the Poisson's ratio of bond-based laws. If [`Self::allows_any_poisson_ratio`] is true, these
+    /// Return Poisson's ratio of bond-based laws. If [`Self::allows_any_poisson_ratio`] is true, these
     /// laws also allow other values.
     pub fn bond_based_poisson_ratio(self) -> f64 {
         match self {

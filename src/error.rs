@@ -9,16 +9,17 @@ use std::ops::Range;
 /// Category of an error; sets the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// The deck or the command line is wrong: exit code 2.
+    /// The deck, a file that it names, or the command line is wrong: exit code 2.
     Input,
     /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
     Run,
-    /// A signal has stopped a run before its first step, or a sweep: exit code 75, which `sysexits.h`
-    /// defines as "try again".
+    /// A signal has stopped a run before its first step, or the command `fissure sweep`: exit code 75, which
+    /// `sysexits.h` defines as "try again".
     Stopped,
 }
 
-/// An error. The message names the wrong key or file, and what is allowed.
+/// An error for the user. If the input is wrong, the message names the wrong key or file, and what is
+/// allowed.
 #[derive(Debug, Clone)]
 pub struct Error {
     /// Category of the error.
@@ -44,8 +45,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// Format a user's text for a message: in backticks, with escaped control characters. A text longer than
-/// `EXCERPT` characters is cut off there, and followed by `…`.
+/// Format a user's text for a message: in backticks, with escaped control characters. Of a longer text, the
+/// message contains only the first `EXCERPT` characters, followed by `…`.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {
@@ -70,7 +71,7 @@ impl Error {
         }
     }
 
-    /// Create an error about a wrong deck or wrong arguments.
+    /// Create an error about wrong input: a deck, a file that the deck names, or the command line.
     pub fn input(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Input, message)
     }
@@ -80,7 +81,8 @@ impl Error {
         Self::new(ErrorKind::Run, message)
     }
 
-    /// Create an error for a run that a signal has stopped before its first step, or for a stopped sweep.
+    /// Create an error for a run that a signal has stopped before its first step, or for a stopped
+    /// `fissure sweep`.
     pub fn stopped(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Stopped, message)
     }
@@ -93,13 +95,13 @@ impl Error {
         }
     }
 
-    /// Test whether a signal has stopped the run or sweep. Such a stop is not a failure.
+    /// Test whether a signal has stopped the run or `fissure sweep`. Such a stop is not a failure.
     pub fn is_stop(&self) -> bool {
         self.kind == ErrorKind::Stopped
     }
 
-    /// Return the process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments, 75 for a
-    /// run or sweep that a signal has stopped.
+    /// Return the process's exit code: 1 for a failed run, 2 for wrong input, 75 for a run or `fissure sweep`
+    /// that a signal has stopped.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Run => 1,

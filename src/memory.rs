@@ -16,10 +16,10 @@ pub struct Shortage {
     pub available: u64,
 }
 
-/// Check that this process can allocate `needed` more bytes.
+/// Check that this process can allocate `needed` more bytes. Allocations below 64 MiB are not checked.
 ///
 /// # Errors
-/// If the available memory is too small.
+/// If less memory than `needed` + 64 MiB is available.
 pub fn check_room(needed: u64) -> Result<(), Shortage> {
     if needed < LARGE {
         return Ok(());
@@ -63,14 +63,14 @@ fn control_group() -> Option<u64> {
 }
 
 /// Return the smallest amount of memory and swap (bytes) that is left in the control group `path` below
-/// `root`, and in the groups above it.
+/// `root`, and in the groups above it. `None` if none of these groups has a limit.
 fn left_in_groups(root: &Path, path: &Path) -> Option<u64> {
     let groups = path.ancestors().map(|group| root.join(group));
     groups.filter_map(|group| left_in_group(&group)).min()
 }
 
 /// Return the memory and swap left in the control group with this folder, bytes. `None` if the group has no
-/// limit.
+/// limit, or if its files cannot be read.
 fn left_in_group(group: &Path) -> Option<u64> {
     let read = |name: &str| fs::read_to_string(group.join(name)).ok();
     let number = |name: &str| read(name)?.trim().parse::<u64>().ok();
@@ -92,12 +92,14 @@ fn free_swap() -> Option<u64> {
     kibibytes("/proc/meminfo", "SwapFree:")
 }
 
-/// Read an entry of a file that gives the entry in KiB, and return it in bytes.
+/// Read the number of KiB after `name` from a file, and return the number of bytes. `None` if the file cannot
+/// be read or has no such number.
 fn kibibytes(path: &str, name: &str) -> Option<u64> {
     entry(&fs::read_to_string(path).ok()?, name).map(|kibibytes| 1024 * kibibytes)
 }
 
-/// Return the number after `name` in the first line that starts with `name`.
+/// Return the number after `name` in the first line that starts with `name`; `None` without such a line or
+/// number.
 fn entry(text: &str, name: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()
@@ -107,7 +109,7 @@ fn entry(text: &str, name: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Slurm limits the memory of a job or step, a group above that of the process.
+    /// Slurm sets the limit on the group of a job or step. This group is above the group of the process.
     #[test]
     fn limits_of_parent_groups_count() {
         let root = std::env::temp_dir().join(format!("control_groups_{}", std::process::id()));

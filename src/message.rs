@@ -12,7 +12,8 @@ pub fn format_number(value: f64) -> String {
     }
 }
 
-/// Return the entry of `known` that resembles `name` most; `None` if none is similar.
+/// Return the entry of `known` that resembles `name` most; `None` if no entry is similar, or if the names are
+/// too long.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
@@ -27,7 +28,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 }
 
 /// Return the suggestion for an error on an unknown name: `; did you mean …? (known: …)`. Without a similar
-/// name, the result is only the part in parentheses.
+/// name, the result is only the part in parentheses. If `known` is empty, this part is `(none is defined)`.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let mean = nearest(name, known.iter().copied())

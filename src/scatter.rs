@@ -4,11 +4,12 @@
 /// A scattered quantity. The random numbers of different quantities are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scattered {
-    /// A component of the position of a point.
+    /// The shift of a point from the centre of its cell, in the direction with this index.
     Position(usize),
     /// The strength of a point.
     Strength,
-    /// A component of a vector of random signs, from which a solver estimates the trace of a matrix.
+    /// The sign of a point in the direction with this index. Newton's method estimates the trace of a matrix
+    /// from these signs.
     Probe(usize),
 }
 
@@ -59,8 +60,8 @@ mod tests {
     const COUNT: u64 = 20_000;
 
     /// Return the bound on the largest difference between the empirical distribution function of `count`
-    /// values and the true distribution function. One in a million samples exceeds the bound (Dvoretzky,
-    /// Kiefer & Wolfowitz, with Massart's constant).
+    /// values and the true distribution function. At most one in a million samples exceeds the bound
+    /// (Dvoretzky, Kiefer & Wolfowitz, with Massart's constant).
     fn bound(count: u64) -> f64 {
         (libm::log(2e6) / (2.0 * count as f64)).sqrt()
     }

@@ -2,9 +2,10 @@
 //!
 //! The difference of two computed values of size |u| has a round-off of ε|u|, where ε is the machine epsilon.
 //! Dividing a second difference of such values by the square of a small step amplifies this error. In this
-//! module, most operations compute the change of their result from the changes of their operands. Their
-//! round-off is therefore ε times the size of the change. For example, the change of sin from a to b is
-//! 2 cos((a + b)/2) sin((b − a)/2). The other operations, such as `tan` and `atan2`, subtract two values.
+//! module, most operations compute the change of their result from the changes of their operands. The
+//! round-off of these operations is therefore ε times the size of the change. For example, the change of sin
+//! from a to b is 2 cos((a + b)/2) sin((b − a)/2). The other operations, such as `tan` and `atan2`, subtract
+//! two values.
 
 use std::sync::Arc;
 
@@ -24,8 +25,8 @@ impl Moving {
     }
 }
 
-/// Compute the change of the code's value when the time grows from t to t + `step`. `variables` are x, y, z
-/// and t.
+/// Compute the change of the code's value from the time t to t + `step`; `step` may be negative. `variables`
+/// are x, y, z and t.
 pub(super) fn increment(
     code: &[Instruction],
     tables: &[Arc<Table>],

@@ -20,8 +20,9 @@
 //!
 //! The variables are `x`, `y`, `z` and `t`, where the deck allows these; the only constant is `pi`. These
 //! names hide parameters of the same name; names of functions do not. In keys that are functions of the
-//! length of a bond, `r` is the only variable; elsewhere `r` can be a parameter. Names of [tables](Table) are
-//! values by time, and are allowed where `t` is allowed. The functions are:
+//! length of a bond, `r` is the only variable; elsewhere `r` can be a parameter. The name of a
+//! [table](Table) stands for the value of the table at the time `t`, and is allowed where `t` is allowed. The
+//! functions are:
 //!
 //! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
@@ -203,7 +204,7 @@ impl Expression {
             tables,
         };
         let mut code = parse::parse(text, &scope)?;
-        // Drop unused tables, so that equality of expressions does not depend on these.
+        // Drop unused tables, so that equality of expressions does not depend on unused tables.
         let mut used: Vec<usize> = Vec::new();
         for instruction in &mut code {
             if let Instruction::Table(number) = instruction {
@@ -269,8 +270,8 @@ impl Expression {
         evaluate::evaluate(&self.code, &self.tables, self.stack_size, [x, y, z, time])
     }
 
-    /// Compute the change of the value from `time` to `time + step`; `step` may be negative. For most operations,
-    /// round-off is relative to the change, not to the value.
+    /// Compute the change of the value from `time` to `time + step`; `step` may be negative. For most
+    /// operations, round-off is relative to the change, not to the value.
     pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
         let [x, y, z] = position;
         increment::increment(&self.code, &self.tables, [x, y, z, time], step)
@@ -302,7 +303,8 @@ impl Expression {
     }
 
     /// Return the names in the text that are neither functions nor constants, in the order of their first
-    /// use. Variables are included. The text need not be a valid expression.
+    /// use. Variables are included. A name counts as a function if `(` follows. The text need not be a valid
+    /// expression.
     ///
     /// # Errors
     ///

@@ -170,7 +170,8 @@ impl Scope<'_> {
     }
 }
 
-/// Return the end of an error message, with the most similar name if there is one.
+/// Return the part of an error message after the unknown name: `; did you mean …?` with the most similar
+/// name, or `;` if no name is similar.
 fn suggestion(name: &str, names: &[&str]) -> String {
     let lower = name.to_lowercase();
     let tolerance = match lower.len() {

@@ -33,7 +33,8 @@ pub(super) fn parse(text: &str, scope: &Scope) -> Result<Vec<Instruction>, Expre
     }
 }
 
-/// Return the names in the text that are neither functions nor constants, each once, in order.
+/// Return the names in the text that are neither functions nor constants, each once, in order. A name counts
+/// as a function if `(` follows.
 pub(super) fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
     let tokens = tokenize(text)?;
     let mut names: Vec<String> = Vec::new();
@@ -100,7 +101,8 @@ impl Parser<'_> {
         append(&mut self.code, instruction);
     }
 
-    /// Parse a value and the following operators that bind at least as tightly as `loosest`.
+    /// Parse a value, and the following operators that bind at least as tightly as `loosest`, with their
+    /// right operands.
     fn expression(&mut self, loosest: Precedence) -> Result<(), ExpressionError> {
         let first = self.peek();
         if self.nesting > DEEPEST_NESTING {
@@ -207,7 +209,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// Parse the arguments of a call of this function.
+    /// Parse the arguments of a call of the function `name`, and append the instruction of the function.
     fn call(&mut self, name: Token) -> Result<(), ExpressionError> {
         let function = self
             .scope

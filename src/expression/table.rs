@@ -122,7 +122,8 @@ mod tests {
             let difference = table.at(time + step) - table.at(time);
             assert!((table.increment(time, step) - difference).abs() < 1e-15);
         }
-        // The round-off is relative to the change. A difference of the two values would have a larger error.
+        // The round-off is relative to the change. The difference of the values before and after the step
+        // would have a larger error.
         let steep = Table::new(vec![0.0, 1.0], vec![1e6, 1e6 + 1.0]).unwrap();
         assert_eq!(steep.increment(0.3, 1e-9), 1e-9);
     }

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
-/// Sizes of the point data and bond data of a law.
+/// Sizes of the point data and bond data of a law, and other constants of its type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Count of the constants of a point, [`Law::CONSTANTS`].

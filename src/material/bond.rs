@@ -1,6 +1,6 @@
 //! Geometry of eight deformed bonds, without square roots and divisions at small strains.
 //!
-//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², the square of its length is
+//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², the square of its length |Y| is
 //! |Y|² = |ξ|² (1 + x).
 //! Laws need two functions of x:
 //!
@@ -220,7 +220,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
             beyond_series: intact,
         };
     }
-    // True for NaN, too.
+    // The bit of a bond with x = NaN is set, too.
     let beyond_series =
         intact & !simd.at_least(Lanes::splat(limit), relative_square_extension.abs());
     let (mut stretch, mut extension_over_deformed) =
@@ -284,7 +284,7 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
 }
 
 /// Return `near`, or in the lanes of `beyond_series` with |x| above [`NEAR`] the quotient x/(√(1 + x) + o).
-/// `other` computes o and its rounding error from 1 + x and its rounding error.
+/// `other` computes o and the rounding error of o, from 1 + x and the rounding error of 1 + x.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,
@@ -520,7 +520,8 @@ mod tests {
             (zero.stretch, zero.extension_over_deformed),
             (Lanes::splat(0.0), Lanes::splat(0.0))
         );
-        // Ten million numbers: of all sizes, near the limit of the series, and at usual strains.
+        // Ten million numbers: of all sizes up to 1, near the limit of the series, at usual strains, and at
+        // large strains.
         let mut state = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = || {
             state ^= state << 13;

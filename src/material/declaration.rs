@@ -32,7 +32,7 @@ pub struct Declaration {
     /// combination is allowed.
     pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
     /// Return the elastic constants that follow from the law's own keys, if the deck gives these keys. Such a
-    /// deck must give no other elastic constants.
+    /// deck must give no other elastic constants. The field is `None` if no such keys exist.
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
     /// Whether the energy criterion can break bonds of this law.
     pub breaks_by_energy: bool,
@@ -42,7 +42,7 @@ pub struct Declaration {
     /// bonds.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
-    /// `None` if a damage law breaks the bonds.
+    /// The field is `None` for laws without such a stretch.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
     /// Whether the law breaks bonds because of their history, in addition to a damage law. Bonds of such a
     /// law also break without a damage law.
@@ -85,7 +85,7 @@ impl Declaration {
         }
     }
 
-    /// Test whether the law breaks bonds without a damage law.
+    /// Test whether the law has its own critical stretch, so that its bodies have no damage law.
     pub fn breaks_by_itself(&self) -> bool {
         self.own_critical_stretch.is_some()
     }
@@ -107,13 +107,14 @@ impl fmt::Debug for Declaration {
     }
 }
 
-/// Invariants of a law that hold after any motion.
+/// Invariants of a law: which of these statements hold for any motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Invariants {
     /// Forces are the gradient of the strain energy. This holds neither for laws that dissipate energy nor
     /// for `stress = "willberg2022"`.
     pub conservative: bool,
-    /// Rotating a motion rotates the forces.
+    /// Rotating a motion rotates the forces. [Linear](Declaration::linear) laws are excepted: their forces
+    /// keep the direction of ξ.
     pub objective: bool,
     /// The internal forces of a body have no resultant moment.
     pub angular_momentum: bool,
@@ -131,7 +132,7 @@ impl Invariants {
 /// An error in the values of a law's keys.
 #[derive(Debug, Clone)]
 pub struct LawFault {
-    /// The wrong key; `None` if several keys are involved.
+    /// The wrong key; `None` if the error is not in a single key, for example if a key is missing.
     pub key: Option<&'static str>,
     /// Message: what is wrong, and what is allowed.
     pub message: String,
@@ -304,8 +305,9 @@ pub struct Given<'a> {
     pub horizon: f64,
     /// Values of the law's own keys; all required keys have a value.
     pub values: &'a Values,
-    /// Whether the critical stretch follows from a fracture energy; the law may then scale it by a factor per
-    /// bond. Otherwise the deck gives the critical stretch, and all bonds have this critical stretch.
+    /// Whether the critical stretch follows from a fracture energy; the law may then scale the critical
+    /// stretch by a factor per bond. Otherwise, the deck gives a critical stretch that holds for all bonds,
+    /// or the bonds have no damage.
     pub from_fracture_energy: bool,
 }
 
@@ -314,7 +316,7 @@ pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy(given.dimension, given.elastic, energy, given.horizon)
 }
 
-/// A law with the data that the loops over bonds do not read.
+/// A law and its influence function.
 pub struct Built {
     /// The law that the loops over bonds call.
     pub law: AnyLaw,

@@ -11,8 +11,9 @@
 //! The bond breaks when λ reaches 0. In a constant cyclic strain this is after 1/(A (ε − ε∞)^m) cycles.
 //! With ε∞ = 0, a crack of length a grows by da/dN ∝ ΔK^m, with the range ΔK of the stress intensity factor.
 //!
-//! The law stores the used life 1 − λ. A time step is a block of cycles, all with the stretches at the end of
-//! the step. λ does not change the force of an intact bond.
+//! The law stores the used life 1 − λ. The number of cycles in a time step is the length of the step times
+//! [`FatiguePmb::cycles_per_second`]; all these cycles have the stretches at the end of the step. λ does not
+//! change the force of an intact bond.
 //!
 //! The law of SAND2014-18590 has separate constants A and m for the nucleation of cracks (phase I) and for
 //! their growth (phase II). This law has one pair of constants for both phases.

@@ -18,7 +18,7 @@ pub trait ForceState<const D: usize>: Copy {
     /// Add the force state of the other end, −T_j⟨−ξ⟩.
     fn plus(self, other: Self) -> Self;
 
-    /// Add to `sums` the force density (N/m³) of the bonds whose bit is set: the force state times
+    /// Add to `sums` the force density (N/m³) of the bonds whose bit in `bits` is set: the force state times
     /// `volume`, Ṽ_j (m³).
     fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]);
 

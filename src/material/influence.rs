@@ -44,8 +44,8 @@ impl Influence {
         }
     }
 
-    /// Return ∫₀¹ ω(r) rⁿ dr for a horizon of 1. Simpson's rule on 2000 cells has an error below 10⁻¹² for
-    /// n ≥ 2.
+    /// Return ∫₀¹ ω(r) rⁿ dr for a horizon of 1, with n = `power`. Simpson's rule on 2000 cells has an error
+    /// below 10⁻¹² for n ≥ 2.
     pub fn moment(self, power: i32) -> f64 {
         let cells = 2000;
         let at = |k: i32| match f64::from(k) / f64::from(cells) {

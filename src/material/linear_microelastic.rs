@@ -18,8 +18,8 @@ use crate::lanes::{IsaSet, Lanes};
 pub struct LinearMicroelastic {
     /// Micromodulus c, N/m⁶; 1 if the deck gives λ(|ξ|).
     pub micromodulus: f64,
-    /// Classical energy density W₁ (J/m³) at unit isotropic stretch, to which the surface correction scales
-    /// the energy density of each point; `None` without surface correction.
+    /// Classical energy density W₁ at unit isotropic stretch, J/m³. The surface correction scales the energy
+    /// density of each point to W₁. `None` without surface correction.
     pub corrected_to: Option<f64>,
 }
 

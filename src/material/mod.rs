@@ -146,9 +146,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Number of passes over the bonds before the force evaluation.
     const PASSES: usize = 0;
 
-    /// Number of values of a point that only this law's functions per point read, such as
-    /// [`Self::point_energy`]. The loops over bonds do not read these values, and ghosts have none. They are
-    /// stored after the numbers of [`Self::Point`].
+    /// Number of a point's own numbers. Only functions that are called per point, such as
+    /// [`Self::point_energy`], read the own numbers. The loops over bonds do not read the own numbers, and
+    /// ghosts have none. The own numbers are stored after the numbers of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
     /// Whether [`Self::force_state`] or [`Self::bond_history`] reads [`Bond::stretch`].
@@ -182,8 +182,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether the law overrides [`Self::is_worn_out`].
     const WEARS_OUT: bool = false;
 
-    /// Whether [`Self::force_state`] or [`Self::bond_energy`] reads the bond history. Otherwise the history is
-    /// computed only in evaluations that store it.
+    /// Whether [`Self::force_state`] or [`Self::bond_energy`] reads the bond history. Otherwise, the history
+    /// is computed only in evaluations that store the history.
     const FORCE_READS_HISTORY: bool = true;
 
     /// Whether the stress of a point is the mean of the stresses of its bonds, so that
@@ -264,8 +264,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) -> Self::Force;
 
     /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
-    /// ends. A force along the bond is divided by a length, as in [`Self::force`]. The results of both ends
-    /// are equal to the last bit, except for the sign. Laws may override this function to save operations.
+    /// ends. A force along the bond is divided by a length, as in [`Self::force_state`]. The results of both
+    /// ends are equal to the last bit, except for the sign. Laws may override this function to save
+    /// operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -365,14 +366,16 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Test whether the law needs enough bonds in all directions. The intact bonds of a point are then
-    /// compared with all bonds of the point, including the bonds that pre-cracks cut.
+    /// Test whether the law needs enough bonds in all directions. The initial family of a point then includes
+    /// the bonds that pre-cracks cut, so that the law can compare the intact bonds with all bonds of the
+    /// point.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Test whether a point carries no force, because the law cannot use its intact bonds (too few or too
-    /// stiff), or because the law has no stress at the deformation of the point.
+    /// Test whether a point carries no force, because the law cannot use the intact bonds of the point (too
+    /// few or too stiff), or because the law has no stress at the deformation of the point or of one of its
+    /// bonds.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
@@ -400,11 +403,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return a spring constant k (N/m⁷) per bond that bounds the strain energy density W (J/m³) of one end:
-    /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For bond-based laws k = |∂T/∂η|.
+    /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ, or the weaker bound of [`Self::resists_across`]. For bond-based laws
+    /// k = |∂T/∂η|.
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
 
-    /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds: W ≤ ½ Σ k
-    /// |η|² Ṽ.
+    /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds:
+    /// W ≤ ½ Σ k |η|² Ṽ.
     fn resists_across(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! Sums over a family of monomials of the bond directions, and least-squares fits to them.
+//! Sums of monomials of the bond directions over a family, and solution of linear least-squares problems.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -8,7 +8,7 @@
 //! √(c/c_ij), with the micromodulus c of an untruncated family. This keeps the energy of breaking the bond.
 //!
 //! With the influence function δ/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2 with
-//! c̄_i = c_i δ = 4 W₁ / Σ Ṽ. The equation has W₁ = 9K/4.
+//! c̄_i = c_i δ = 4 W₁ / Σ Ṽ. In their equation, W₁ is 9K/4.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,8 @@ pub struct Normalised {
     /// `form = "diehl2016"`.
     pub energy: f64,
     /// Micromodulus c of an untruncated family, N/m⁶, for which the damage law has computed the critical
-    /// stretch; `None` if the deck gives the critical stretch, which then holds for all bonds.
+    /// stretch. `None` if the deck gives the critical stretch, which then holds for all bonds, or if the
+    /// bonds have no damage.
     pub reference: Option<f64>,
 }
 

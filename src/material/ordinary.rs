@@ -231,7 +231,7 @@ impl<const D: usize> Law<D> for Ordinary {
     const CONSTANTS: usize = 1;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// The only such number is the dilatation θ.
+    /// The own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]

@@ -10,17 +10,17 @@
 //! e_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ and the yield value ψ₀.
-//! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by (1 − r)
-//! e_d.
+//! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by
+//! (1 − r) e_d.
 //!
 //! Plastic flow preserves volume, Σ ω|ξ| e_p Ṽ = 0. Therefore this is Mitchell's law until bonds of the
 //! family break.
 //! After that, Mitchell's θ of the total extension e would not give a force that derives from the energy. The
 //! remaining plastic extensions would expand the family, and breaking bonds would add energy.
 //!
-//! ψ₀ follows from the yield stress σ_y in pure shear.
-//! A deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The point yields at
-//! ε:ε = σ_y²/(6G²).
+//! ψ₀ is calibrated in pure shear: the point yields where the equivalent stress of von Mises is σ_y.
+//! A deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent
+//! stress is σ_y at ε:ε = σ_y²/(6G²).
 //! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
 //! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
 //! With the thickness h, Mitchell's value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G,
@@ -103,7 +103,8 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Return the error if the yield limit of complete families is to hold for points that have their own influence functions.
+/// Return the error if the deck has `calibration = "continuum"` and a surface correction, with which each
+/// point has its own influence functions.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     let is_corrected = values.word(SURFACE_CORRECTION.name) != "none";
     (is_corrected && values.word(CALIBRATION.name) != "family").then(|| LawFault {
@@ -137,7 +138,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 3;
-    /// The only such number is the dilatation θ.
+    /// The own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

@@ -142,8 +142,8 @@ impl Relaxation {
     }
 
     /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these values
-    /// before the step. `deviatoric` is e_d/|ξ| after the step. `factor` times e_d²/|ξ|² is the energy of
-    /// a bond without relaxation times 2, J/m⁶.
+    /// before the step. `deviatoric` is e_d/|ξ| after the step. Without relaxation, a bond has the energy
+    /// ½ `factor` (e_d/|ξ|)², J/m⁶.
     #[inline(always)]
     pub(super) fn after(
         &self,
@@ -155,7 +155,7 @@ impl Relaxation {
         let [gone, beta] = self.relaxed(step);
         let change = (*before - *back) * gone + (deviatoric - *before) * beta;
         let now = *back + change;
-        // Energy that the dashpot dissipates, with its force at the middle of the step.
+        // Energy that the dashpot dissipates, with the force of the dashpot at the middle of the step.
         let force = (*before - *back + deviatoric - now) * (0.5 * self.share);
         let taken = factor * force * change;
         [now, deviatoric, *loss + taken]
@@ -179,7 +179,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 2;
-    /// The only such number is the dilatation θ.
+    /// The own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

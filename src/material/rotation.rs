@@ -53,8 +53,8 @@ fn in_plane(f: &Matrix3<f64>) -> Rotation {
 
 /// Return cos(φ/2) and sin(φ/2) from cos φ and sin φ, |φ| ≤ π.
 fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
-    // For |φ| below 120°, cos(φ/2) is computed by a square root; for larger |φ|, sin(φ/2) is. The other
-    // function follows from sin φ = 2 sin(φ/2) cos(φ/2).
+    // A square root gives cos(φ/2) for |φ| below 120°, and sin(φ/2) for larger |φ|. The other function
+    // follows from sin φ = 2 sin(φ/2) cos(φ/2).
     if cosine > -0.5 {
         let half = (0.5 * (1.0 + cosine)).sqrt();
         [half, 0.5 * sine / half]

@@ -299,8 +299,8 @@ fn rounded(number: f64) -> String {
     digits.parse().map_or(digits, format_number)
 }
 
-/// Return the error message if bonds would break before they soften. With a long horizon, bonds at their
-/// strength store more than the fracture energy.
+/// Return the error message if sc is not above s0, so that bonds would break before they soften. With a long
+/// horizon, bonds at s0 store more than the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -352,7 +352,7 @@ const PAST_LARGEST: f64 = 0.95;
 /// Largest number of samples in the search for the largest stress.
 const MOST_STRAINS: usize = 400;
 
-/// Bisection steps for the transverse strain.
+/// Number of bisection steps for the transverse strain.
 const ACROSS_ITERATIONS: usize = 25;
 
 impl SofteningPmb {
@@ -363,8 +363,8 @@ impl SofteningPmb {
         pulled * self.secant(pulled) + stretch.min(zero)
     }
 
-    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by its elastic stress at
-    /// the axial strain s0.
+    /// Return the largest stress of a homogeneous body in uniaxial tension, divided by the elastic stress of
+    /// this body at the axial strain s0.
     pub fn largest_tension(&self, dimension: Dimension) -> f64 {
         let in_space = match dimension {
             Dimension::Line { .. } => return 1.0,
@@ -445,7 +445,7 @@ impl SofteningPmb {
             .min(Lanes::splat(self.critical_stretch))
     }
 
-    /// Return the position of stretches between `from` and `to`, from 0 to 1.
+    /// Return (stretch − `from`)/(`to` − `from`), clamped to the range from 0 to 1.
     #[inline(always)]
     fn way(stretch: Lanes, from: f64, to: f64) -> Lanes {
         let way = (stretch - Lanes::splat(from)) * (1.0 / (to - from));

@@ -4,8 +4,8 @@
 //! The micromodulus of an end is c n·H n, with the micromodulus c of an untruncated family, the direction n
 //! of the bond and a symmetric tensor H of the end.
 //! The elastic tensor of a family is ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ.
-//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d +
-//! 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
+//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here
+//! μ = 2 W₁/(d (d + 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
 //! H is the least-squares fit over all components of the elastic tensor. This fit is independent of the axes.
 //! In an untruncated family H is nearly I. Near a surface H is larger normal to the surface than along it.
 //!
@@ -21,20 +21,20 @@ use super::symmetric::{Symmetric, mixed, quadratic_form, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
-/// Smallest eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are two or
-/// three points thick.
+/// Smallest allowed eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are
+/// two or three points thick.
 const SMALLEST: f64 = 0.2;
 
-/// Largest eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly in one
-/// plane, would be unbounded.
+/// Largest allowed eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly
+/// in one plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
 /// norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest ratio is 0.23 at a corner of a plate, 0.14 at a corner of a
-/// block, and 0.1 in a strip two points wide. The ratio is below 1e-4 in a slightly bent strip one point
-/// wide.
+/// For a horizon of 3 spacings, the ratio of the smallest to the largest singular value is 0.23 at a corner
+/// of a plate, 0.14 at a corner of a cuboid, and 0.1 in a strip two points wide. The ratio is below 1e-4 in a
+/// slightly bent strip one point wide.
 const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
@@ -47,8 +47,8 @@ pub struct TensorPmb {
     micromodulus: f64,
     /// Shear modulus μ of the solid, Pa.
     shear_modulus: f64,
-    /// Whether the critical stretch is scaled with the micromodulus, because it follows from a fracture
-    /// energy.
+    /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with the
+    /// micromodulus.
     is_scaled: bool,
 }
 
@@ -100,9 +100,9 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
-    // A row stands for several equal tensor components. Its weight is the square root of their number, so
-    // that the fit does not depend on the axes. Columns have the same weights; then the solution of smallest
-    // norm is independent of the axes, too.
+    // A row stands for several equal tensor components. The weight of the row is the square root of the
+    // number of these components, so that the fit does not depend on the axes. Columns have the same weights;
+    // then the solution of smallest norm is independent of the axes, too.
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
         let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
         let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();
@@ -183,8 +183,8 @@ impl<const D: usize> Law<D> for TensorPmb {
             * (0.5 * self.micromodulus)
     }
 
-    /// Return an upper bound on the spring constant of a bond: c/|ξ| times the largest absolute row sum of ½
-    /// H, which is at least the largest eigenvalue of ½ H.
+    /// Return an upper bound on the spring constant of a bond: c/|ξ| times the largest absolute row sum of
+    /// ½ H, which is at least the largest eigenvalue of ½ H.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;
@@ -219,8 +219,8 @@ impl<const D: usize> Law<D> for TensorPmb {
 mod tests {
     use super::*;
 
-    /// Return H of a point with neighbours at these offsets, all of the same volume, with a micromodulus that
-    /// suits a disc.
+    /// Return H of a point with neighbours of unit volume at these offsets. With the constants of this test,
+    /// H in the middle of a disc with a radius of 3 is of the order of I.
     fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
         let mut sums = [0.0; MONOMIALS];
         for [x, y] in offsets {

@@ -113,8 +113,8 @@ impl Bins {
         let radius_squared = radius_squared * (1.0 + 1e-6);
         let centre: [f64; 3] =
             std::array::from_fn(|k| (position[k] - self.lower[k]) * self.inverse_edge);
-        // Squared radius that is left for the other directions, after the gap to a layer of boxes is
-        // subtracted.
+        // Squared radius that is left for the other directions, after the square of the gap to a layer of
+        // boxes is subtracted.
         let remaining = |radius_squared: f64, k: usize, layer: isize| {
             let [below, above] = [layer as f64 - centre[k], centre[k] - (layer + 1) as f64];
             let gap = below.max(above).max(0.0);
@@ -142,8 +142,8 @@ impl Bins {
     }
 }
 
-/// Edge (m) of boxes, at least `min_edge` (m), and number of boxes per direction. The total number of boxes
-/// is at most 2 `points` + 64.
+/// Return the edge (m) of boxes, at least `min_edge` (m), and the number of boxes per direction. The total
+/// number of boxes is at most 2 `points` + 64.
 pub fn boxes(lower: [f64; 3], upper: [f64; 3], min_edge: f64, points: usize) -> (f64, [usize; 3]) {
     let mut edge = min_edge * (1.0 + 1e-6);
     loop {

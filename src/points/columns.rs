@@ -27,7 +27,7 @@ pub const LONGEST_ROW: u64 = 1 << 16;
 /// The columns of a point file, with the indices of the columns that are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns {
-    /// All columns of a row, by name.
+    /// Names of all columns of a row.
     pub names: Vec<String>,
     /// Columns of the coordinates.
     pub position: Vec<usize>,
@@ -88,7 +88,7 @@ impl Columns {
         })
     }
 
-    /// Names of the columns that are not read.
+    /// Return the names of the columns that are not read.
     pub fn ignored(&self) -> Vec<&str> {
         let is_read = |column: &usize| {
             self.position.contains(column) || *column == self.volume || Some(*column) == self.block
@@ -101,7 +101,7 @@ impl Columns {
 /// Layout of the rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// Index of the column of each quantity.
+    /// Columns of each row.
     pub columns: Columns,
     /// Offset of the heading in the file, bytes; `None` if the file has no heading.
     pub heading: Option<u64>,
@@ -153,7 +153,8 @@ pub fn layout(
     Ok(Ok(layout))
 }
 
-/// The heading of a file: the first row that is neither empty nor a comment, if it contains no number.
+/// The heading of a file: the first row that is neither empty nor a comment, if this row contains neither a
+/// number nor an empty entry.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
     /// Entries of the heading, without quotes.
@@ -164,7 +165,8 @@ pub struct Heading {
     pub line: u64,
 }
 
-/// Read the heading of a file; `None` if it has no heading.
+/// Read the heading of a file; `None` if the file has no heading, or if a row up to the heading is not UTF-8
+/// text.
 ///
 /// # Errors
 /// If the file cannot be read or is not a regular file.
@@ -208,7 +210,7 @@ pub fn is_comment(row: &str) -> bool {
     row.trim_start().starts_with(['#', '/', '*'])
 }
 
-/// The names of a heading; `None` if the row contains a number or an empty entry.
+/// Return the names of a heading; `None` if the row contains a number or an empty entry.
 fn names(row: &str) -> Option<Vec<String>> {
     let row = row.strip_prefix(PERILAB_HEADER).unwrap_or(row);
     let entries = entries(row).ok()?;

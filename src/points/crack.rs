@@ -13,7 +13,7 @@ const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.
 ///
-/// - For a crack without width, a point in the plane of the crack counts as on the positive side.
+/// - For a crack without width, a point in the plane of the crack counts as on the side of the normal.
 /// - A bond crosses a slot if the bond touches the volume between the faces of the slot.
 /// - Pass the end with the lower id first, so that both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
@@ -145,7 +145,7 @@ fn within(
     (start <= end).then(|| [at(start), at(end)])
 }
 
-/// The point of a segment nearest to the origin.
+/// Return the point of a segment nearest to the origin.
 fn nearest_to_origin(from: Vector, to: Vector) -> Vector {
     let edge = to - from;
     let square = edge.dot(&edge);
@@ -155,7 +155,7 @@ fn nearest_to_origin(from: Vector, to: Vector) -> Vector {
     from + (-from.dot(&edge) / square).clamp(0.0, 1.0) * edge
 }
 
-/// The point where a segment crosses a plane; `None` if its ends lie on the same side.
+/// Return the point where a segment crosses a plane; `None` if both ends of the segment lie on the same side.
 fn plane_crossing(origin: Vector, normal: Vector, [from, to]: [Vector; 2]) -> Option<Vector> {
     let height_from = (from - origin).dot(&normal);
     let height_to = (to - origin).dot(&normal);

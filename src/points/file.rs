@@ -14,8 +14,8 @@ use super::columns::{Columns, Layout, layout};
 use super::rows::{Part, for_each_row};
 use super::{BodyPoints, Point};
 
-/// The bodies that use a file: index of the body, and the block number that the body selects. Without a block
-/// number, a body selects the rows that no other body selects.
+/// Return the bodies that use a file: index of the body, and the block number that the body selects. Without
+/// a block number, a body selects the rows that no other body selects.
 pub fn users(bodies: &[BodyPoints], file: &Path) -> Vec<(usize, Option<u32>)> {
     bodies
         .iter()
@@ -35,8 +35,8 @@ const SAMPLED: u64 = 256;
 /// Largest absolute coordinate, m; squared distances then cannot overflow.
 const FARTHEST: f64 = 1e30;
 
-/// The columns that the deck names for the file of the body with index `user`; `None` if the deck names no
-/// columns. The columns are equal for all bodies that use the file.
+/// Return the columns that the deck names for the file of the body with index `user`; `None` if the deck
+/// names no columns. The columns are equal for all bodies that use the file.
 fn columns<'a>(bodies: &[BodyPoints<'a>], user: usize) -> Option<&'a Columns> {
     match bodies[user].points {
         PointSource::File { columns, .. } => columns.as_ref(),
@@ -67,7 +67,8 @@ pub fn layout_of(
 /// Collective.
 ///
 /// # Errors
-/// If the file cannot be read or a row is invalid; the message gives file and line.
+/// If the file cannot be read, or the heading or a row is invalid. The message gives the file, and the line
+/// of the heading or row.
 pub(super) fn for_each_point(
     bodies: &[BodyPoints],
     dimension: usize,

@@ -59,8 +59,8 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     Ok(ids)
 }
 
-/// The first line (from 1) in which the number `number` is an entry; `None` if there is no such line or the
-/// file cannot be read. Comments and the heading do not count.
+/// Return the first line (from 1) in which the number `number` is an entry; `None` if there is no such line
+/// or the file cannot be read. Comments and the heading do not count.
 pub fn line_of(path: &Path, number: u64) -> Option<u64> {
     let heading = heading(path).ok()?.map(|heading| heading.line);
     let text = std::fs::read_to_string(path).ok()?;
@@ -73,7 +73,7 @@ pub fn line_of(path: &Path, number: u64) -> Option<u64> {
     found.map(|(line, _)| line)
 }
 
-/// The entries of a row.
+/// Return the entries of a row.
 fn words(row: &str) -> impl Iterator<Item = &str> {
     let words = row.split([',', ';', ' ', '\t', '\r']);
     words.filter(|entry| !entry.is_empty())

@@ -11,7 +11,8 @@ use super::{MAX_PER_RANK, Point, distance_squared, shape};
 /// Binary logarithm of the maximum number of cells per rank. Testing this number of cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
-/// Number of candidate cells that are sampled to estimate the fraction of them that belongs to a body.
+/// Number of candidate cells that are sampled to estimate the fraction of candidate cells that belong to a
+/// body.
 const SAMPLES: u64 = 1 << 17;
 
 /// Step of a low-discrepancy sequence in [0, 1): the inverse of the golden ratio.
@@ -79,17 +80,18 @@ impl<'a> LatticeBody<'a> {
         }))
     }
 
-    /// Number of candidate cells, whose centres can lie within the shape; saturates at `u64::MAX`.
+    /// Return the number of candidate cells, whose centres can lie within the shape; saturates at `u64::MAX`.
     pub fn cells(&self) -> u64 {
         self.region.total()
     }
 
-    /// The centre (m) of the candidate cell with this index; `None` if the cell does not belong to the body.
+    /// Return the centre (m) of the candidate cell with this index; `None` if the cell does not belong to the
+    /// body.
     pub fn centre(&self, index: u64) -> Option<[f64; 3]> {
         self.centre_of(self.region.cell(index))
     }
 
-    /// The centre (m) of a cell; `None` if the cell does not belong to the body.
+    /// Return the centre (m) of a cell; `None` if the cell does not belong to the body.
     fn centre_of(&self, cell: [i64; 3]) -> Option<[f64; 3]> {
         let centre = self.position(cell.map(|x| x as f64));
         self.contains(centre).then_some(centre)
@@ -100,12 +102,13 @@ impl<'a> LatticeBody<'a> {
         self.centre_of(cell).is_some()
     }
 
-    /// The cell whose centre is nearest to a position, m.
+    /// Return the cell whose centre is nearest to a position (m).
     pub fn cell_at(&self, position: [f64; 3]) -> [i64; 3] {
         self.index_at(position, 1.0)
     }
 
-    /// The grid index of a position (m), in steps of 1/`steps` of an edge from the centre of cell 0.
+    /// Return the grid index of a position (m): the number of steps from the centre of cell 0, in each
+    /// direction. A step is 1/`steps` of an edge.
     pub fn index_at(&self, position: [f64; 3], steps: f64) -> [i64; 3] {
         std::array::from_fn(|k| {
             if k < self.dimension {
@@ -116,7 +119,7 @@ impl<'a> LatticeBody<'a> {
         })
     }
 
-    /// The position (m) at an offset, in edges, from the centre of cell 0.
+    /// Return the position (m) at an offset, in edges, from the centre of cell 0.
     pub fn position(&self, edges: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| {
             if k < self.dimension {
@@ -133,17 +136,17 @@ impl<'a> LatticeBody<'a> {
         within(self.shape) && !self.later.iter().any(|shape| within(shape))
     }
 
-    /// Volume of a cell, m³.
+    /// Return the volume of a cell, m³.
     pub fn cell_volume(&self) -> f64 {
         self.spacing[..self.dimension].iter().product::<f64>() * self.out_of_plane_measure
     }
 
-    /// Number of points per cell.
+    /// Return the number of points per cell.
     pub fn points_of_cell(&self) -> u64 {
         u64::from(self.quadrature.points(self.dimension))
     }
 
-    /// Number of points. With many candidate cells, the number is estimated from sampled cells.
+    /// Return the number of points. With many candidate cells, the number is estimated from sampled cells.
     pub fn points(&self) -> f64 {
         let belongs = |index: &u64| self.centre(*index).is_some();
         let (cells, all) = (self.cells(), self.cells() as f64);
@@ -156,13 +159,14 @@ impl<'a> LatticeBody<'a> {
         fraction * all * self.points_of_cell() as f64
     }
 
-    /// The centres (m) of at most `count` sampled cells of the body.
+    /// Return the centres (m) of at most `count` sampled cells of the body.
     pub fn some_centres(&self, count: u64) -> Vec<[f64; 3]> {
         let centres = even_samples(SAMPLES, self.cells()).filter_map(|index| self.centre(index));
         centres.take(count as usize).collect()
     }
 
-    /// Upper bound on the number of cells within a distance (m) of a position.
+    /// Return an upper bound on the number of cells whose centres are within a distance (m) of the centre of
+    /// a cell.
     pub fn cells_within(&self, distance: f64) -> f64 {
         let width = |k: usize| {
             let all = self.region.range(k).count() as f64;
@@ -171,7 +175,8 @@ impl<'a> LatticeBody<'a> {
         (0..self.dimension).map(width).product()
     }
 
-    /// Number of the body's points in cells whose centres are within a distance (m) of a position (m).
+    /// Return the number of the body's points in cells whose centres are within a distance (m) of a position
+    /// (m).
     pub fn count_near(&self, position: [f64; 3], distance: f64) -> u64 {
         let range = |k: usize| {
             let all = self.region.range(k);
@@ -205,7 +210,7 @@ impl<'a> LatticeBody<'a> {
         let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);
         let mut within = 0;
         for k in 0..samples {
-            // With few cells, sample each one equally often. With many cells, sample some of them once.
+            // With few cells, sample each cell equally often. With many cells, sample some cells once.
             let index = if region.total() <= SAMPLES {
                 k % region.total()
             } else {
@@ -223,14 +228,14 @@ impl<'a> LatticeBody<'a> {
     }
 }
 
-/// `samples` evenly distributed integers below `count`.
+/// Return `samples` evenly distributed integers below `count`; none if `count` is 0.
 fn even_samples(samples: u64, count: u64) -> impl Iterator<Item = u64> {
     let at = move |k: u64| ((k as f64 * EVEN_STEP).fract() * count as f64) as u64;
     (0..if count == 0 { 0 } else { samples }).map(at)
 }
 
-/// Generate this rank's piece of a body's points, with ids of 0. Cells are ordered with x fastest. Each
-/// rank generates a consecutive range.
+/// Generate this rank's piece of a body's points, all with the id 0. Cells are ordered with x fastest. Each
+/// rank generates the points of consecutive cells.
 ///
 /// # Errors
 /// If cells are too far from the origin to be numbered.

@@ -14,8 +14,8 @@ use super::{BodyPoints, Point, check_no_empty_body, file, mesh};
 /// dimensions. V is divided by the thickness in the plane, and by the cross-section in 1-D. The mean spacing
 /// of a lattice is its spacing, or the geometric mean of the edges of a cell.
 ///
-/// Files and meshes are read, but no points are stored: each rank reads a part of a file, and rank 0 reads
-/// the meshes. The result is the same on any number of ranks.
+/// Files and meshes are read, but no points are kept. Each rank reads a part of a file, and rank 0 reads the
+/// meshes. The result is the same on any number of ranks.
 ///
 /// # Errors
 /// If a file or mesh of a wanted body is unreadable or invalid, or a body with this file or mesh has no

@@ -49,7 +49,7 @@ pub struct Found {
     pub names: Vec<String>,
 }
 
-/// Index of the first body whose points come from this mesh.
+/// Return the index of the first body whose points come from this mesh.
 ///
 /// # Panics
 /// If no body uses the mesh.
@@ -78,7 +78,7 @@ pub(super) fn users<'a>(bodies: &[BodyPoints<'a>], file: &Path) -> Vec<User<'a>>
     of_file.collect()
 }
 
-/// Read a mesh on rank 0. Return this rank's part of its points, for all bodies that use it. Collective.
+/// Read a mesh on rank 0. Return this rank's part of the points of all bodies that use the mesh. Collective.
 ///
 /// # Errors
 /// Same as for [`read`]; the error is the same on all ranks.
@@ -219,7 +219,7 @@ pub(super) fn read_points(
     })
 }
 
-/// The index of each element's body, or [`NO_BODY`].
+/// Return the index of each element's body, or [`NO_BODY`].
 fn bodies_of_elements(
     all: &[BodyPoints],
     dimension: usize,
@@ -487,7 +487,7 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     Some([pair[0].1, pair[1].1])
 }
 
-/// The ids of the points of a group. A group has the points of
+/// Return the ids of the points of a group. A group has the points of
 ///
 /// - the elements of the group;
 /// - elements that have all corners of a face, edge or point element of the group;

@@ -89,7 +89,7 @@ impl<'a> BodyPoints<'a> {
     }
 }
 
-/// Squared distance of two positions, m².
+/// Return the squared distance of two positions, m².
 pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     let difference = Vector3::from(b) - Vector3::from(a);
     difference.dot(&difference)

@@ -86,7 +86,7 @@ impl Polygon {
         }
     }
 
-    /// Lower and upper corner of the box around the polygon, m.
+    /// Return the lower and the upper corner of the box around the polygon, m.
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         (self.lower, self.upper)
     }
@@ -126,7 +126,7 @@ impl Polygon {
         [self.vertices[index], self.vertices[next]]
     }
 
-    /// The strip at a coordinate (m) along the axis, clamped to the first and last strip.
+    /// Return the index of the strip at a coordinate (m) along the axis, clamped to the first and last strip.
     fn strip(&self, coordinate: f64) -> usize {
         let strip = (coordinate - self.lower[self.axis]) * self.strips_per_length;
         (strip as usize).min(self.starts.len() - 2)
@@ -162,7 +162,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The containment test with all edges, without the index.
+    /// Test containment with all edges, without the index.
     fn by_all_edges(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool {
         let edges = || {
             let next = vertices.iter().cycle().skip(1);
@@ -220,7 +220,7 @@ mod tests {
         );
     }
 
-    /// The largest number of edges read for a position.
+    /// Return the largest number of edges in a strip.
     fn most_read(polygon: &Polygon) -> usize {
         let strips = 0..polygon.starts.len() - 1;
         strips

@@ -78,17 +78,17 @@ impl Region {
         })
     }
 
-    /// The first and last cell in a direction.
+    /// Return the first and the last cell in a direction.
     pub fn range(&self, direction: usize) -> RangeInclusive<i64> {
         self.hull.first[direction]..=self.hull.end[direction] - 1
     }
 
-    /// Number of cells; saturates at `u64::MAX`.
+    /// Return the number of cells; saturates at `u64::MAX`.
     pub fn total(&self) -> u64 {
         self.total
     }
 
-    /// The cell with a given index, from 0.
+    /// Return the cell with a given index, from 0.
     pub fn cell(&self, index: u64) -> [i64; 3] {
         let mut rest = index;
         let mut spans = &self.layers;
@@ -108,7 +108,7 @@ impl Region {
     }
 }
 
-/// Shapes whose union contains the shape.
+/// Return shapes whose union contains the shape.
 fn parts(shape: &Shape) -> Vec<&Shape> {
     match shape {
         Shape::Union(shapes) => shapes.iter().flat_map(parts).collect(),
@@ -117,8 +117,8 @@ fn parts(shape: &Shape) -> Vec<&Shape> {
     }
 }
 
-/// The cells whose centres can lie within a box (m) that is enlarged by `margin` edges. `None` if cells are
-/// too far from the origin to be numbered.
+/// Return the cells whose centres can lie within a box (m) that is enlarged by `margin` edges. `None` if
+/// cells are too far from the origin to be numbered.
 fn cells(
     (lower, upper): ([f64; 3], [f64; 3]),
     spacing: [f64; 3],

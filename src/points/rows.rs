@@ -85,7 +85,7 @@ pub fn for_each_row(
     Ok(read_part)
 }
 
-/// Call `row` with the entries of a row, unless it is empty or a comment.
+/// Call `row` with the entries of a row, unless the row is empty or a comment.
 fn of_row(
     bytes: &[u8],
     row: &mut impl FnMut(&[&str]) -> std::result::Result<(), String>,

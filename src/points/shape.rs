@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::problem::Shape;
 
-/// The lower and upper corner of a box that contains the shape, m; ±∞ in unbounded directions.
+/// Return the lower and the upper corner of a box that contains the shape, m; ±∞ in unbounded directions.
 pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
     match shape {
         Shape::Box { lower, upper } => (*lower, *upper),

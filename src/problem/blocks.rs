@@ -1,5 +1,5 @@
-//! The blocks of a problem. Without refinement, a block is a body; otherwise, the points of a body with one
-//! level and kind.
+//! The blocks of a problem. Without refinement, each body is a block. With refinement, a block contains the
+//! points of a body that have the same level and the same [`Kind`].
 //!
 //! All points of a block have the same law and horizon. Their volumes differ only in bodies from files and
 //! meshes, and in some blocks of refined bodies.
@@ -18,7 +18,7 @@ pub enum Kind {
     Whole,
     /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,
-    /// Points with coarser points within their horizon. The horizon of these points is enlarged by
+    /// Points with coarser points within their horizon. The horizon of these points is multiplied by
     /// [`Refinement::interface_factor`](super::Refinement::interface_factor).
     AtCoarser,
 }

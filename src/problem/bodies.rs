@@ -245,12 +245,14 @@ pub struct Damage {
     pub rule: DamageRule,
     /// The toughness, from which the threshold follows.
     pub toughness: Toughness,
-    /// α in the criterion s ≥ s0 − α s_min.
+    /// α in the threshold s0 − α s_min of the stretch. s0 is the critical stretch, and s_min the smallest
+    /// stretch of the intact bonds of a point. With [`DamageRule::Energy`], the critical work is multiplied
+    /// by ((s0 − α s_min)/s0)².
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
     /// Dependence of the fracture energy on the direction of the crack; `None` if all directions are equal.
-    /// Otherwise, `toughness` is the fracture energy of cracks along the axis.
+    /// Otherwise, `toughness` is the fracture energy of cracks along the axis a of [`ToughnessByDirection`].
     pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
@@ -321,7 +323,7 @@ pub enum PointSource {
         scale: f64,
         /// Span of the file's name in the deck.
         span: Range<usize>,
-        /// Span of the group's name in the deck.
+        /// Span of the group's name in the deck, or of the file's name if the deck names no group.
         block_span: Range<usize>,
     },
 }
@@ -393,7 +395,7 @@ impl Set {
 pub enum Selector {
     /// All points.
     All,
-    /// The points of a body, by index.
+    /// The points of the body with this index.
     Body(usize),
     /// Points whose reference position fulfils the condition.
     Where(Expression),
@@ -405,7 +407,7 @@ pub enum Selector {
         ids: Vec<u64>,
         /// The file that contains the ids; `None` if the deck contains them.
         file: Option<IdFile>,
-        /// Span of the largest id in the deck.
+        /// Span of the largest id in the deck, or of the name of the file that contains the ids.
         largest: Range<usize>,
     },
     /// Points of a group of the meshes from which bodies get their points.

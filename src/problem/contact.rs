@@ -16,7 +16,7 @@ pub struct Contact {
 pub struct ContactPair {
     /// Name in the deck.
     pub name: String,
-    /// Names of the bodies.
+    /// Names of the two bodies; the same name twice for the points of one body.
     pub bodies: [String; 2],
     /// The rule; `None` for no contact.
     pub rule: Option<ContactRule>,

@@ -60,7 +60,7 @@ pub struct Problem {
     pub family: FamilyRule,
     /// Rules for the bonds between bodies.
     pub interface: Interface,
-    /// Contact between points that no bond joins; `None` without contact.
+    /// Contact between points that no intact bond joins; `None` without contact.
     pub contact: Option<Contact>,
     /// Rigid bodies that points can touch.
     pub rigid: Vec<Rigid>,

@@ -12,7 +12,7 @@ pub enum Interval {
     Seconds(f64),
     /// Number of time steps.
     Steps(u64),
-    /// Simulated time, checked only at steps that are multiples of a number.
+    /// Simulated time, checked only at steps whose number is a multiple of `steps`.
     SecondsAtSteps {
         /// Interval of simulated time, s.
         seconds: f64,
@@ -40,7 +40,7 @@ pub struct Balance {
     pub imbalance: f64,
 }
 
-/// Settings of the main result file or a further one.
+/// Settings of the main result file or of a further result file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     /// Name of a further result; `None` for the main result.
@@ -53,7 +53,8 @@ pub struct Output {
     pub fields: Vec<Field>,
     /// Whether the fields are rounded to 4-byte numbers.
     pub single: bool,
-    /// Index of the set whose points the result contains, and the span of its name; `None` for all points.
+    /// Index of the set whose points the result contains, and the span of the set's name in the deck; `None`
+    /// for all points.
     pub set: Option<(usize, Range<usize>)>,
 }
 
@@ -239,8 +240,8 @@ pub enum Field {
     /// Weighted volume m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
     /// Kirchhoff stress Σ T⊗Y Ṽ of the three-dimensional body, Pa: xx, yy, zz, xy, yz, xz. In plane strain,
-    /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 −
-    /// ν) xx.
+    /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain,
+    /// yy = zz = ν/(1 − ν) xx.
     Stress,
     /// Cauchy stress, Pa: Kirchhoff stress divided by the ratio of deformed to undeformed volume, in the same
     /// order.
@@ -269,7 +270,8 @@ pub enum Field {
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.
     Temperature,
-    /// Fragment id: the smallest id of the points that intact bonds connect to the point.
+    /// Fragment id: the smallest id in the fragment of the point, which contains all points that chains of
+    /// intact bonds connect to the point.
     Fragment,
     /// The rank that owns the point.
     Rank,

@@ -26,17 +26,19 @@ pub struct Refinement {
     pub trigger: Option<Trigger>,
 }
 
-/// Criteria of refinement during the run. A point that fulfils one criterion triggers refinement: all points
-/// within its horizon are refined, one level at a time.
+/// Criteria of refinement during the run. A point that fulfils [`Self::energy`], [`Self::damage`] or
+/// [`Self::condition`], and also [`Self::only`], triggers refinement: all points within the horizon of this
+/// point are refined, one level at a time. Criteria that are `None` are not used.
 #[derive(Debug, Clone)]
 pub struct Trigger {
     /// Span in the deck.
     pub span: Range<usize>,
     /// Steps between evaluations of the criteria.
     pub every_steps: u64,
-    /// Smallest strain energy density of a triggering point, as a fraction of the maximum over all points.
+    /// Smallest strain energy density that fulfils this criterion, as a fraction of the maximum over all
+    /// points.
     pub energy: Option<f64>,
-    /// Smallest damage of a triggering point.
+    /// Smallest damage that fulfils this criterion.
     pub damage: Option<f64>,
     /// A condition on reference position and time that makes a point trigger refinement.
     pub condition: Option<Expression>,

@@ -20,16 +20,16 @@ pub struct Time {
 /// Settings of a time step that adapts to the number of bonds that break in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
-    /// Largest number of bonds of one point that may break in a step. If more break, the step is repeated
-    /// with a smaller dt.
+    /// Largest number of bonds of one point that may break in a step. If more bonds break, the step is
+    /// repeated with a smaller Δt.
     pub most_broken: u64,
     /// Largest number of bonds of one point that break in a calm step.
     pub stable_broken: u64,
-    /// Number of consecutive calm steps before dt is raised.
+    /// Number of consecutive calm steps before Δt is raised.
     pub steps: u64,
-    /// Factor on dt if a step is repeated.
+    /// Factor on Δt if a step is repeated.
     pub reduce: f64,
-    /// Factor on dt after `steps` calm steps.
+    /// Factor on Δt after `steps` calm steps.
     pub raise: f64,
     /// The smallest step, s; `None` for 1/100 of the largest.
     pub smallest: Option<f64>,
@@ -75,7 +75,8 @@ pub enum Method {
 pub struct Static {
     /// Number of load steps.
     pub load_steps: u64,
-    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
+    /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
+    /// reactions.
     pub tolerance: f64,
     /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub max_iterations: u64,
@@ -118,7 +119,8 @@ impl Method {
 pub struct Relaxation {
     /// Number of load steps.
     pub load_steps: u64,
-    /// Largest residual: norm of the unbalanced force, divided by the norm of loads and reactions.
+    /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
+    /// reactions.
     pub tolerance: f64,
     /// Largest number of iterations of a load step, counted from the last break of bonds.
     pub iterations: u64,

@@ -10,8 +10,7 @@
 //!
 //! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|², W = Σ w Ψ(F_ξ), w = ω Ṽ/Σ ω Ṽ,
 //!
-//! summed over the intact bonds. The force state is the derivative of W. With the stress P_ξ = ∂Ψ/∂F at F_ξ
-//! it is
+//! summed over the intact bonds. With the stress P_ξ = ∂Ψ/∂F at F_ξ, the derivative of W is the force state
 //!
 //! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ), Z = Σ w P_ξ (I − n⊗n).
 //!
@@ -96,7 +95,7 @@ impl Described for BondAssociated {
 /// bonds (m⁻³), H, and Z K⁻¹ (N/m⁷).
 type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
-/// Indices of the numbers of a point, see [`Point`]; K⁻¹ and a flag follow.
+/// Indices of the numbers of a point: the numbers of [`Point`], then K⁻¹, then a flag.
 struct Places;
 
 impl Places {
@@ -112,8 +111,8 @@ impl Places {
         Self::direct::<D>() + D * D
     }
 
-    /// Return the index of the flag for a point without force: K is nearly singular, the intact part is too
-    /// stiff, or a bond has no stress.
+    /// Return the index of the flag for a point without force: K is nearly singular, the intact part of the
+    /// family is too stiff, or a bond has no stress.
     const fn singular<const D: usize>() -> usize {
         Self::inverse::<D>() + 2 * D
     }
@@ -176,8 +175,8 @@ impl<const D: usize> Law<D> for BondAssociated {
         }
     }
 
-    /// Return the trace of the shape tensor of an untruncated family, divided by the trace of K of this
-    /// family; 1 if K is nearly singular.
+    /// Return the trace of the shape tensor of an untruncated family, divided by the trace of K of the point;
+    /// 1 if K is nearly singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {

@@ -8,7 +8,8 @@ use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
 use std::f64::consts::PI;
 
-/// The zero-energy control: the matrix B of the force state ω B z.
+/// The zero-energy control: the matrix B of the force state ω B z, with the symbols of
+/// `correspondence/mod.rs`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
@@ -20,12 +21,12 @@ pub enum Control {
     /// B = (4/3) G/k I, with the shear modulus G and a diagonal entry k (m⁵) of the shape tensor of an
     /// untruncated family. Long shear waves then have no dispersion.
     ///
-    /// Derivation: consider a wave of amplitude u, wavenumber κ along the axis x, and modulus M; let q = Σ ω
-    /// ξ_x⁴ Ṽ.
-    /// H is too small by the fraction κ²q/(6k), so the energy of the wave is ½ M κ² (1 − κ²q/(3k)) |u|².
-    /// z is −½ (κ·ξ)² u, so a control (b/k) I stores the energy ½ b κ⁴q/(4k) |u|².
-    /// The sum of both energies is independent of q for b = (4/3) M, for every dimension, influence function
-    /// and lattice.
+    /// Derivation: consider a wave along the axis x with the amplitude u, the wavenumber κ and the modulus M,
+    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ.
+    /// H is too small by the fraction κ²q/(6k), so the wave stores ½ M κ² (1 − κ²q/(3k)) |u|² per volume.
+    /// z is −½ (κ ξ_x)² u, so a control (b/k) I stores ½ b κ⁴q/(4k) |u|² per volume.
+    /// The sum of both is independent of q for b = (4/3) M, for every dimension, influence function and
+    /// lattice.
     Dispersion {
         /// Product (4/3) G/k, N/m⁷.
         strength: f64,

@@ -1,5 +1,5 @@
-//! Hooke's matrix: isotropic, orthotropic or full, in material axes that may be rotated against the axes of
-//! the body.
+//! Hooke's matrix: isotropic, orthotropic or full. The deck gives the constants in material axes, which may
+//! be rotated against the axes of the body.
 //!
 //! Voigt's order is xx, yy, zz, yz, xz, xy with engineering shear strains. A plane problem uses the
 //! components xx, yy and xy. In plane stress the matrix is that of a thin sheet. In plane strain the

@@ -6,9 +6,10 @@
 //!
 //! with the equivalent plastic strain ε̄, the temperature T, the initial temperature T₀, the melting
 //! temperature T_m, and the constants of [`JohnsonCook`].
-//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at the point where it is generated: T − T₀ = β w/(ρ
-//! c). Here w is the energy density that the point has dissipated, β the fraction of w that becomes heat, and
-//! ρ c the volumetric heat capacity. A step is computed with the temperature at the start of the step.
+//! In a step Δt the rate is ε̄̇ = Δε̄/Δt. All heat stays at the point where it is generated:
+//! T − T₀ = β w/(ρ c). Here w is the energy density that the point has dissipated, β the fraction of w that
+//! becomes heat, and ρ c the volumetric heat capacity. A step is computed with the temperature at the start
+//! of the step.
 //!
 //! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of
 //! time uses this stored factor. Therefore a stress that has been returned to the yield surface does not flow
@@ -16,8 +17,8 @@
 //!
 //! The increment of plastic strain is ΔE_p = x S_d with the deviator S_d of the final stress, and Δε̄ = ⅔ x q
 //! with the equivalent stress q of the final stress. The factor x follows from the trial stress: each part of
-//! the equivalent trial stress is divided by 1 + x c, with the stiffness c of the part ([`Modes`]). The
-//! equation
+//! the equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part ([`Modes`]), not
+//! the heat capacity. The equation
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!
@@ -202,13 +203,13 @@ pub fn fault(values: &Values) -> Option<LawFault> {
     None
 }
 
-/// Parts of the equivalent trial stress that plastic flow reduces at different rates. The final equivalent
-/// stress q is q² = Σ s/(1 + x c)², summed over the parts.
+/// Parts of the equivalent trial stress that plastic flow reduces at different rates. The square of the final
+/// equivalent stress is q² = Σ s/(1 + x c)², summed over the parts.
 #[derive(Debug, Clone, Copy)]
 pub struct Modes {
     /// Squared parts s of the trial stress, Pa².
     pub squares: [f64; 2],
-    /// Stiffnesses c, Pa. The second is the larger one.
+    /// Stiffnesses c, Pa. The second is at least as large as the first.
     pub stiffnesses: [f64; 2],
 }
 
@@ -240,7 +241,8 @@ pub struct Surface {
 }
 
 impl JohnsonCook {
-    /// Create the hardening of a body; `None` if the deck gives no key that only this hardening has.
+    /// Create the hardening of a body; `None` if the deck gives no yield stress, or no key that only this
+    /// hardening has.
     pub fn of(values: &Values) -> Option<Self> {
         first_given(values)?;
         let number = |key: &Key| values.get(key.name).map(|_| values.number(key.name));
@@ -511,9 +513,9 @@ mod tests {
         }
     }
 
-    /// Integrate the rate equations of a bar by the method of Runge and Kutta. Above the yield stress the
-    /// rate of flow follows from the stress: ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns stress (Pa), ε̄ and work
-    /// (J/m³).
+    /// Integrate the rate equations of a bar by the method of Runge and Kutta. If the stress σ exceeds the
+    /// yield stress σ₀ without the factor of the rate, the rate of flow is ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns
+    /// σ (Pa), ε̄ and the dissipated energy density (J/m³).
     fn integrated(strain: f64, rate: f64) -> [f64; 3] {
         let steps = 400_000;
         let step = strain / rate / f64::from(steps);

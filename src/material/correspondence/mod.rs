@@ -184,7 +184,8 @@ type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// Count of the point's own numbers: W − ½ P : H (J/m³), and the flag of a point without force.
+/// Count of the point's [own numbers](Law::OWN_NUMBERS): W − ½ P : H (J/m³), and the flag of a point without
+/// force.
 ///
 /// If a body yields and has a control, two more numbers follow. The first is ½ tr(B H K Hᵀ), the part of
 /// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is s at the start of the step.
@@ -196,8 +197,8 @@ const OWN_OF_ELASTIC: usize = 2;
 /// A, and the diagonal and mixed entries of B, N/m⁷.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
-/// Return A ξ + B η, N/m⁶. The rows are written out, because the compiler would not unroll a loop over them,
-/// and would keep all of its data in memory instead of registers.
+/// Return A ξ + B η, N/m⁶. The rows are written out, because the compiler would not unroll a loop over the
+/// rows, and would keep the data of such a loop in memory instead of registers.
 #[inline(always)]
 fn times_bond<S: Simd, const D: usize>(
     simd: S,

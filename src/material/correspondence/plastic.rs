@@ -8,15 +8,15 @@
 //! Without flow this is the St. Venant–Kirchhoff law. The law is meant for small strains with rotations of
 //! any size.
 //!
-//! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²) and the equivalent plastic strain ε̄,
-//! the yield surface is q = σ_y + H ε̄.
+//! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²), the equivalent plastic strain ε̄ and
+//! the hardening modulus H, the yield surface is q = σ_y + H ε̄.
 //! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3):
 //! Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
 //! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the deviator of the final
 //! stress, where x solves a scalar equation (§3.4).
 //!
-//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain, by rate and
-//! temperature.
+//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain and by the strain
+//! rate, and softening by heat.
 //!
 //! The whole plastic work ∫ q dε̄ is dissipated.
 
@@ -492,8 +492,8 @@ mod tests {
             if state.equivalent > before.equivalent {
                 hardened += usize::from(state.yield_change > 0.0);
                 assert!(over > -tolerance, "{over}");
-                // The increment of the plastic strain is along the deviator; its length gives the increment
-                // of the equivalent strain.
+                // The increment of the plastic strain is along the deviator. The length of this increment
+                // gives the increment of the equivalent plastic strain.
                 let growth = state.equivalent - before.equivalent;
                 let wanted = deviator(&stress) * (1.5 * growth / equivalent(&stress));
                 assert!((flow - wanted).norm() < 1e-9 * growth);

@@ -7,18 +7,18 @@ use crate::material::monomials::{index_of, least_squares, multiplicity};
 use crate::material::symmetric::mixed;
 
 /// Smallest allowed σ/σ₀; bonds with σ ≤ 0 would repel when stretched. For a horizon of 3 spacings, the
-/// smallest σ/σ₀ at a corner of a block is about 0.4.
+/// smallest σ/σ₀ at a corner of a cuboid is about 0.4.
 const SMALLEST: f64 = 0.1;
 
 /// Largest allowed σ/σ₀. Without a limit and for a horizon of 3 spacings, σ/σ₀ reaches 1.8 at edges of a
-/// block, 12 in bars that are three points thick, and 30 in sheets of two layers.
+/// cuboid, 12 in bars that are three points thick, and 30 in sheets of two layers.
 const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest
 /// norm is used.
 ///
-/// For a horizon of 3 spacings, the smallest ratio is 0.08 at a corner of a block, 0.007 in a sheet of two
-/// layers, and 0 in a single layer.
+/// For a horizon of 3 spacings, the ratio of the smallest to the largest singular value is 0.08 at a corner
+/// of a cuboid, 0.007 in a sheet of two layers, and 0 in a single layer.
 const RANK: f64 = 5e-3;
 
 /// The exponents and the coefficient of a monomial of degree 2 in the components of n or N.
@@ -27,7 +27,7 @@ type Monomial = ([usize; 3], f64);
 /// A polynomial of degree 2 in the components of n or N.
 type Quadratic = [Monomial];
 
-/// Return the sum over a family of the product of two polynomials, from the sums of the monomials of degree
+/// Return the sum of the product of two polynomials over a family, from the sums of the monomials of degree
 /// 4.
 fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
     let mut total = 0.0;
@@ -53,17 +53,17 @@ fn of_product(a: usize, b: usize) -> [usize; 3] {
 pub(super) struct Fit<const D: usize> {
     /// Matrix of the function: T in n·T n or N·T N.
     pub(super) tensor: SMatrix<f64, D, D>,
-    /// Sum over the family of the squared function.
+    /// Sum of the squared function over the family.
     pub(super) square: f64,
-    /// Sum over the family of the function.
+    /// Sum of the function over the family.
     pub(super) sum: f64,
 }
 
 /// Fit the function g = c + Σ τ_k p_k, a sum over the conditions k with the multipliers τ_k. For each
-/// condition k, the sum over the family of p_k g must be wanted_k, as far as the family allows. c is
+/// condition k, the sum of p_k g over the family must be wanted_k, as far as the family allows. c is
 /// `constant`; p_k and wanted_k are the entries of `conditions`.
 ///
-/// `sums` are the sums over the family of the monomials of degree 4, in the components of n or N.
+/// `sums` are the sums of the monomials of degree 4, in the components of n or N, over the family.
 /// `one` is the polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².
 fn nearest<const D: usize>(
     sums: &[f64],
@@ -115,7 +115,7 @@ fn one_in_squares<const D: usize>() -> Vec<([usize; 3], f64)> {
 }
 
 /// Fit ω with the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab, from the sums of |ξ|² Ṽ times the monomials of n.
-/// `weighted_volume` is m, m⁵.
+/// `weighted_volume` is m = Σ |ξ|² Ṽ (m⁵), which gives ω₀ = d/m.
 ///
 /// Mixed conditions have the weight √2, because each represents two components. Therefore the fitted function
 /// rotates with the family.

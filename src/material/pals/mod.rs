@@ -56,7 +56,7 @@ const OTHERS: usize = 1;
 pub struct Pals {
     /// The linear solid with ω = ω₀ and σ = σ₀.
     ordinary: Ordinary,
-    /// Whether the critical stretch is scaled with σ, because it follows from a fracture energy.
+    /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with σ.
     is_scaled: bool,
 }
 
@@ -95,8 +95,7 @@ impl Pals {
     }
 }
 
-/// No deck name: decks write `ordinary` with `surface_correction = "pals"`, as for the plastic and the
-/// viscoelastic law.
+/// No deck name: decks write `ordinary` with `surface_correction = "pals"`.
 impl Declared for Pals {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
@@ -134,8 +133,8 @@ fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
 }
 
 impl<const D: usize> Law<D> for Pals {
-    /// Constants: Λ (1/m⁵), S (N/m⁷), and a spring constant (N/m⁷) that bounds the energy. Then k′θ − (1/d) Σ
-    /// σ|ξ| ε Ṽ (Pa) and θ/d.
+    /// Constants: Λ (1/m⁵), S (N/m⁷), and a spring constant (N/m⁷) that bounds the energy. Then
+    /// k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
@@ -146,7 +145,7 @@ impl<const D: usize> Law<D> for Pals {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// The only such number is the dilatation θ.
+    /// The own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const SCALED: bool = true;
@@ -165,7 +164,7 @@ impl<const D: usize> Law<D> for Pals {
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         let (of_directions, of_squares) = sums.split_at(MONOMIALS);
         let weighted_volume = weighted_volume::<D>(of_directions);
-        // The point has no bonds.
+        // True for a point without bonds.
         if weighted_volume <= 0.0 {
             return;
         }
@@ -375,8 +374,8 @@ mod tests {
         }
     }
 
-    /// The spring constant uses the extremes of σ over all bonds. Without volume correction, σ varies by a
-    /// factor of two even in an untruncated family.
+    /// The spring constant uses the extremes of σ over all bond directions. Without volume correction, σ
+    /// varies by a factor of two even in an untruncated family.
     #[test]
     fn the_spring_constant_bounds_the_energy() {
         let law = law();
@@ -396,7 +395,7 @@ mod tests {
             ("sheet", family(|[.., z]| z == 0), 1.7),
         ] {
             let (functions, bound) = functions(&family);
-            // Matrix A of 2W = e·A e.
+            // Matrix A of 2W = e·A e, with the vector e of all extensions.
             let count = family.len();
             let mut matrix = DMatrix::zeros(count, count);
             let lengths = DVector::from_iterator(count, family.iter().map(|xi| xi.norm()));

@@ -1,17 +1,18 @@
 //! Elastic–perfectly plastic solid with the influence functions of [`Pals`].
 //!
-//! Each bond has a plastic extension e_p. Energy and force are those of [`Pals`] at the elastic extensions
-//! e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d Ṽ = 0:
+//! Each bond has a plastic extension e_p per end. Energy and force are those of [`Pals`] at the elastic
+//! extensions e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d Ṽ = 0:
 //!
 //! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
-//! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G): twice the deviatoric energy density at the yield stress σ_y of
-//! von Mises. Without surfaces, this is the yield condition of [`super::super::OrdinaryPlastic`].
-//! The return is radial: e_p grows by (1 − r) ε_d, with r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore
-//! does not change θ.
+//! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G). This limit is twice the deviatoric energy density at which the
+//! equivalent stress of von Mises is the yield stress σ_y. Without surfaces, this is the yield condition of
+//! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with
+//! r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore does not change θ.
 //!
-//! While all bonds are intact, ε_d is ε of [`Pals`]. If bonds are broken, ε = ε_d + c|ξ|, and flow reduces
-//! the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, so 1 − r is limited to this value.
+//! While all bonds are intact, ε_d is ε of [`Pals`]. If bonds are broken, ε = ε_d + c|ξ| with a number c of
+//! the point. Flow then reduces the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ. Therefore 1 − r
+//! is limited to this value.
 
 use super::{
     Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, Pals,
@@ -70,7 +71,7 @@ impl<const D: usize> Law<D> for PalsPlastic {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 3;
     const LEAST_DIMENSION: usize = 2;
-    /// θ.
+    /// The own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_STRETCH: bool = true;

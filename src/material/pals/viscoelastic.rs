@@ -1,6 +1,6 @@
 //! Standard linear solid with the influence functions of [`Pals`]: the deviatoric part of the force relaxes.
 //!
-//! With the back extension e_b of each bond, which follows the deviatoric extension ε of [`Pals`], and the
+//! Each bond has a back extension e_b per end, which follows the deviatoric extension ε of [`Pals`]. With the
 //! relaxing fraction λ ([`Relaxation`]),
 //!
 //! W = ½ k′θ² + ½ Σ σ (ε² + λ (e_b² − 2 ε e_b)) Ṽ,
@@ -45,7 +45,7 @@ impl Described for PalsViscoelastic {
 }
 
 impl<const D: usize> Law<D> for PalsViscoelastic {
-    /// The numbers of [`Pals`]; the second changing one is k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ, Pa.
+    /// The numbers of [`Pals`], with k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) instead of k′θ − (1/d) Σ σ|ξ| ε Ṽ.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     /// e_b/|ξ|, ε/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];
@@ -56,7 +56,7 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 2;
     const LEAST_DIMENSION: usize = 2;
-    /// θ.
+    /// The own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_STRETCH: bool = true;
