@@ -70,10 +70,17 @@ impl Law {
                 });
             }
         }
-        if !matches!(dimension, Dimension::Line { .. }) {
-            let fault = self.declaration.fault?;
-            return fault(&self.values, dimension);
+        if matches!(dimension, Dimension::Line { .. })
+            && let Some(fault) = self.fault_of_a_line()
+        {
+            return Some(fault);
         }
+        let fault = self.declaration.fault?;
+        fault(&self.values, dimension)
+    }
+
+    /// Return the fault of a law or of a value that has no 1-D form. `None` if all have one.
+    fn fault_of_a_line(&self) -> Option<LawFault> {
         let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
             (Kind::Word(words), Some(Value::Word(given))) => {
                 let word = words.iter().find(|word| word.word == given)?;

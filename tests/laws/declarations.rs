@@ -107,6 +107,37 @@ fn fault<const D: usize>(problem: &Problem) -> Option<String> {
     made.err().map(|error| error.message)
 }
 
+/// A law without its own keys is either refused with a message or runs, in every dimension.
+#[test]
+fn laws_without_keys_do_not_panic() {
+    let constraints = [Constraint::UniaxialStress, Constraint::UniaxialStrain];
+    let lines = constraints.map(|constraint| Dimension::Line {
+        cross_section: 1.0,
+        constraint,
+    });
+    for declaration in declarations() {
+        let law = || Law::of(declaration);
+        let is_refused = |dimension, message: Option<String>| {
+            let wanted = law().fault(dimension).is_some();
+            assert!(
+                message.is_some() || !wanted,
+                "{declaration:?} {dimension:?}"
+            );
+        };
+        for line in lines {
+            is_refused(line, fault::<1>(&body(line, law(), None)));
+        }
+        for plane in [
+            Dimension::PlaneStress { thickness: 1.0 },
+            Dimension::PlaneStrain { thickness: 1.0 },
+        ] {
+            is_refused(plane, fault::<2>(&body(plane, law(), None)));
+        }
+        let space = Dimension::Space;
+        is_refused(space, fault::<3>(&body(space, law(), None)));
+    }
+}
+
 #[test]
 fn a_law_of_a_problem_in_rust_is_checked_before_the_run() {
     let law = |name| Law::named(name).unwrap();
