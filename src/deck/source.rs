@@ -18,7 +18,8 @@ const MOST_SHOWN: usize = 790;
 /// Largest number of characters of the message of an error or warning, without location and excerpt.
 const MOST_SAID: usize = 600;
 
-/// Limits of the width to which the excerpt of a line is cut, in characters. A shorter line is not cut.
+/// Smallest and largest width of the excerpt of a line, in characters. The width depends on the length of the
+/// message. A line that fits in this width is shown whole.
 const SHOWN_OF_LINE: [usize; 2] = [24, 160];
 
 /// The path and the text of a deck.

@@ -242,7 +242,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Return the bond history of one end after a time step (s) that ends at the deformation of these bonds.
+    /// Return the bond history of one end after a time step of length `_step` (s). `before` is the history at
+    /// the start of the step, and `_bond` has the deformation at its end.
     #[inline(always)]
     fn bond_history(
         &self,

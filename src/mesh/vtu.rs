@@ -349,7 +349,8 @@ impl File<'_> {
             self.header_number(&mut source)?,
             self.header_number(&mut source)?,
         );
-        // The header has the size of each block, so a wrong number of blocks fails at the end of the data.
+        // `blocks` needs no check: the header has a size for each block, so the loop fails at the latest at
+        // the end of the data.
         let mut sizes = Vec::new();
         for _ in 0..blocks {
             sizes.push(self.header_number(&mut source)?);

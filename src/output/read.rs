@@ -169,7 +169,7 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Values"))
     }
 
-    /// Return the number of the time step of each complete step (output).
+    /// Return, for each complete output, the number of the time step at which it was written.
     ///
     /// # Errors
     /// If the file is damaged.

@@ -8,8 +8,8 @@ use super::pattern::Pattern;
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// Indices, in steps of the level, that the refinement of coarser levels adds to level 0. A node exists
-    /// at such an index if a node is possible there.
+    /// Indices, in steps of the level, at which the refinement of coarser levels creates nodes in addition to
+    /// the grid of level 0. An index counts only if [`Pattern::is_possible`] holds there.
     finer: GridIndexSet,
     /// Bits of those indices of a word that lie on the grid of level 0. All words that contain such indices
     /// have the same bits.

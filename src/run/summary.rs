@@ -31,7 +31,7 @@ pub struct Summary {
     pub instructions: &'static str,
     /// Number of checkpoints written.
     pub checkpoints: u64,
-    /// Wall-clock time of the slowest rank by phase, s.
+    /// Wall-clock time by phase, s: for each phase, the largest time of any rank.
     pub seconds: Phases,
 }
 

@@ -418,8 +418,8 @@ mod tests {
         }
     }
 
-    /// Keys of hardening by strain, strain rate and heating. The temperature rises by about half of the
-    /// melting range.
+    /// Keys of Johnson–Cook hardening: by strain and strain rate, with softening by heat. In the random walk,
+    /// the temperature rises by about half of the difference between melting and initial temperature.
     const JOHNSON_COOK: [(&str, f64); 8] = [
         ("hardening_modulus", 0.02),
         ("hardening_exponent", 0.3),

@@ -297,7 +297,8 @@ impl RigidBody {
         let arm = Vector3::from(place) - Vector3::from(self.state.position);
         let surface = self.surface_velocity(arm);
         let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
-        // As for pairs of points, the normal points from the point to the body.
+        // The normal has the direction from the point to the body, as it has the direction to the other point
+        // for a pair of points.
         let normal = std::array::from_fn(|d| -normal[d]);
         Some(
             self.response
