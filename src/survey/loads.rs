@@ -13,8 +13,8 @@ use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
 /// Largest factor between the thickness of a loaded layer and the depth of the load. A warning is printed if
-/// the thickness is larger or smaller by more than this factor. The thickness is measured along the axes, so that
-/// of a curved layer one cell thick is up to π/2 cells.
+/// the thickness is larger or smaller by more than this factor. The thickness is measured along the axes, so
+/// that of a curved layer one cell thick is up to π/2 cells.
 const MAX_THICKNESS_RATIO: f64 = 1.8;
 
 /// Maximum number of points of a layer for which the thickness is checked.
