@@ -142,9 +142,9 @@ impl<'a> Cubes<'a> {
         (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
     }
 
-    /// Paint the visible faces of a box without shading: the cube itself, or the larger box behind it. `centre`
-    /// is the position of the centre of the box, and `depth` the depth of this centre. `sizes` are the edges of
-    /// the box along x, y and z, and `edge` is the edge of the cube, all in pixels.
+    /// Paint the visible faces of a box without shading: the cube itself, or the larger box behind it.
+    /// `centre` is the position of the centre of the box, and `depth` the depth of this centre. `sizes` are
+    /// the edges of the box along x, y and z, and `edge` is the edge of the cube, all in pixels.
     fn paint_box(
         &mut self,
         (centre, depth): ([f64; 2], f64),

@@ -71,8 +71,8 @@ impl EnergyWatch {
     }
 
     /// Check the ratio of energy gain to energy input in a row of the history. Return a warning at the first
-    /// row with a ratio above [`WARNING_GAIN`]. `stable` is the stable step of the present stage, s. `is_last`:
-    /// whether this is the last row of the run. The result is the same on all ranks.
+    /// row with a ratio above [`WARNING_GAIN`]. `stable` is the stable step of the present stage, s.
+    /// `is_last`: whether this is the last row of the run. The result is the same on all ranks.
     ///
     /// # Errors
     /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above

@@ -514,8 +514,8 @@ mod tests {
     }
 
     /// Integrate the rate equations of a bar by the method of Runge and Kutta. If the stress σ exceeds the
-    /// yield stress σ₀ without the factor of the rate, the rate of flow is ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C). Returns
-    /// σ (Pa), ε̄ and the dissipated energy density (J/m³).
+    /// yield stress σ₀ without the factor of the rate, the rate of flow is ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C).
+    /// Returns σ (Pa), ε̄ and the dissipated energy density (J/m³).
     fn integrated(strain: f64, rate: f64) -> [f64; 3] {
         let steps = 400_000;
         let step = strain / rate / f64::from(steps);

@@ -246,9 +246,9 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Bond update for a force evaluation that does not change the state. During a load step, the forces follow
-    /// from the history that the bonds would have if the present positions were an equilibrium; this history is
-    /// not stored.
+    /// Bond update for a force evaluation that does not change the state. During a load step, the forces
+    /// follow from the history that the bonds would have if the present positions were an equilibrium; this
+    /// history is not stored.
     pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
         if self.progress.load_step.is_settled {
             BondUpdate::None
