@@ -332,7 +332,7 @@ fn a_grid_is_found_in_a_file() {
     let wrong = check("lattice");
     assert_eq!(wrong.status.code(), Some(2));
     assert!(
-        text(&wrong).contains("do not lie on a regular grid"),
+        text(&wrong).contains("needs points of equal volume on a regular grid"),
         "{}",
         text(&wrong)
     );
