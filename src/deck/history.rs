@@ -107,12 +107,7 @@ fn rows(scope: &Scope, history: &grammar::History) -> Result<Option<Interval>> {
 }
 
 /// Return the header of a table of the history. A name that cannot be part of a column name is an error.
-fn header_of_column<T>(
-    scope: &Scope,
-    kind: &str,
-    name: &str,
-    table: &Spanned<T>,
-) -> Result<String> {
+fn table_header<T>(scope: &Scope, kind: &str, name: &str, table: &Spanned<T>) -> Result<String> {
     let key = format!("[history.{kind}.{name}]");
     suits_a_column(scope, &key, name, table)?;
     Ok(key)
@@ -135,7 +130,7 @@ fn front(
     table: &Spanned<grammar::Front>,
     horizon: f64,
 ) -> Result<problem::Front> {
-    let key = header_of_column(scope, "front", name, table)?;
+    let key = table_header(scope, "front", name, table)?;
     let front = table.get_ref();
     let length_or = |number: &Option<Number>, name, default| match number {
         None => Ok(default),
@@ -211,7 +206,7 @@ fn component(
 }
 
 fn probe(scope: &Scope, name: &str, table: &Spanned<grammar::Probe>) -> Result<problem::Probe> {
-    let key = header_of_column(scope, "probe", name, table)?;
+    let key = table_header(scope, "probe", name, table)?;
     let probe = table.get_ref();
     let at = scope.vector(&probe.at, &format!("{key} at"))?;
     let key = format!("{key} fields");
@@ -243,7 +238,7 @@ fn statistics(
     table: &Spanned<grammar::FieldStatistics>,
     sets: &[problem::Set],
 ) -> Result<problem::FieldStatistics> {
-    let key = header_of_column(scope, "field", name, table)?;
+    let key = table_header(scope, "field", name, table)?;
     let rule = table.get_ref();
     let field = field(scope, &rule.field, &format!("{key} field"))?;
     let given = rule.of.get_ref();
@@ -291,7 +286,7 @@ fn support_force(
     table: &Spanned<grammar::SupportForce>,
     sets: &[problem::Set],
 ) -> Result<problem::SupportForce> {
-    let key = header_of_column(scope, "force", name, table)?;
+    let key = table_header(scope, "force", name, table)?;
     let force = table.get_ref();
     Ok(problem::SupportForce {
         name: name.to_owned(),
@@ -308,7 +303,7 @@ fn crack(
     sets: &[problem::Set],
     damage_threshold: f64,
 ) -> Result<problem::CrackPath> {
-    let key = header_of_column(scope, "crack", name, table)?;
+    let key = table_header(scope, "crack", name, table)?;
     if scope.dimension == 1 {
         let message = format!(
             "{key}: a bar has no crack path; use `[history.tip.{name}]` with `from` and `direction`"
@@ -335,7 +330,7 @@ fn tip(
     sets: &[problem::Set],
     damage_threshold: f64,
 ) -> Result<problem::Tip> {
-    let key = header_of_column(scope, "tip", name, table)?;
+    let key = table_header(scope, "tip", name, table)?;
     let tip = table.get_ref();
     Ok(problem::Tip {
         name: name.to_owned(),
@@ -358,7 +353,7 @@ fn j_integral(
     table: &Spanned<grammar::JIntegral>,
     horizon: f64,
 ) -> Result<problem::JIntegral> {
-    let key = header_of_column(scope, "j_integral", name, table)?;
+    let key = table_header(scope, "j_integral", name, table)?;
     if scope.dimension == 1 {
         let message = format!("{key}: is for plane and 3-D problems, this one is 1-D");
         return Err(scope.error(table.span(), message));

@@ -100,11 +100,11 @@ impl EnergyWatch {
                 self.input,
             )
         };
-        let steps = format!("time step {:.3e} s, stable {stable:.3e} s", clock.step());
+        let steps = || format!("time step {:.3e} s, stable {stable:.3e} s", clock.step());
         let fatal = relative_gain > FATAL_GAIN;
         let certain = relative_gain.is_nan() || relative_gain > CERTAIN_GAIN;
         if certain || (fatal && (self.suspected || is_last)) {
-            let message = format!("{}; reduce the time step ({steps})", text());
+            let message = format!("{}; reduce the time step ({})", text(), steps());
             return Err(Error::run(message));
         }
         self.suspected = fatal;
@@ -112,7 +112,7 @@ impl EnergyWatch {
             return Ok(None);
         }
         self.warned = true;
-        Ok(Some(format!("{} ({steps})", text())))
+        Ok(Some(format!("{} ({})", text(), steps())))
     }
 
     /// Check the fracture energy of a row of the history. Return a warning at the first row in which breaking

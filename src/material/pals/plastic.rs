@@ -124,11 +124,10 @@ impl<const D: usize> Law<D> for PalsPlastic {
         _: f64,
     ) {
         let changing = &mut numbers[4 * D + OTHERS..];
-        let [pressure, even, dilatation] = self.elastic.dilated(sums);
         match pass {
             0 => {
                 let [sum, square] = [sums[0], sums[1]];
-                changing[1] = even;
+                changing[1] = sum / D as f64;
                 changing[2] = if square > 0.0 { sum / square } else { 0.0 };
             }
             1 => {
@@ -141,11 +140,7 @@ impl<const D: usize> Law<D> for PalsPlastic {
                     0.0
                 };
             }
-            _ => {
-                changing[0] = pressure;
-                changing[1] = even;
-                changing[4] = dilatation;
-            }
+            _ => [changing[0], changing[1], changing[4]] = self.elastic.dilated(sums),
         }
     }
 

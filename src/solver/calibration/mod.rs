@@ -26,7 +26,7 @@ pub fn calibrated(problem: &Problem) -> Result<Cow<'_, Problem>> {
         let Some(ratio) = ratio.filter(|ratio| *ratio > 0.0) else {
             let message = format!(
                 "[body.{}] damage: `calibration = \"opening\"` needs a body on a lattice with a horizon of at most 3 \
-                 spacings in 3-D and 10 in 2-D, which separates before it only yields; use \"energy\"",
+                 spacings in 3-D and 10 in 2-D, and a yield stress at which the body breaks; use \"energy\"",
                 body.name
             );
             return Err(Error::input(message).at(&body.span));
