@@ -148,7 +148,7 @@ impl Scope<'_> {
             return format!("`{name}` cannot be used here: this expression must be constant");
         }
         format!(
-            "`{name}` cannot be used here: of x, y, z and t, this expression may use only {}",
+            "`{name}` cannot be used here: of the variables, this expression may use only {}",
             allowed.join(", ")
         )
     }

@@ -333,7 +333,7 @@ fn variables_are_only_allowed_where_they_have_a_value() {
     };
     assert_eq!(
         message(&[Variable::X, Variable::Y]),
-        "`t` cannot be used here: of x, y, z and t, this expression may use only x, y"
+        "`t` cannot be used here: of the variables, this expression may use only x, y"
     );
     assert_eq!(
         message(&[]),

@@ -1,5 +1,5 @@
 //! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is
-//! stored as one bit, without a neighbour index. Eight points adjacent along x form a lane group.
+//! stored as one bit, without a neighbour index. Up to eight points adjacent along x form a lane group.
 
 use std::ops::Range;
 use std::sync::Arc;

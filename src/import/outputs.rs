@@ -160,7 +160,7 @@ struct Frequency {
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
-    /// Interval of each output with fields, or with neither fields nor columns of the history.
+    /// Interval of each output, except those in `history_intervals`.
     intervals: Vec<Frequency>,
     /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,

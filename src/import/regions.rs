@@ -27,8 +27,8 @@ pub enum Region {
 /// returns a region by its name.
 ///
 /// # Errors
-/// If the style or a region of a union is unknown, an argument is missing or not a number, or the region lies
-/// outside of its surface.
+/// If the style or a region of a union is unknown, an argument is missing or not a number, or the region is
+/// everything outside of a surface (`side out`).
 pub fn region(
     variables: &Variables,
     arguments: &[&str],

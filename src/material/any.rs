@@ -305,8 +305,8 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes {
-        with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
+    fn stiffness(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes {
+        with_law!(self, law => Law::<D>::stiffness(law, bond, &first(end)))
     }
 
     fn truncation_factor(&self, sums: &[f64]) -> f64 {

@@ -137,7 +137,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, end: &[Lanes; 0]) -> Lanes {
-        Law::<D>::stiffness(&self.elastic, length, end)
+    fn stiffness(&self, bond: &Bond<D>, end: &[Lanes; 0]) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, bond, end)
     }
 }

@@ -111,7 +111,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, [factor]: &[Lanes; 1]) -> Lanes {
-        *factor * (0.5 * self.micromodulus) / length
+    fn stiffness(&self, bond: &Bond<D>, [factor]: &[Lanes; 1]) -> Lanes {
+        *factor * (0.5 * self.micromodulus) / bond.length
     }
 }

@@ -406,7 +406,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Return a spring constant k (N/m⁷) per bond that bounds the strain energy density W (J/m³) of one end:
     /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ, or the weaker bound of [`Self::resists_across`]. For bond-based laws
     /// k = |∂T/∂η|.
-    fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
+    fn stiffness(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes;
 
     /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds:
     /// W ≤ ½ Σ k |η|² Ṽ.

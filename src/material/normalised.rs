@@ -8,7 +8,7 @@
 //! √(c/c_ij), with the micromodulus c of an untruncated family. This keeps the energy of breaking the bond.
 //!
 //! With the influence function δ/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2 with
-//! c̄_i = c_i δ = 4 W₁ / Σ Ṽ. In their equation, W₁ is 9K/4.
+//! c̄_i = c_i δ = 4 W₁ / Σ Ṽ, but their equation has the constant 9K/4 in place of the classical W₁.
 
 use std::f64::consts::PI;
 
@@ -156,8 +156,8 @@ impl<const D: usize> Law<D> for Normalised {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, [inverse]: &[Lanes; 1]) -> Lanes {
-        *inverse * (2.0 * self.energy) / length
+    fn stiffness(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1]) -> Lanes {
+        *inverse * (2.0 * self.energy) / bond.length
     }
 
     #[inline(always)]

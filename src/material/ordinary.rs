@@ -326,7 +326,7 @@ impl<const D: usize> Law<D> for Ordinary {
     /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω e² Ṽ. Therefore the spring constant (A + max(κ, 0) d²)/m bounds the
     /// energy.
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, [extension_factor, _]: &[Lanes; 2]) -> Lanes {
+    fn stiffness(&self, _: &Bond<D>, [extension_factor, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;
         *extension_factor * (1.0 + square * self.volumetric.max(0.0) / self.extensional)
     }

@@ -266,9 +266,9 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     #[inline(always)]
     fn stiffness(
         &self,
-        length: Lanes,
+        bond: &Bond<D>,
         [extension_factor, volume_factor, ..]: &[Lanes; 4],
     ) -> Lanes {
-        Law::<D>::stiffness(&self.elastic, length, &[*extension_factor, *volume_factor])
+        Law::<D>::stiffness(&self.elastic, bond, &[*extension_factor, *volume_factor])
     }
 }

@@ -131,14 +131,16 @@ impl Relaxation {
     /// Return 1 − a and β of a step (s).
     fn relaxed(&self, step: f64) -> [f64; 2] {
         let x = step / self.time;
-        let gone = -libm::expm1(-x);
-        let beta = if x < 1e-3 {
-            // Series of 1 − (1 − e^−x)/x, which avoids cancellation.
-            x * (0.5 - x * (1.0 / 6.0 - x / 24.0))
+        if x < 1e-3 {
+            // Series of (1 − e^−x)/x. The exponential function would take a sixth of the time of a step, and
+            // 1 − (1 − e^−x)/x would lose digits.
+            let lost =
+                x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0))));
+            [x - x * lost, lost]
         } else {
-            1.0 - gone / x
-        };
-        [gone, beta]
+            let gone = -libm::expm1(-x);
+            [gone, 1.0 - gone / x]
+        }
     }
 
     /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these values
@@ -289,7 +291,11 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, [extension_factor, volume_factor, _]: &[Lanes; 3]) -> Lanes {
-        Law::<D>::stiffness(&self.elastic, length, &[*extension_factor, *volume_factor])
+    fn stiffness(
+        &self,
+        bond: &Bond<D>,
+        [extension_factor, volume_factor, _]: &[Lanes; 3],
+    ) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, bond, &[*extension_factor, *volume_factor])
     }
 }

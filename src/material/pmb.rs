@@ -149,8 +149,8 @@ impl<const D: usize> Law<D> for Pmb {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, _: &[Lanes; 0]) -> Lanes {
-        Lanes::splat(0.5 * self.micromodulus) / length
+    fn stiffness(&self, bond: &Bond<D>, _: &[Lanes; 0]) -> Lanes {
+        Lanes::splat(0.5 * self.micromodulus) / bond.length
     }
 }
 

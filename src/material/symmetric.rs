@@ -57,14 +57,22 @@ pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f6
 
 /// Return n·T n for eight bonds of direction n.
 #[inline(always)]
-pub fn quadratic_form<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
-    let xi = &bond.reference;
-    let mut sum = diagonal[0] * (xi[0] * xi[0]);
+pub fn quadratic_form<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+    quadratic_form_of(&bond.reference, tensor) * (bond.inverse * bond.inverse)
+}
+
+/// Return v·T v for eight vectors v.
+#[inline(always)]
+pub fn quadratic_form_of<const D: usize>(
+    vector: &[Lanes; D],
+    (diagonal, others): &Symmetric<D>,
+) -> Lanes {
+    let mut sum = diagonal[0] * (vector[0] * vector[0]);
     for d in 1..D {
-        sum += diagonal[d] * (xi[d] * xi[d]);
+        sum += diagonal[d] * (vector[d] * vector[d]);
     }
     for (k, (a, b)) in mixed::<D>().enumerate() {
-        sum += others[k] * (xi[a] * xi[b] * 2.0);
+        sum += others[k] * (vector[a] * vector[b] * 2.0);
     }
-    sum * (bond.inverse * bond.inverse)
+    sum
 }

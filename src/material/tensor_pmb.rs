@@ -17,7 +17,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
 use super::monomials::{exponents, index_of, least_squares, multiplicity, write_monomials};
-use super::symmetric::{Symmetric, mixed, quadratic_form, to_entries};
+use super::symmetric::{Symmetric, quadratic_form, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
@@ -183,19 +183,9 @@ impl<const D: usize> Law<D> for TensorPmb {
             * (0.5 * self.micromodulus)
     }
 
-    /// Return an upper bound on the spring constant of a bond: c/|ξ| times the largest absolute row sum of
-    /// ½ H, which is at least the largest eigenvalue of ½ H.
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
-        let mut rows = *diagonal;
-        for (k, (a, b)) in mixed::<D>().enumerate() {
-            rows[a] += others[k].abs();
-            rows[b] += others[k].abs();
-        }
-        let largest = rows
-            .iter()
-            .fold(Lanes::splat(0.0), |most, row| most.max(*row));
-        largest * self.micromodulus / length
+    fn stiffness(&self, bond: &Bond<D>, end: &Symmetric<D>) -> Lanes {
+        quadratic_form(bond, end) * self.micromodulus / bond.length
     }
 
     #[inline(always)]

@@ -1,8 +1,8 @@
 //! Meshes of finite elements in the formats of other programs. Elements become points.
 //!
-//! A reader compares a count in a file with the size of the file before it allocates memory for the counted
-//! entries, or reads the entries one by one. A damaged file therefore needs no more memory than a valid file
-//! of the same size.
+//! A count in a file can be wrong. A reader therefore either reads the counted entries one by one, or compares
+//! the count with the size of the file before it allocates memory for the entries. A damaged file needs no
+//! more memory than a valid file of the same size.
 
 mod abaqus;
 mod exodus;

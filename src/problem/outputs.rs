@@ -264,8 +264,8 @@ pub enum Field {
     NewlyBrokenBonds,
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for correspondence laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 if the point carries no force, otherwise 0. A point carries no force if its law cannot use its
-    /// intact bonds, or defines no stress at the deformation of the point or of one of its bonds.
+    /// 1 if the point carries no force, otherwise 0. A point carries no force if its intact bonds are
+    /// too few or too stiff for its law, or if the law defines no stress at the deformation of the point or of one of its bonds.
     Singular,
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.

@@ -141,3 +141,26 @@ fn surface_corrections_of_bars() {
         }
     }
 }
+
+/// With a surface correction, the stable step of a bar is limited by its edges and corners. Before, the bound
+/// did not depend on the directions of the bonds, and the ratios were 0.52 and 0.24.
+#[test]
+fn stable_steps_with_surface_corrections() {
+    let stable_step = |law: &str, correction: &str| {
+        let text = format!(
+            "dimension = '3d'
+            grid = {{ spacing = 1, horizon = 3.015 }}
+            material.solid.{law} = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, surface_correction = '{correction}' }}
+            body.bar = {{ material = 'solid', shape.box = {{ lower = [0, 0, 0], upper = [12, 10, 10] }} }}
+            time.end = 1
+            "
+        );
+        simulate::<3, _>(&text, |simulation: Simulation<3>| {
+            simulation.undeformed.stable_step
+        })
+    };
+    for (law, correction, least) in [("pmb", "tensor", 0.88), ("ordinary", "pals", 0.28)] {
+        let ratio = stable_step(law, correction) / stable_step(law, "none");
+        assert!((least..1.0).contains(&ratio), "{law}: {ratio}");
+    }
+}

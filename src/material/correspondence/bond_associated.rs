@@ -303,8 +303,8 @@ impl<const D: usize> Law<D> for BondAssociated {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, ([whole, along, ..], _): &Point<D>) -> Lanes {
-        *whole + *along / (length * length)
+    fn stiffness(&self, bond: &Bond<D>, ([whole, along, ..], _): &Point<D>) -> Lanes {
+        *whole + *along / (bond.length * bond.length)
     }
 
     fn resists_across(&self) -> bool {

@@ -247,7 +247,8 @@ struct Family<const D: usize> {
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state in a step of this length (s). `sums`
     /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None`
-    /// if K is nearly singular, the intact part of the family is too stiff, or the law has no stress at H.
+    /// if K is nearly singular, the intact part of the family is stiffer than the stable step allows
+    /// ([`ShapeTensor::inverse_of_rest`]), or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],
@@ -497,7 +498,7 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, end: &Point<D>) -> Lanes {
+    fn stiffness(&self, _: &Bond<D>, end: &Point<D>) -> Lanes {
         end.0[0]
     }
 

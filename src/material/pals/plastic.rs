@@ -91,7 +91,7 @@ impl<const D: usize> Law<D> for PalsPlastic {
     fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
-        (functions, [stiffness, pressure, even, mean, _]): &Self::Point,
+        (functions, [ratio, pressure, even, mean, _]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> [Lanes; 3] {
         let bond = elastic(bond, *plastic);
@@ -108,7 +108,7 @@ impl<const D: usize> Law<D> for PalsPlastic {
                 [weighted * part, weighted, nothing]
             }
             _ => {
-                let point = (*functions, [*stiffness, *pressure, *even]);
+                let point = (*functions, [*ratio, *pressure, *even]);
                 self.elastic.pass_contribution::<0>(&bond, &point, &[])
             }
         }
@@ -167,10 +167,10 @@ impl<const D: usize> Law<D> for PalsPlastic {
     fn force_state(
         &self,
         bond: &Bond<D>,
-        (functions, [stiffness, pressure, even, ..]): &Self::Point,
+        (functions, [ratio, pressure, even, ..]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> Along {
-        let point = (*functions, [*stiffness, *pressure, *even + *plastic]);
+        let point = (*functions, [*ratio, *pressure, *even + *plastic]);
         self.elastic.force_state(bond, &point, &[])
     }
 
@@ -178,10 +178,10 @@ impl<const D: usize> Law<D> for PalsPlastic {
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        (functions, [stiffness, pressure, even, ..]): &Self::Point,
+        (functions, [ratio, pressure, even, ..]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> Lanes {
-        let point = (*functions, [*stiffness, *pressure, *even + *plastic]);
+        let point = (*functions, [*ratio, *pressure, *even + *plastic]);
         self.elastic.bond_energy(bond, &point, &[])
     }
 
@@ -203,7 +203,7 @@ impl<const D: usize> Law<D> for PalsPlastic {
     }
 
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, (_, [stiffness, ..]): &Self::Point) -> Lanes {
-        *stiffness
+    fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
+        deviatoric(bond, &functions.1) * *ratio
     }
 }

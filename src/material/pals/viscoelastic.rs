@@ -124,11 +124,11 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
     fn force_state(
         &self,
         bond: &Bond<D>,
-        (functions, [stiffness, pressure, even]): &Self::Point,
+        (functions, [ratio, pressure, even]): &Self::Point,
         [back, ..]: &[Lanes; 3],
     ) -> Along {
         let eased = *even + *back * self.relaxation.share();
-        (self.elastic).force_state(bond, &(*functions, [*stiffness, *pressure, eased]), &[])
+        (self.elastic).force_state(bond, &(*functions, [*ratio, *pressure, eased]), &[])
     }
 
     #[inline(always)]
@@ -161,8 +161,8 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
     }
 
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, (_, [stiffness, ..]): &Self::Point) -> Lanes {
-        *stiffness
+    fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
+        deviatoric(bond, &functions.1) * *ratio
     }
 
     #[inline(always)]

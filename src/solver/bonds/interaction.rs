@@ -33,8 +33,8 @@ pub struct BlockLaws {
     /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
     /// all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Selection of the data of the block's points that the criteria of bonds to other bodies read. Only
-    /// pairs of bodies with a separate damage law count.
+    /// Which data of the block's points are read by the criteria of bonds to other bodies. Only pairs of
+    /// bodies with a separate damage law count.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,

@@ -172,8 +172,9 @@ impl<const D: usize> Kernel<D> for Stiffness {
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
         let length = group.bond.length;
         let xi = &group.bond.reference;
-        let own = Law::<D>::stiffness(&self.laws[0], length, group.own) * group.weights.own();
-        let far = Law::<D>::stiffness(&self.laws[1], length, &group.far) * group.weights.far();
+        let bond = &group.bond;
+        let own = Law::<D>::stiffness(&self.laws[0], bond, group.own) * group.weights.own();
+        let far = Law::<D>::stiffness(&self.laws[1], bond, &group.far) * group.weights.far();
         // A law with `resists_across` has bond stiffness k I; any other law has k n⊗n.
         let [own_across, far_across] = self.laws.map(|law| Law::<D>::resists_across(&law));
         let none = Lanes::splat(0.0);

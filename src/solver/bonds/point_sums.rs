@@ -7,8 +7,8 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Request x of [`crate::material::bond`], but neither the stretch of the bonds nor the extension over the
-/// deformed length.
+/// Request the relative change of the squared length of the bonds ([`crate::material::bond`]), but neither
+/// their stretch nor their extension over the deformed length.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 /// Number of points that one task processes.
 const CHUNK: usize = 1024;
 
-/// The points that may touch each owned point: one row per owned point, in ascending order of ids.
+/// The points that may touch each owned point: one row per owned point. The points in a row are in
+/// ascending order of ids.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     /// Index of the first pair of each owned point, followed by the number of pairs.

@@ -97,8 +97,8 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Sum of the energy balance in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
-    /// Kinetic energy, J, that loads and prescribed motions can add in a step, and that the trapezoidal rule
-    /// does not count as work.
+    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step and that is
+    /// not counted as work. The work is integrated by the trapezoidal rule, which misses this energy.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
@@ -280,8 +280,8 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// Compute the present row. Afterwards, the largest number of broken bonds of a step is counted from 0
-    /// again. Collective.
+    /// Compute the present row. Then reset the largest number of bonds broken in one step to 0, such that the
+    /// next row has the largest number since this row. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

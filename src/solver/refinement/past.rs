@@ -82,7 +82,7 @@ impl Past {
         past
     }
 
-    /// Return the values of removed points to their parents, so that volume, mass, momentum and energies
+    /// Add the values of removed points to their parents, so that volume, mass, momentum and energies
     /// are conserved. Collective.
     fn leave<const D: usize>(
         &mut self,

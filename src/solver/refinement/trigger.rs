@@ -37,8 +37,8 @@ const MOST_PLACES: f64 = 1e4;
 ///
 /// # Errors
 /// If the horizon contains too many spacings, if initial values are read from a file, or if loads or
-/// temperatures act on sets given by ids or by groups of meshes. If refinement is triggered during the run,
-/// also if strengths scatter, or if the run has load steps or an adaptive step.
+/// temperatures act on sets given by ids or by groups of meshes. With a trigger, further errors are
+/// strengths that scatter, load steps and an adaptive step.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
