@@ -13,7 +13,7 @@ pub enum ErrorKind {
     Input,
     /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
     Run,
-    /// A signal has stopped a run before its first step, or the command `fissure sweep`: exit code 75, which
+    /// A signal has stopped the command `fissure sweep`, or a run before its first step: exit code 75, which
     /// `sysexits.h` defines as "try again".
     Stopped,
 }

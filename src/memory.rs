@@ -53,9 +53,9 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory and swap left in this process's control group and in the groups that contain it, bytes:
-/// the smallest amount of a group with a limit. `None` if no group has a limit, or on systems without control
-/// groups of version 2.
+/// Return the memory and swap that the control groups of this process leave, bytes: the smallest amount that
+/// is left in the group of the process or in a group above it. `None` if none of these groups has a limit, or
+/// on systems without control groups of version 2.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;

@@ -14,8 +14,8 @@ const TOP_KEYS: [&str; 5] = [
     "constraint",
 ];
 
-/// Return whether `name` is a key of the deck: a path with dots, or a key outside of all sections. If the
-/// deck has a parameter with the name of a key outside of all sections, return false.
+/// Return whether `name` is a key of the deck: a path with dots, or a key outside of all sections. A name
+/// without dots that is also the name of a parameter counts as the parameter, so the function returns false.
 pub fn is_key(source: &Source, name: &str) -> bool {
     let is_parameter = || {
         let deck = source.text.parse::<DocumentMut>().ok()?;
@@ -31,8 +31,8 @@ pub fn is_key(source: &Source, name: &str) -> bool {
 /// an expression, becomes a string. If the deck is not valid TOML, its text is returned unchanged.
 ///
 /// # Errors
-/// If a key has an empty part or is the name of a section, or if a part before the last one is a list or a
-/// value.
+/// If a key is the name of a section, or one of its parts between dots is empty. If a part before the last
+/// one is the name of a list or a value.
 pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
     let mut document: DocumentMut = match source.text.parse() {
         Ok(document) => document,

@@ -14,8 +14,8 @@ use crate::message::format_number;
 use crate::points::{BodyPoints, Columns};
 use crate::problem;
 
-/// Largest number of bodies. Tables such as the longest bonds of the bond search have an entry for each pair
-/// of bodies, so these tables grow with the square of the number of bodies.
+/// Largest number of bodies. Some tables have an entry for each pair of bodies, such as the length of the
+/// longest bond in the bond search. These tables grow with the square of the number of bodies.
 const MOST_BODIES: usize = 256;
 
 /// Validate the bodies.
@@ -110,7 +110,7 @@ pub fn point_sources(
     Ok(sources)
 }
 
-/// Return the names of the bodies with the sources of their points.
+/// Return the name of each body and the source of its points.
 pub fn of_sources<'a>(deck: &'a Deck, sources: &'a [problem::PointSource]) -> Vec<BodyPoints<'a>> {
     let bodies = deck.body.iter().zip(sources);
     let own = bodies.map(|((name, table), points)| BodyPoints {

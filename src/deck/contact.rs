@@ -11,7 +11,7 @@ use crate::problem::{self, ContactModel, ContactRule};
 /// Smallest coefficient of restitution. The damping of smaller coefficients requires very short time steps.
 const LEAST_RESTITUTION: f64 = 0.01;
 
-/// Keys of the contact rule of `[contact]`, of a pair of bodies or of a rigid body.
+/// Keys of a contact rule: the rule of `[contact]`, of a pair of bodies or of a rigid body.
 #[derive(Clone, Copy)]
 pub(super) struct Keys<'a> {
     pub model: ContactName,
@@ -27,7 +27,7 @@ pub(super) struct Keys<'a> {
 /// # Errors
 /// On numbers out of range, and on invalid or repeated pairs. On friction in a relaxation, and on methods or
 /// grids that do not support contact or rigid bodies. On a pair that inherits the stiffness of `[contact]`
-/// but has another model than `[contact]`, except `"none"`.
+/// but has another model than `[contact]`; only the model `"none"` is allowed then.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,

@@ -149,7 +149,7 @@ impl Comparison<'_> {
             (old, new) => {
                 let values = [self.expression(0, old), self.expression(1, new)];
                 let same = match &values {
-                    // A run with a later end may need more rows of a table than the old run.
+                    // A restart may append rows to a table, because a run with a later end may need them.
                     [Some(old), Some(new)] => new.extends(old),
                     _ => old == new,
                 };

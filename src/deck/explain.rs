@@ -24,8 +24,8 @@ pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> 
         let [times, values] = scope.tables[name].rows();
         *table.get_mut() = Table::of_rows(times, values);
     }
-    // Serialize to a `toml::Value` first. Only the value is then written as text, which shortens the
-    // compilation.
+    // Serialize to a `toml::Value` first. The writer of text is then compiled for this one type only, which
+    // shortens the compilation.
     toml::Value::try_from(&deck)
         .and_then(|deck| toml::to_string(&deck))
         .map_err(|error| Error::run(format!("cannot write the deck: {error}")))
@@ -209,9 +209,9 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the depth of a traction or pressure, m. `None` for a condition without a depth. Also `None` if the
-/// depth is the spacing of each body, and the bodies that may have points in the set have different spacings
-/// or one of them has no single spacing.
+/// Return the depth of a traction or pressure, m; `None` for a condition without a depth. If the depth is the
+/// spacing of each body, return this spacing only if all bodies that may have points in the set have the same
+/// single spacing; otherwise, return `None`.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

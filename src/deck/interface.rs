@@ -104,7 +104,7 @@ struct Damages<'a> {
 }
 
 impl Damages<'_> {
-    /// Return the damage of the bonds, and the byte range of the value of `damage` or `strength`; the byte
+    /// Return how the bonds break, and the byte range of the value of `damage` or `strength`; the byte
     /// range is `0..0` if the pair gives neither.
     fn damage(
         &self,

@@ -1,5 +1,5 @@
 //! Warnings about probable mistakes in a deck: unused names, unread columns of files, numbers in place of
-//! conditions, and stages that change the mass of moving points.
+//! comparisons, and stages that change the mass of moving points.
 
 use std::ops::Range;
 
@@ -96,7 +96,8 @@ fn not_read(key: &str, ignored: &[&str], span: &Range<usize>) -> Option<Warning>
     (!ignored.is_empty()).then(warning)
 }
 
-/// Return a warning for each unreferenced table of a section whose tables have an effect only by reference.
+/// Return a warning for each unused table. Sections whose tables have an effect without a reference to them
+/// are not checked.
 fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let used = scope.used.borrow();
     let mut tables = deck.named_tables();

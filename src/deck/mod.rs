@@ -52,9 +52,8 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Deck {
     source: Source,
     grammar: grammar::Deck,
-    /// The grammar with numbers in place of horizons that contain the mean spacing. The value is `None` if
-    /// the deck has no such horizons. It is determined once, because meshes and point files may have to be
-    /// read.
+    /// Copy of `grammar` with numbers in place of horizons that contain the mean spacing; `None` if the deck
+    /// has no such horizons. The copy is made only once, because meshes and point files may have to be read.
     with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
@@ -151,13 +150,13 @@ impl Deck {
 
     fn problem_in(&self, scope: &Scope, grammar: &grammar::Deck) -> Result<Problem> {
         let mut problem = validate::validate(scope, grammar)?;
-        // The warnings are about the deck as written: a parameter that occurs only in a horizon is used,
-        // although `grammar` may have a number in its place.
+        // The warnings are about the deck as written, `self.grammar`. A parameter that occurs only in a
+        // horizon is used there, but `grammar` may have a number in place of this horizon.
         problem.warnings = lints::lints(scope, &self.grammar, &problem)?;
         Ok(problem)
     }
 
-    /// Return the grammar with numbers in place of horizons that contain the mean spacing. Collective.
+    /// Return the parsed deck, with numbers in place of horizons that contain the mean spacing. Collective.
     fn with_horizons(&self, scope: &mut Scope, comm: &dyn Communicator) -> Result<&grammar::Deck> {
         let known = self.with_horizons.get();
         // Ranks may be threads that share this deck, so some ranks may find the result of other ranks here.

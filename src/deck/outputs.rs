@@ -8,7 +8,8 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem;
 
-/// Part of the file names of results that a restart has renamed, so that no new result replaces such a file.
+/// Part of the new names of result files that a restart renames. Names of further results must not contain
+/// this part, so that no new result replaces a renamed file.
 const SET_ASIDE: &str = "until_step_";
 
 /// Validate the main result; `end` is the end of the run, s.

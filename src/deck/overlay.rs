@@ -116,7 +116,7 @@ mod tests {
             .unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
 
-    /// Merge two tables without choices; the reference for the test.
+    /// Merge two tables key by key, without the rule for choices; the reference for the test.
     fn over(lower: &mut Table, upper: &Table) {
         for (key, value) in upper {
             match (lower.get_mut(key), value) {

@@ -113,7 +113,7 @@ fn circle(scope: &Scope, written: &IndexMap<Text, Number>) -> Error {
     let mut next = written
         .values()
         .find_map(|number| awaited(scope, written, number));
-    // Every unevaluated parameter leads to a circle, but may not be part of the circle.
+    // Every unevaluated parameter leads to a circle, but need not be part of the circle.
     while let Some(index) = next.filter(|index| !way.contains(index)) {
         way.push(index);
         next = awaited(scope, written, &written[index]);

@@ -105,7 +105,8 @@ fn trigger(
         return Err(scope.error(table.span(), message));
     }
     // The rank that owns a new point needs the parents of this point as owned points or ghosts. The parents
-    // may be a cell's diagonal apart, and ghosts are at most a horizon away.
+    // may be a cell's diagonal apart, and ghosts are at most a horizon away. The horizon must therefore be at
+    // least the diagonal.
     for body in bodies {
         if let PointSource::Lattice { spacing, .. } = body.points {
             let edges = spacing[..scope.dimension].iter();

@@ -141,8 +141,8 @@ pub fn first_method(deck: &Deck) -> grammar::Method {
     *methods(deck)[0].1.get_ref()
 }
 
-/// Return the end of a stage, s. The end must be after the start of the stage and before the end of the
-/// run; the last stage ends with the run.
+/// Return the end of a stage, s. The end must be after the start of the stage. The last stage ends with the
+/// run; all other stages must end before the end of the run.
 fn stage_end(
     scope: &Scope,
     table: &Spanned<grammar::Stage>,

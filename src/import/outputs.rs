@@ -164,7 +164,7 @@ pub struct Outputs {
     intervals: Vec<Frequency>,
     /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,
-    /// Whether points have temperatures, because materials expand by prescribed temperatures.
+    /// Whether points have temperatures: temperatures are prescribed, and a material expands.
     has_temperature: bool,
     /// Computed quantities: name, outcome and note.
     computed: Vec<(String, Fate, String)>,
@@ -293,8 +293,8 @@ impl Outputs {
         Ok(())
     }
 
-    /// Return the largest interval of the outputs; outputs with fields take precedence. Other intervals are
-    /// logged. Return `None` if no output has an interval.
+    /// Return the largest interval of the outputs with fields, or of all outputs if none has fields. Log the
+    /// other intervals. Return `None` if no output has an interval.
     fn interval(&self, translation: &Translation) -> Option<Interval> {
         let with_fields = self.intervals.iter().any(|frequency| frequency.has_fields);
         let candidates = self.intervals.iter();
@@ -315,8 +315,8 @@ impl Outputs {
         Some(largest.interval)
     }
 
-    /// Return the smallest interval of the outputs that contain only columns of the history. Other intervals
-    /// are logged. Return `None` if no such output has an interval.
+    /// Return the smallest interval of the outputs that contain only columns of the history. Log the other
+    /// intervals of these outputs. Return `None` if none of these outputs has an interval.
     fn history_interval(&self, translation: &Translation) -> Option<Interval> {
         let all = self.history_intervals.iter();
         let smallest = all.reduce(|a, b| if is_longer(a, b) { b } else { a })?;

@@ -177,8 +177,8 @@ impl<'a> Translation<'a> {
         written
     }
 
-    /// Same as [`name`](Self::name), for a new table even if the source name is in use. The section of a body
-    /// is given as `set`, because bodies are also sets, so a body and a set must not have the same name.
+    /// Return a name that no table of the section has yet, even if an earlier table had the same source name.
+    /// For a body, give `set` as the section: bodies are also sets, so a body and a set need different names.
     pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
         let plain = slug(name);
         let taken = |written: &str| {

@@ -79,7 +79,8 @@ impl Law {
         fault(&self.values, dimension)
     }
 
-    /// Return the fault of a law or of a value that has no 1-D form. `None` if all have one.
+    /// Return the fault of a problem in 1-D: the law, or the word given for one of its keys, has no 1-D form.
+    /// `None` if the law and all words have one.
     fn fault_of_a_line(&self) -> Option<LawFault> {
         let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
             (Kind::Word(words), Some(Value::Word(given))) => {

@@ -243,8 +243,8 @@ pub enum Field {
     /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain,
     /// yy = zz = ν/(1 − ν) xx.
     Stress,
-    /// Cauchy stress, Pa: Kirchhoff stress divided by the ratio of deformed to undeformed volume, in the same
-    /// order.
+    /// Cauchy stress, Pa: Kirchhoff stress divided by the ratio of deformed to undeformed volume. The order
+    /// of the components is that of [`Self::Stress`].
     CauchyStress,
     /// Equivalent stress of von Mises from the Cauchy stress, Pa.
     VonMisesStress,
@@ -264,8 +264,9 @@ pub enum Field {
     NewlyBrokenBonds,
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for correspondence laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 if the point carries no force, otherwise 0. A point carries no force if its intact bonds are
-    /// too few or too stiff for its law, or if the law defines no stress at the deformation of the point or of one of its bonds.
+    /// 1 if the point carries no force, otherwise 0. A point carries no force if its intact bonds are too few
+    /// or too stiff for its law. It also carries no force if the law defines no stress at the deformation of
+    /// the point or of one of its bonds.
     Singular,
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.

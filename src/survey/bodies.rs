@@ -169,8 +169,8 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     found
 }
 
-/// Return a warning if the volume of a body's points does not fit the volume of its shape, or the distance
-/// of its points.
+/// Return a warning if the volume of a body's points does not fit the volume of its shape. For points from a
+/// file or mesh, return a warning if their mean volume does not fit their mean distance.
 fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {

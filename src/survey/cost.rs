@@ -15,7 +15,8 @@ const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 /// Bytes of a result or checkpoint in addition to the data of the points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list, at each end: an eighth of a compact group of neighbour indices, and one bit.
+/// Bytes of a bond in a list, at each end: an eighth of a compact group of eight neighbour indices (20
+/// bytes), and one bit.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
 /// Bytes of a bond in a lattice, at each end: one bit.
@@ -161,7 +162,7 @@ impl Cost {
     }
 }
 
-/// Return the bytes of history that a body stores at each end of a bond: the history of both ends.
+/// Return the bytes of bond history that a body stores for each end of a bond: both histories of the bond.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {

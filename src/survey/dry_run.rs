@@ -49,7 +49,7 @@ pub struct Seconds {
     pub evaluation: f64,
     /// A row of the history.
     pub row: f64,
-    /// The fields of an output, without writing them to the disk, for each of [`Problem::outputs`].
+    /// The computation of the fields of each output of [`Problem::outputs`], without the writing to the disk.
     pub outputs: Vec<f64>,
 }
 

@@ -13,8 +13,8 @@ use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
 /// Largest factor between the thickness of a loaded layer and the depth of the load. A warning is printed if
-/// the thickness is larger or smaller by more than this factor. The thickness is measured along the axes, so
-/// that of a curved layer one cell thick is up to π/2 cells.
+/// the thickness is larger or smaller by more than this factor. The thickness is measured along the axes. For
+/// a curved layer one cell thick, the measured thickness is therefore up to π/2 cells.
 const MAX_THICKNESS_RATIO: f64 = 1.8;
 
 /// Maximum number of points of a layer for which the thickness is checked.
@@ -170,7 +170,8 @@ fn layer<const D: usize>(
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
         let body = problem.body_of(usize::from(model.block[*point as usize]));
-        // The set of a condition that acts in no stage may have points without a single spacing.
+        // Skip points of bodies without a single spacing. Only sets of conditions that act in no stage may
+        // have such points.
         let Some(edge) = problem.bodies[body].single_spacing(D) else {
             continue;
         };

@@ -248,8 +248,8 @@ fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
 
-/// Warn of pre-cracks without width that pass through more points than there are dimensions. Each of these
-/// points counts as on one side of the pre-crack.
+/// Warn of pre-cracks without width that pass through more points than there are dimensions. All of these
+/// points count as points on one side of the pre-crack, so the actual cut lies beside them.
 fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let is_on = |crack: &Crack, point: &usize| {
@@ -283,7 +283,7 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
 }
 
 /// Return the number of points of each set. Warn of sets by position that have fewer points than there are
-/// dimensions, unless the run has at most two points per dimension. Collective.
+/// dimensions. Do not warn if the run has at most 2 points in 1-D, 4 in 2-D or 6 in 3-D. Collective.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

@@ -96,9 +96,9 @@ pub enum Quadrature {
 #[serde(deny_unknown_fields)]
 pub struct Interface {
     /// Constants of the bonds between bodies. `"own"`: each end exerts its half of the force with its own
-    /// modulus and horizon. `"average"` and `"minimum"`: both ends use the mean or the smaller modulus and
-    /// horizon. `"none"`: bodies are not bonded, whatever their distance. The default is `"own"`, or
-    /// `"none"` with `[contact]`.
+    /// modulus and horizon. `"average"`: both ends use the mean modulus and the mean horizon. `"minimum"`:
+    /// both ends use the smaller modulus and the smaller horizon. `"none"`: bodies are not bonded, whatever
+    /// their distance. The default is `"own"`, or `"none"` with `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
     /// Pairs of bodies with their own rule or damage law, by a freely chosen name.

@@ -323,8 +323,8 @@ pub struct Front {
     pub threshold: Number,
 }
 
-/// A crack tip: among the points of a set whose damage exceeds a threshold, the farthest point in one
-/// direction. The position is then interpolated as for a [`Front`].
+/// A crack tip: the farthest point in one direction among those points of a set that have a damage above a
+/// threshold. The position is then interpolated as for a [`Front`].
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {

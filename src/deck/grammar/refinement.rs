@@ -21,8 +21,8 @@ pub struct Refinement {
     /// With `"delta-m"`: m of each level from 1 on. If not given, m rises by 1 from level to level.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
-    /// Factor on the horizon of points that have points of a coarser level inside their horizon, so that
-    /// their families do not lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
+    /// Factor on the horizon of points that have points of a coarser level inside their horizon. Without
+    /// this factor, their families may lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
     /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with

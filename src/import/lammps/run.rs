@@ -152,7 +152,8 @@ fn reset(
     Ok(())
 }
 
-/// Read the first run or a later command. Later commands matter only if they change the end of the run.
+/// Read the first `run` command, or a command after it. Commands after the first `run` matter only if they
+/// change the end of the run.
 pub(super) fn follow(
     translation: &Translation,
     variables: &Variables,

@@ -69,7 +69,8 @@ pub(super) fn contact(
         model(translation, models, interaction, &mut section)?;
         translation.add(section);
     }
-    // In Peridigm, general contact acts between different blocks only.
+    // In Peridigm, general contact acts between different blocks only. Each body therefore needs a separate
+    // rule for contact with itself.
     if general.is_none() && self_contact.is_none() {
         return Ok(());
     }

@@ -58,7 +58,7 @@ fn blocks_of_abaqus(
     for group in &mesh.groups {
         if let (Some(name), Members::Elements(elements), "element set") =
             (&group.name, &group.members, group.kind)
-            // A name with a point, such as `INSTANCE.SET`, is the name of a set of one instance. The name
+            // A name with a dot, such as `INSTANCE.SET`, is the name of a set of one instance. The name
             // `SET` is that of the set of all instances.
             && !name.contains('.')
         {
