@@ -140,9 +140,9 @@ fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
 
 /// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin,
 /// so that their points stay aligned. In each direction, the origin follows from the first body
-/// with this spacing that is a whole number of cells long between flat faces. The origin is 0 if
-/// cells from 0 fill this body exactly, otherwise the lower face of the body. Without such a body,
-/// the origin is 0.
+/// with this spacing that is a whole number of cells long between flat faces. The origin is 0 if a
+/// grid with this origin fills the body exactly, otherwise the lower face of the body. Without such
+/// a body, the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -180,8 +180,8 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
 const WHOLE: f64 = 1e-6;
 
 /// Return the grid origin along an axis, m, from which cells with the edge `edge` (m) fill a shape exactly.
-/// The origin is 0 if cells from 0 fill the shape, otherwise the lower face of the shape. `None` for a shape
-/// that is not a whole number of cells long between two flat faces.
+/// The origin is 0 if a grid with this origin fills the shape exactly, otherwise the lower face of the shape.
+/// `None` for a shape that is not a whole number of cells long between two flat faces.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {

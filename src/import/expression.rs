@@ -51,7 +51,7 @@ pub fn rewrite(
     }
     match Expression::parse(&result, &|_| None, &[], variables) {
         Ok(expression) => Ok(match expression.as_constant() {
-            // A plain number keeps its notation.
+            // A plain number keeps its notation; of any other constant, the value is written.
             Some(value) if result.parse::<f64>().is_err() => format!("{value:?}"),
             _ => result,
         }),

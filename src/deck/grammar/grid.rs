@@ -21,8 +21,8 @@ pub struct Grid {
     pub horizon: Number,
     /// Position in m of a corner of a lattice cell. The default is chosen separately for each
     /// spacing. In each direction it follows from the first body with this spacing that is a whole
-    /// number of cells long between flat faces: 0 if cells from 0 fill this body exactly, otherwise
-    /// the lower face of the body. Without such a body, the default is 0.
+    /// number of cells long between flat faces: 0 if a grid with this origin fills the body exactly,
+    /// otherwise the lower face of the body. Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
     /// Volume correction of points near the edge of a family: `"exact"`, `"linear"`,

@@ -242,8 +242,9 @@ pub struct BondEnergy {
     #[serde(default = "yes")]
     pub tension_only: bool,
     /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
-    /// surfaces have fewer bonds, so each bond stores more energy at the same strain, and the body breaks at
-    /// its surfaces first. With 1, the critical work of a bond is larger by the same factor as its energy.
+    /// surfaces have fewer bonds, so each bond stores more energy at the same strain. Without the correction,
+    /// the body therefore breaks at its surfaces first. With 1, the critical work of a bond is larger by the
+    /// same factor as its energy.
     #[serde(default = "zero")]
     pub family_correction: Number,
     /// α: the threshold is computed for the stretch s0 − α s_min instead of s0, where s_min is the smallest

@@ -2,8 +2,8 @@
 //!
 //! A number may be a string with an expression of the `[parameters]`, except counts, levels, ids and seeds.
 //! All values are in SI units. Unknown keys are errors. A choice, such as the law of a material, is a table
-//! with the name of the chosen variant (`[material.glass.pmb]`), so that error messages keep the source
-//! location.
+//! with the name of the chosen variant (`[material.glass.pmb]`). With a key for the variant instead, the
+//! deserializer would lose the locations of the values for error messages.
 
 mod bodies;
 mod conditions;

@@ -17,11 +17,11 @@ pub(super) enum Points {
 pub(super) enum MeshBlocks {
     /// The numbers of groups of the mesh.
     Numbers,
-    /// The numbers of groups of the mesh. The only block of a deck has all elements if its number is 1,
-    /// because the import does not read the mesh, which may have no groups.
+    /// The numbers of groups of the mesh. The import does not read the mesh, which may have no groups. If the
+    /// deck has a single block, and its number is 1, this block therefore has all elements.
     NumbersOrAll,
-    /// Positions, from 1, in this list of the names of element sets; `None` if the mesh cannot be read. The
-    /// only block of a deck has all elements if its number is 1.
+    /// Positions, from 1, in this list of the names of element sets; `None` if the mesh cannot be read. If
+    /// the deck has a single block, and its number is 1, this block has all elements.
     Sets(Option<Vec<String>>),
 }
 
@@ -40,7 +40,7 @@ impl MeshBlocks {
 /// `None` if the file cannot be read.
 ///
 /// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
-/// last. PeriLab has no fixed order for the other sets, so the order is that of the file.
+/// last. PeriLab has no fixed order for the other sets, so here their order is that of the file.
 fn blocks_of_abaqus(
     translation: &Translation,
     path: &str,
