@@ -102,8 +102,8 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// The first point of a rank whose motion, force or reaction is not finite: at the earliest step, the point
-/// with the smallest id.
+/// The first point of a rank with a motion, force or reaction that is not finite: of the points with such
+/// values at the earliest step, the one with the smallest id.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,

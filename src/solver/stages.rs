@@ -57,8 +57,8 @@ impl<const D: usize> Simulation<'_, D> {
         self.undeformed.stable_step * self.time_rule().density_scale.sqrt()
     }
 
-    /// Begin another stage at the present positions. Velocities are set to 0 at the beginning of a stage with
-    /// load steps and of the stage after it. Collective.
+    /// Begin another stage at the present positions. Velocities are set to 0 if this stage or the previous
+    /// one consists of load steps. Collective.
     pub(super) fn begin_stage(&mut self, stage: usize) {
         let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);

@@ -188,8 +188,8 @@ fn raised(rule: &Adaptive, [first, largest]: [f64; 2], length: f64) -> f64 {
     let round = rule.steps as f64;
     let growth = rule.raise - 1.0;
     let rounds_to = |ratio: f64| libm::log(ratio) / libm::log1p(growth);
-    // Number of rounds before the largest step is reached, but no more than fit in the duration. The duration
-    // of k rounds is a geometric series.
+    // Number of rounds before the largest step is reached, or the number of rounds that fit in the duration
+    // if this number is smaller. The duration of k rounds is a geometric series.
     let before_largest = rounds_to(largest / first).ceil();
     let fitting = rounds_to(1.0 + length * growth / (round * first)).floor();
     let rounds = before_largest.min(fitting);

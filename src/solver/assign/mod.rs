@@ -131,7 +131,7 @@ fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare 
     )
 }
 
-/// The longest bond (m) of each pair of blocks, row-major; 0 for a pair without bonds.
+/// Length (m) of the longest bond of each pair of blocks, row-major; 0 for a pair without bonds.
 pub fn cutoffs(problem: &Problem) -> Vec<f64> {
     let reach = |here: &Block, there: &Block| {
         if problem.interface.between(here.body, there.body) == InterfaceRule::None {
@@ -259,8 +259,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
             Criterion::Stretch(i.critical)
         }
         [CriticalStretch(i), CriticalStretch(j)] => {
-            // With the factor ∞, the critical stretch of one end does not limit the stretch m_e of the other
-            // end, see [`StretchConversion`].
+            // The factor ∞ means that the critical stretch of one end does not limit the other end, see
+            // [`StretchConversion`].
             let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
             let conversion = StretchConversion { ratios, stiffness };
             Criterion::StretchBetween([i.critical, j.critical], conversion)
@@ -394,7 +394,7 @@ pub fn assign<const D: usize>(
         if *pair_damage == InterfaceDamage::Unbreakable
             && [&here, &there].into_iter().any(wears_out)
         {
-            // Such a law breaks bonds by their history, whatever the criterion is.
+            // A law that wears out breaks bonds by their history, also without a criterion.
             bonds.protect(|_| true);
         }
         let stiffness = ends.each_ref().map(|end| end.stiffness);

@@ -11,8 +11,8 @@ use crate::problem::{
 /// of bodies.
 ///
 /// # Errors
-/// - If a law does not support the dimension of the problem, or the damage, the thermal expansion or a
-///   horizon of a body.
+/// - If the law of a body does not support the dimension of the problem.
+/// - If the law does not support the damage, the thermal expansion or a horizon of the body.
 /// - If the damage of a body is incompatible with another setting, or with the damage of another body to
 ///   which bonds may join this body.
 /// - If the bonds of a pair of bodies cannot have the damage of the pair.
@@ -45,8 +45,8 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     horizons_are_possible(problem)
 }
 
-/// Return an error if the law of a body of this pair breaks bonds itself. The bonds of the pair are
-/// unbreakable, so they would soften and never break.
+/// Check a pair of bodies with unbreakable bonds: return an error if the law of one of the bodies breaks
+/// bonds itself. Unbreakable bonds of such a law would soften and never break.
 fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
     let softens = |body: &&Body| pair.has(body) && body.material.law.declaration.breaks_by_itself();
     let Some(body) = problem.bodies.iter().find(softens) else {

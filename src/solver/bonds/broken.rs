@@ -21,7 +21,7 @@ use super::{Forces, Pass};
 /// Ranges of points are merged if at most this number of points lies between them.
 const GAP: usize = 64;
 
-/// Changes at a point that broken bonds cause in a force evaluation.
+/// Changes that broken bonds cause at a point in a force evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Broken<const D: usize> {
     /// Local index of the owned point.

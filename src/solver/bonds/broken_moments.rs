@@ -15,8 +15,9 @@ type Vector = Vector3<f64>;
 /// [`Moments::mean`].
 const LAYER: f64 = 1e-9;
 
-/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D. ω and Ṽ are those
-/// of [`FamilyTensors`](super::measures::FamilyTensors). The sums are, by index:
+/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D. ω is the influence
+/// function of a bond, and Ṽ is the volume of the neighbour times its volume correction. The sums are, by
+/// index:
 ///
 /// - 0: Σ ω Ṽ over all bonds, m³;
 /// - 1 to 3: Σ ω ξ Ṽ over all bonds, m⁴;

@@ -182,8 +182,8 @@ impl<const D: usize> Forces<D> {
         if end == from { from } else { self.border(end) }
     }
 
-    /// Return the columns of point numbers, rotations and stresses that change before each force sum and
-    /// that both ends read, and the number of these columns.
+    /// Return the columns that change before each force sum, and that laws or criteria read at both ends of a
+    /// bond: point numbers, rotations and stress measures. Also return the number of these columns.
     pub(super) fn changing_columns(&mut self) -> HaloColumns<'_> {
         let first = self.numbers.first_changing;
         let changing = first..self.numbers.read.max(first);
@@ -198,8 +198,8 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// Return the columns over the local points that a halo exchange sends and receives for this content, and
-    /// the number of these columns.
+    /// Return the columns that a halo exchange with this content sends and receives, and the number of these
+    /// columns. The columns have one entry per local point.
     fn halo_columns<'a>(
         &'a mut self,
         content: HaloContent,

@@ -126,8 +126,8 @@ impl<L> Force<L> {
         }
     }
 
-    /// Return one bit per bond, set if the bond breaks by its history. Only the histories of ends that act on
-    /// the bond count.
+    /// Return one bit per bond, set if the bond breaks by its history. The history for an end counts only if
+    /// the force state of this end acts on the bond.
     #[inline(always)]
     fn worn_out<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> u8
     where

@@ -42,8 +42,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Selection of the point data that the failure criteria of bonds between two bodies read, for bodies with a
-/// separate damage law for these bonds.
+/// Which point data are read by the failure criteria of bonds between two bodies. Only pairs of bodies with a
+/// separate damage law count.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.
@@ -52,7 +52,7 @@ pub struct PairReads {
     pub truncation_factors: bool,
     /// Whether these criteria read rotations.
     pub rotations: bool,
-    /// Whether these criteria read each stress measure, in the order of [`StressMeasure::ALL`].
+    /// For each stress measure, in the order of [`StressMeasure::ALL`]: whether these criteria read it.
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 

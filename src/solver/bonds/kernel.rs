@@ -75,7 +75,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// Operation that combines the lanes of a sum, and the sum and a column.
+/// Operation that combines the lanes of a sum with each other, and a sum with its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
     /// Sum.
@@ -113,7 +113,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     const COMBINE: Combine = Combine::Add;
 
     /// Instruction sets for which the kernel's loops are compiled. The default, one version, is enough for
-    /// most outputs.
+    /// most kernels that compute outputs.
     const ISA_SET: IsaSet = IsaSet::One;
 
     /// Whether to compile a second loop for lane groups whose bonds are all within the series limit, |x| ≤

@@ -16,7 +16,7 @@ pub struct LimitsRead {
     pub truncation_factors: bool,
     /// Whether rotations are read.
     pub rotations: bool,
-    /// Whether each stress measure is read, in the order of [`StressMeasure::ALL`].
+    /// For each stress measure, in the order of [`StressMeasure::ALL`]: whether it is read.
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 

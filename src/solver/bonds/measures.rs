@@ -6,7 +6,8 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, FamilyShare, Law, family_sha
 
 use super::kernel::{Group, Kernel};
 
-/// Request every bond quantity; most of these kernels run only for set-up and outputs.
+/// Request every bond quantity. Unused quantities cost little, because most kernels of this file run only for
+/// set-up and outputs.
 pub(super) const fn wanted(linear: bool) -> Wanted {
     Wanted {
         linear,

@@ -147,8 +147,8 @@ impl<const D: usize> Forces<D> {
     /// points have thermal stretches. [`Self::find_constants`] must be called afterwards. Collective.
     ///
     /// # Errors
-    /// If no instruction set has the [requested name](Instructions::of_all), or if a rank has none of the
-    /// sets. The error is the same on all ranks.
+    /// If no instruction set has the [requested name](Instructions::of_all), or if the processor of a rank
+    /// supports none of the sets.  The error is the same on all ranks.
     pub fn new(
         comm: &dyn Communicator,
         model: &Model<D>,

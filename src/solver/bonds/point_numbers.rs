@@ -1,5 +1,5 @@
-//! Point numbers: values of a point, such as the dilatation, that the law of the point declares, and computes
-//! from sums over the bonds of the point.
+//! Point numbers: values of a point, such as the dilatation. The law of the point declares its point numbers,
+//! and computes them from sums over the bonds of the point.
 
 use std::ops::Range;
 

@@ -45,10 +45,10 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// The columns over the points that a kernel adds its sums to.
+/// The columns over the points, to which a kernel adds its sums.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
-/// Sums over the bonds of a point that break in a sweep.
+/// Sums of a point over those of its bonds that break in a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct BrokenSums {
     /// Local index of the point.

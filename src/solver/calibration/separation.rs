@@ -23,7 +23,8 @@ const START: f64 = 0.02;
 /// Maximum number of steps; blocks need far fewer steps to separate.
 const MAX_STEPS: u32 = 1500;
 
-/// Relative tolerance for a cutoff that is a multiple of the spacing.
+/// Relative tolerance of the cutoff. With this tolerance, the number of cells within the cutoff is correct
+/// also if the cutoff is a multiple of the spacing, up to round-off.
 const SLACK: f64 = 1e-9;
 
 /// Steps between checks of the bonds across the plane.
@@ -38,7 +39,8 @@ const CHECK_INTERVAL: u32 = 20;
 /// The result is `None` in these cases:
 ///
 /// - the body has no fracture energy, or is on no lattice;
-/// - the law or the damage of the body is not possible, or bonds break by stress;
+/// - the block cannot have the law or the damage of the body;
+/// - bonds break by stress;
 /// - the families are too large, so the block would have more than `MAX_BONDS` bonds;
 /// - the simulation of the block cannot be set up;
 /// - the block does not separate.

@@ -60,7 +60,7 @@ pub fn are_finite<const D: usize>(
                 looker.look(&key, &COMPONENTS, place, set, values)?;
             }
             Action::BodyForce(values, factors) => {
-                // The smallest divisor gives the largest load.
+                // Only the smallest divisor is checked, because this divisor gives the largest load.
                 let bodies = problem.sets[set].possible_bodies(&problem.bodies);
                 let divisors = condition.divisors(bodies, D);
                 let smallest_divisor = divisors.into_iter().fold(f64::INFINITY, f64::min);

@@ -13,7 +13,7 @@ pub struct LoadFactors {
     present: Vec<f64>,
     /// Factors at the last equilibrium; in explicit stages, the factors of the current step.
     at_equilibrium: Vec<f64>,
-    /// A hash of all requests since the start of the run, or since the state was last restored.
+    /// A hash of all requests since the start of the run or its restart from a checkpoint.
     requests: u64,
 }
 

@@ -428,14 +428,15 @@ impl<const D: usize> Conditions<D> {
         (conditions, sums)
     }
 
-    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) and that the work
-    /// of the trapezoidal rule does not contain. The terms are upper estimates: for a load, the
-    /// energy that it gives points at rest in one step; for a supported component, the energy of its
-    /// velocity, and the energy that its prescribed acceleration gives a point at rest in one step.
+    /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step (s)
+    /// and that is not counted as work. The work is integrated by the trapezoidal rule, which misses this
+    /// energy. A load contributes the energy that it gives to points at rest in one step. A supported
+    /// component contributes the energy of its velocity, and the energy that its prescribed acceleration
+    /// gives to a point at rest in one step.
     ///
-    /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density f of a point
-    /// jumps, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without bound
-    /// in an unstable run.
+    /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density on a point jumps
+    /// from 0 to f, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without
+    /// bound in an unstable run.
     pub fn step_energy(&self, model: &Model<D>, fields: &Fields<D>, step: f64) -> ExactSum {
         let mut sum = ExactSum::ZERO;
         let kinetic = |point: usize, velocity: f64| {

@@ -1,9 +1,9 @@
 //! The ghosts of contact: points of other ranks that may touch owned points. These ghosts differ from the
 //! ghosts of the bonds, because contact depends on present positions.
 //!
-//! Any two ranks can have contact. Each cell of present positions has a home rank, given by the hash of the
-//! cell. The home rank informs every rank with points in the cell about the other ranks with points in this
-//! cell or in an adjacent one.
+//! Points of any two ranks can touch each other. Each cell of present positions has a home rank, given by the
+//! hash of the cell. The home rank informs every rank with points in the cell about the other ranks with
+//! points in this cell or in an adjacent one.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -297,8 +297,8 @@ impl RigidBody {
         let arm = Vector3::from(place) - Vector3::from(self.state.position);
         let surface = self.surface_velocity(arm);
         let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
-        // The normal has the direction from the point to the body, as it has the direction to the other point
-        // for a pair of points.
+        // [`Response::touch`] needs the normal from the point to the body, which is opposite to the outward
+        // normal.
         let normal = std::array::from_fn(|d| -normal[d]);
         Some(
             self.response
@@ -371,7 +371,7 @@ impl RigidBody {
         }
     }
 
-    /// Velocity (m/s) of the surface at a position relative to the centre (m).
+    /// Velocity (m/s) of the surface at the position `arm`, which is relative to the centre (m).
     fn surface_velocity(&self, arm: Vector3<f64>) -> Vector3<f64> {
         let spin = self.angular_velocity(&self.rotation());
         Vector3::from(self.state.velocity) + spin.cross(&arm)
@@ -411,8 +411,8 @@ impl RigidBody {
 /// Return `rotation`, followed by a rotation with an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
-    // The result is (1 + ½ Δt w) q with the angular velocity w and the quaternion q of `rotation`. It needs
-    // no sine; the error of its angle is of third order in Δt.
+    // The result is (1 + ½ Δt w) q with the angular velocity w and the quaternion q of `rotation`. The
+    // computation needs no sine, and the error of the angle is of third order in Δt.
     let turn = Quaternion::from_parts(1.0, half);
     UnitQuaternion::new_normalize(turn * rotation.quaternion())
 }

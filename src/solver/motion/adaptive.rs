@@ -48,7 +48,7 @@ pub struct StepControl {
 }
 
 impl StepControl {
-    /// Start the rule for a stage. `step` (s) is the first step of the stage without the rule.
+    /// Start the rule for a stage. `step` (s) is the first step that the stage would have without the rule.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);

@@ -13,8 +13,9 @@ const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
     /// Return a new step (s) if contact is too stiff for the present step, or if enough consecutive steps
-    /// could have been longer. The new step divides the rest of the stage evenly. `None` if the step stays,
-    /// at the end of a stage, in a quasi-static stage, and in runs without contact.
+    /// could have been longer. The new step divides the rest of the stage evenly. Otherwise return `None`,
+    /// which means that the step does not change. The result is always `None` at the end of a stage, in a
+    /// quasi-static stage, and in runs without contact.
     pub fn step_for_contact(&self) -> Option<f64> {
         if self.is_quasi_static() {
             return None;

@@ -26,10 +26,10 @@
 //! first load step of a stage, the prediction is the solution of the problem that is linearized about the
 //! last equilibrium. The change of the prescribed displacements is then part of x.
 //!
-//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. A load
-//! step in which bonds have broken is not repeated, because an equilibrium at its full load was then found. A
-//! load step is not repeated either if no support holds a loaded piece of a body. The smaller load steps
-//! continue up to the end of the original load step.
+//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. The
+//! smaller load steps continue up to the end of the original load step. A load step in which bonds have
+//! broken is not repeated, because an equilibrium at its full load was then found. A load step is not
+//! repeated either if no support holds a loaded piece of a body.
 
 use std::time::Instant;
 

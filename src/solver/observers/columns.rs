@@ -44,7 +44,7 @@ pub struct GlobalState {
     pub refinement_energy: f64,
     /// Force of the supports on each set of `reactions` by component, N.
     pub reactions: Vec<Vec<f64>>,
-    /// For each entry of `support_forces` in the deck, the component of the support force in the requested
+    /// For each `[history.force.NAME]` of the deck, the component of the support force in the requested
     /// direction, N.
     pub support_forces: Vec<f64>,
     /// Values of the columns of each probe.

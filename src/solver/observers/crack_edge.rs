@@ -27,8 +27,8 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region, or
-    /// if no other damaged points are around the point.
+    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region or
+    /// at an edge of the body, or if no other damaged points are around the point.
     ///
     /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
     /// ⊗ g over these points and the point itself, 1/m²; g is the result of

@@ -149,10 +149,13 @@ impl HistoryObserver {
     /// Find the points of all sets, probes, fronts, cracks, tips and J integrals of the history. Collective.
     ///
     /// # Errors
-    /// If a set is empty, if no point lies along the line of a front, if all points of the set of a crack tip
-    /// lie behind the start of the line, if the box of a J integral contains no point or is too near to the
-    /// end of the bodies, or if no body lies on the line that stands for the crack front of a J integral. The
-    /// error is the same on all ranks.
+    /// - If a set is empty.
+    /// - If no point lies along the line of a front.
+    /// - If all points of the set of a crack tip lie behind the start of the line.
+    /// - If the box of a J integral contains no point, or is too near to the end of the bodies.
+    /// - If no body lies on the line that stands for the crack front of a J integral.
+    ///
+    /// The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let history = &problem.history;

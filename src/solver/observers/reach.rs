@@ -67,9 +67,9 @@ impl Course {
     /// The search starts at the farthest point above the threshold; if several are equally far, at the one
     /// with the smallest id. The next points are the nearest points ahead of this point along the line,
     /// within one horizon of this point. The values are interpolated linearly between the farthest and the
-    /// next points to find the threshold. If several of these points are equally far, the largest value is
-    /// used. When values grow, the position therefore grows without jumps, even when the next point exceeds
-    /// the threshold.
+    /// next points to find the threshold. If several points are equally far along the line, the largest of
+    /// their values is used. When values grow, the position therefore grows without jumps, even when the next
+    /// point exceeds the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -47,7 +47,7 @@ impl Schedule {
             Some(Interval::Steps(steps)) => clock.number().is_multiple_of(steps),
             Some(Interval::Seconds(seconds)) => passed(seconds, before),
             Some(Interval::SecondsAtSteps { seconds, steps }) => {
-                // Time of the previous check, if the time step has not changed since then.
+                // Time `steps` steps ago, at the previous check, if the time step has not changed since then.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
             }
