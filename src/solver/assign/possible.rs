@@ -1,4 +1,4 @@
-//! Checks which laws and which damage the bodies of a problem can have.
+//! Check which laws and which damage the bodies of a problem can have.
 
 use super::{Breaks, breaks, build, constants, given};
 use crate::error::{Error, Result};

@@ -114,7 +114,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Recompute the point numbers of a range of points. Record the energy that points with broken bonds lose
-    /// by this change, without the energy that plastic flow dissipates.
+    /// by the change of their point numbers, without the energy that plastic flow dissipates.
     fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
         // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);

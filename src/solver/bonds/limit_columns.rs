@@ -168,8 +168,8 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         columns: &'a LimitColumns,
         reach: usize,
     ) -> Self {
-        // Rotations are not stored if the forces of all laws act along the bonds. A criterion between two
-        // different such laws still requests rotations.
+        // Rotations are not stored if the forces of all laws act along the bonds. The criterion between two
+        // different laws of this kind still requests rotations.
         let is_stored = !columns.rotations[3].is_empty();
         let is_read = R::COUNT > 0 && criterion.reads_rotations() && is_stored;
         let columns = R::columns(&columns.rotations);

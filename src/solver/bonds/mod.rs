@@ -148,7 +148,7 @@ impl<const D: usize> Forces<D> {
     ///
     /// # Errors
     /// If no instruction set has the [requested name](Instructions::of_all), or if the processor of a rank
-    /// supports none of the sets.  The error is the same on all ranks.
+    /// supports none of the sets. The error is the same on all ranks.
     pub fn new(
         comm: &dyn Communicator,
         model: &Model<D>,
@@ -314,8 +314,8 @@ impl<const D: usize> Forces<D> {
             .sum()
     }
 
-    /// Number of bonds of the owned points from each block to each block, including broken ones. A bond
-    /// between two owned points of one block counts twice.
+    /// For each pair of blocks with bonds, the number of bonds of the owned points, including broken ones. A
+    /// bond between two owned points of one block counts twice.
     pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
         let all = self.interactions.iter().map(|i| &i.bonds);
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))

@@ -351,7 +351,7 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
 }
 
 /// Number of lane groups that skip the fast path after a failed attempt. The fast path is a loop without
-/// failure criterion. An attempt fails if |x| of a bond exceeds
+/// failure criterion. An attempt fails if |x| of a bond, with x of [`crate::material::bond`], exceeds
 /// [`Criterion::limit`](crate::damage::Criterion::limit). Large |x| occur in clusters, so further attempts
 /// would probably fail.
 const FAST_PATH_BACKOFF: usize = 7;

@@ -429,7 +429,7 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step (s)
-    /// and that is not counted as work. The work is integrated by the trapezoidal rule, which misses this
+    /// without being counted as work. The work is integrated by the trapezoidal rule, which misses this
     /// energy. A load contributes the energy that it gives to points at rest in one step. A supported
     /// component contributes the energy of its velocity, and the energy that its prescribed acceleration
     /// gives to a point at rest in one step.

@@ -33,7 +33,7 @@ const GROWTH: f64 = 1.1;
 /// evaluation needs for a point with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// Number of multiply-adds to solve with the factored matrix that is allowed for any number of points.
+/// Number of multiply-adds to solve with the factored matrix. This number is allowed even with few points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.

@@ -129,9 +129,9 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Whether a loaded piece without support drifts away. At large displacements, the unbalanced forces on
-    /// such a piece are below the round-off limit, so its positions would count as an equilibrium.
-    /// Collective.
+    /// Whether a loaded piece without support drifts away. The round-off limit of the forces grows with the
+    /// displacements. At large displacements, the unbalanced forces on a drifting piece are below this limit,
+    /// so the positions of the piece would count as an equilibrium. Collective.
     pub(super) fn is_drifting(&mut self) -> bool {
         self.progress.load_step.residual == 0.0
             && self.contact.is_none()

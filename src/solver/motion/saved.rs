@@ -93,7 +93,7 @@ impl<const D: usize> Simulation<'_, D> {
     ///
     /// # Errors
     /// If the saved state has other bonds or fields than this run, or another amount of data for the progress
-    /// of the run.  The error is the same on all ranks.
+    /// of the run. The error is the same on all ranks.
     pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
         let names = self.saved_names();
         let lengths = self.forces.saved_lengths(self.model.owned());

@@ -256,8 +256,8 @@ fn candidates<const D: usize>(
     outgoing
 }
 
-/// The ranks that compare points in the cells that contain positions within `reach` (m) of `place`. `edge` is
-/// the edge of a cell, m.
+/// The ranks of all cells that may contain points within `reach` (m) of `place`. A rank compares the points
+/// of its cells. `edge` is the edge of a cell, m.
 fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
     let mut homes = Vec::with_capacity(1);
     for corner in 0..1_u32 << D {

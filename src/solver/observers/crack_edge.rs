@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 type Vector = Vector3<f64>;
 
-/// Threshold, in horizons, of the distance between two mean positions: of the damaged points around a point,
-/// and of the family of the point. The distance is measured in the plane of the crack. Points of the front
-/// are above the threshold. The distance is 0.4 on a straight front, and 0.05 at an edge of the body.
+/// A point can be on the front only if a distance exceeds this threshold, in horizons. The distance is
+/// measured in the plane of the crack, from the mean position of the damaged points around the point to the
+/// mean position of the point's family. It is 0.4 on a straight front, and 0.05 at an edge of the body.
 const ONE_SIDED: f64 = 0.2;
 
 /// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged

@@ -37,7 +37,7 @@ const DIAGONAL: f64 = 1.8;
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
-/// Largest damage of a point ahead of the front that counts as undamaged, as a fraction of the threshold. At
+/// Largest damage at which a point ahead of the front counts as undamaged, as a fraction of the threshold. At
 /// an oblique surface of the body, the damage falls below the threshold before the crack ends, but stays
 /// above this fraction.
 const UNDAMAGED: f64 = 0.5;

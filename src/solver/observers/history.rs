@@ -97,8 +97,8 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Sum of the energy balance in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
-    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step and that is
-    /// not counted as work. The work is integrated by the trapezoidal rule, which misses this energy.
+    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step without being
+    /// counted as work. The work is integrated by the trapezoidal rule, which misses this energy.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
