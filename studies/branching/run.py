@@ -13,7 +13,7 @@ A picture of each crack is written to the output folder.
 
 With --shifts N, instead runs the refined and the uniform fine grid with N different shifts of the lattice each. Prints
 mean and standard deviation of the x of the branching point, and of the heights of the outermost branches at the right
-side. Also prints Welch's t for the difference of the means between the two grids; an absolute value above 2.1 is
+side. Also prints Welch's t for the difference of the means between the two grids; an absolute value above 2.2 is
 significant at the 5 % level for 12 shifts.
 """
 
