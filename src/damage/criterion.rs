@@ -147,13 +147,13 @@ pub struct Ends<'a, L, P> {
     pub laws: &'a [L; 2],
     /// Point numbers of points i and j.
     pub points: [&'a P; 2],
-    /// Data of points i and j that only criteria read.
+    /// Data of points i and j. Only criteria read these data.
     pub limits: [&'a Limits; 2],
     /// Influence function times volume correction of the bonds.
     pub weights: Weights,
 }
 
-/// Data of eight points that criteria read.
+/// Data of eight points. Criteria read these data at both ends of a bond.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Stretches, works (J/m⁶) or stresses (Pa) at which the bonds of the points break.

@@ -129,8 +129,8 @@ fn too_many_neighbours(
     let [near, other] = blocks.map(|block| problem.block(block));
     let (body, other) = (near.body, other.body);
     let key = horizon_key(problem, body);
-    // The longest bond may exceed the horizon by part of a cell, so the ratio is computed from the deck's
-    // horizon.
+    // On a lattice, the ratio is computed from the deck's horizon, because the longest bond may exceed this
+    // horizon by part of a cell.
     let spacings = match &other.points {
         PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),
         PointSource::File { .. } | PointSource::Mesh { .. } => spacings,

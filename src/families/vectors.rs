@@ -157,8 +157,8 @@ impl<'a> Vectors<'a> {
 }
 
 impl VectorBonds<'_> {
-    /// The slot of the first of the eight neighbours at an offset, which have consecutive slots. All eight
-    /// slots are in bounds even if none of the eight bonds exists.
+    /// The slot of the first of the eight neighbours at an offset. The eight neighbours have consecutive
+    /// slots. All eight slots are in bounds even if none of the eight bonds exists.
     ///
     /// # Safety
     /// The offset must be an element of [`Self::offsets`].

@@ -63,14 +63,14 @@ impl Lanes {
         self.map(f64::sqrt)
     }
 
-    /// Exponential. Each lane is a call of a function that gives the same result on every processor.
+    /// Exponential. A function that gives the same result on every processor is called for each lane.
     #[inline(always)]
     pub fn exp(self) -> Self {
         self.map(libm::exp)
     }
 
-    /// Power with the same exponent in all lanes. Each lane is a call of a function that gives the same
-    /// result on every processor.
+    /// Power with the same exponent in all lanes. A function that gives the same result on every processor is
+    /// called for each lane.
     #[inline(always)]
     pub fn pow(self, exponent: f64) -> Self {
         self.map(|base| libm::pow(base, exponent))

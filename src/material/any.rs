@@ -16,7 +16,8 @@ pub struct Counts {
     pub constants: usize,
     /// Count of the numbers of a point, [`Law::Point`].
     pub point: usize,
-    /// Count of the values of a point that the loops over bonds do not read, [`Law::OWN_NUMBERS`].
+    /// Count of the own values of a point, [`Law::OWN_NUMBERS`]. The loops over bonds do not read these
+    /// values.
     pub own: usize,
     /// Count of the passes, [`Law::PASSES`].
     pub passes: usize,
@@ -127,7 +128,7 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Return the given entries of T⊗Y of eight bonds (see [`ForceState::dyad`]), multiplied by the two
+    /// Return the given entries of T⊗Y of eight bonds (see [`ForceState::dyad`]), multiplied by both
     /// `factors`. Entries beyond `D` dimensions are 0.
     #[inline(never)]
     pub fn stress_contribution<const D: usize>(
@@ -163,8 +164,9 @@ impl AnyLaw {
     }
 }
 
-/// Bonds between different laws are never linear: a linear law is paired only with itself. Functions that are
-/// called per bond are not inlined; otherwise every loop would contain the code of all laws.
+/// This implementation serves bonds between different laws. These bonds are never linear, because a linear
+/// law is paired only with itself. Functions that are called per bond are not inlined; otherwise every loop
+/// would contain the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;

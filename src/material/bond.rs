@@ -9,10 +9,8 @@
 //!   s, a force c s Y/|Y| is (c/|ξ|) P(x) Y.
 //!
 //! For |x| ≤ [`NEAR`] both functions are computed as Taylor series. The first omitted term is below 6·10⁻¹⁸
-//! of the result.
-//! Larger |x| use the closed forms P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)), which avoid
-//! cancellation.
-//! Both ends of a bond compute the same bits of x, and therefore of P and Q.
+//! times the result. For larger |x| the closed forms P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)) are
+//! used, which avoid cancellation. Both ends of a bond compute the same bits of x, and therefore of P and Q.
 
 use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
@@ -283,8 +281,9 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// Return `near`, or in the lanes of `beyond_series` with |x| above [`NEAR`] the quotient x/(√(1 + x) + o).
-/// `other` computes o and the rounding error of o, from 1 + x and the rounding error of 1 + x.
+/// Return the quotient x/(√(1 + x) + o) in the lanes of `beyond_series` with |x| above [`NEAR`], and `near`
+/// in all other lanes. `other` computes o and the rounding error of o. Its input is 1 + x and the rounding
+/// error of this sum.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,

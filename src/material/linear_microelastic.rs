@@ -2,8 +2,8 @@
 //!
 //! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ is the linearisation of the prototype microelastic
 //! material with the micromodulus c.
-//! Any other λ(|ξ|) is the default law with c = 1 and the influence function λ |ξ|³.
-//! Forces act along ξ, also after large motions. Therefore a rigid rotation causes forces.
+//! The law with any other λ(|ξ|) equals the default law with c = 1 and the influence function λ |ξ|³. Forces
+//! act along ξ, also after large motions. Therefore a rigid rotation causes forces.
 
 use std::sync::Arc;
 

@@ -140,13 +140,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Type of the force state.
     type Force: ForceState<D>;
 
-    /// Number of constants among the numbers of a point.
+    /// Count of the constants among the numbers of a point.
     const CONSTANTS: usize = 0;
 
     /// Number of passes over the bonds before the force evaluation.
     const PASSES: usize = 0;
 
-    /// Number of a point's own numbers. Only functions that are called per point, such as
+    /// Count of a point's own numbers. Only functions that are called per point, such as
     /// [`Self::point_energy`], read the own numbers. The loops over bonds do not read the own numbers, and
     /// ghosts have none. The own numbers are stored after the numbers of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;

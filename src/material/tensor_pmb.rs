@@ -82,8 +82,8 @@ impl Described for TensorPmb {
     }
 }
 
-/// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc. The exponents say how many of its indices are x,
-/// y and z.
+/// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc. The exponents say how many of the indices abcd
+/// are x, y and z.
 fn isotropic(exponents: [usize; 3]) -> f64 {
     let odd = exponents.iter().any(|exponent| exponent % 2 == 1);
     match exponents.iter().max() {

@@ -20,7 +20,7 @@ pub enum Attribute<'a> {
 }
 
 impl Attribute<'_> {
-    /// Return the length of a text of any length, bytes; 0 for other values.
+    /// Return the length of an [`Attribute::Text`], bytes; 0 for other values.
     pub(super) fn text_length(self) -> u64 {
         match self {
             Self::Text(text) => text.len() as u64,

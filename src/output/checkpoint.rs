@@ -175,8 +175,8 @@ impl Checkpoints {
     /// Collective.
     ///
     /// # Errors
-    /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint,
-    /// which the next checkpoint would replace.
+    /// If no checkpoint is intact, or a file is unreadable. A run that ignored an unreadable file could lose
+    /// the newest checkpoint: its next checkpoint might replace this file.
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,

@@ -383,7 +383,8 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// Reserve disk space for all created and extended objects. Writes of rows and flushes do this first.
+    /// Reserve disk space for all created and extended objects. This function is called before each write of
+    /// rows and before each flush.
     fn reserve(&mut self) -> Result<()> {
         if self.comm.raw().is_none() || !self.usable || self.size <= self.reserved {
             return Ok(());

@@ -10,8 +10,8 @@ const ALWAYS_ALLOWED: usize = 100_000;
 /// Above this number of cells per rank, the borders between ranks do not get smoother.
 const SUFFICIENT_PER_RANK: usize = 2000;
 
-/// Above this total, the number of cells per rank is reduced, because one rank partitions all cells, and
-/// every rank stores the owners of all cells.
+/// Above this total number of cells, the number of cells per rank is reduced, because one rank partitions all
+/// cells, and every rank stores the owners of all cells.
 const LARGE_TOTAL: usize = 4_000_000;
 
 /// Number of cells per rank that an even partition needs.

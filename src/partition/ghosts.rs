@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! If a cell of rank p is adjacent to a cell of rank q, rank p sends the points of its cell to rank q. Rank q
-//! then requests as ghosts the points among them that lie within the cutoff of a point of rank q.
+//! If a cell of rank p is adjacent to a cell of rank q, rank p sends the points of its cell to rank q. Of
+//! these points, rank q then requests as ghosts the points within the cutoff of a point of rank q.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

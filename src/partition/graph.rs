@@ -101,8 +101,8 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Renumber parts so that few points migrate. For the index of a cell in `part`, `current` returns the
-/// present rank and the number of points.
+/// Renumber parts so that few points migrate. `current` receives the index of a cell in `part`, and returns
+/// the present rank of the cell and its number of points.
 fn renumber(part: &mut [metis::Idx], ranks: usize, current: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {

@@ -38,7 +38,8 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// The fraction that belongs to the set, of the point at a grid index in steps of the finest level.
+    /// For the point at a grid index in steps of the finest level, return the fraction that belongs to the
+    /// set.
     fn at(
         &mut self,
         body: usize,

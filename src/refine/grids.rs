@@ -345,7 +345,8 @@ impl<'a> Grids<'a> {
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
-            // Without enlarged horizons, nodes at interfaces can share a lattice with other nodes.
+            // Without enlarged horizons, no test is needed: nodes at interfaces can share a lattice with
+            // other nodes.
             return Vec::new();
         }
         let of_level = |level| {

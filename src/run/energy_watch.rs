@@ -16,11 +16,12 @@ use crate::solver::observers::HistoryRow;
 /// instability.
 const WARNING_GAIN: f64 = 1.0;
 
-/// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows, or the last row
-/// of the run, exceed this ratio.
+/// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows of the history,
+/// or the last row of the run, exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
-/// Ratio of energy gain to energy input. The run ends with an error at the first row above this ratio.
+/// Ratio of energy gain to energy input. The run ends with an error at the first row of the history above
+/// this ratio.
 const CERTAIN_GAIN: f64 = 1e9;
 
 /// If breaking bonds have added more energy than this fraction of the energy input, a warning is printed.

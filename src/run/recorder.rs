@@ -352,11 +352,11 @@ pub enum Continuation {
 }
 
 /// Return the reason why the result file of an output cannot be continued; `None` if the file can be
-/// continued. Reasons are: the file is missing, damaged, or shorter than the checkpoint counts; the deck
-/// requests other points, fields, precision or history columns; adaptive refinement was switched on or off.
-/// `outputs` is the number of outputs that the checkpoint counts. For the main result, `history` has the
-/// observer, the number of rows that the checkpoint counts, and the changes of the column definitions.
-/// Collective.
+/// continued. Reasons are: the file is missing or damaged; it has fewer outputs or rows than the checkpoint
+/// counts; the deck requests other points, fields, precision or history columns, or defines a history column
+/// in another way; adaptive refinement was switched on or off. `outputs` is the number of outputs that the
+/// checkpoint counts. For the main result, `history` has the observer, the number of rows that the checkpoint
+/// counts, and the changes of the column definitions. Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.

@@ -20,10 +20,9 @@
 //! The gradients of Chen 2018 sum over the neighbours that points i and j share. Such gradients would need
 //! enough shared neighbours and a shape tensor per bond, so they are not used.
 //!
-//! A bound on the stiffness follows from W ≤ ½ c Σ w |H_ξ|² with H_ξ = F_ξ − I. The terms are
-//! |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|², and |H|² ≤ Σ ω |η|² Ṽ/λ.
-//! Here c is the largest modulus of the solid, and λ is the smallest eigenvalue of K. The spring constant
-//! c (1/λ + 1/(|ξ|² Σ ω Ṽ)) is therefore a bound.
+//! With the largest modulus c of the solid, W ≤ ½ c Σ w |H_ξ|² for H_ξ = F_ξ − I. Here
+//! |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|². With the smallest eigenvalue λ of K, |H|² ≤ Σ ω |η|² Ṽ/λ.
+//! Therefore springs with the constant c (1/λ + 1/(|ξ|² Σ ω Ṽ)) store at least the energy W.
 
 use nalgebra::SMatrix;
 

@@ -410,8 +410,8 @@ impl Hooke {
     /// If Hooke's matrix is singular.
     pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
         let used = used(dimension);
-        // The determinant of a matrix of very small or very large entries is not representable. A power of
-        // two scales without round-off.
+        // The matrix is scaled, because the determinant of a matrix of very small or very large entries is
+        // not representable. The scale is a power of two, which causes no round-off.
         let (_, exponent) = libm::frexp(self.matrix.amax());
         let unit = libm::ldexp(1.0, exponent - 1);
         let own = DMatrix::from_fn(used.len(), used.len(), |a, b| {

@@ -1,5 +1,6 @@
-//! The fits of ω and σ of [`Pals`](super::Pals) to the family of a point. A sum over the family has the
-//! weight |ξ|² Ṽ per bond, unless a formula gives the terms.
+//! The fits of ω and σ of [`Pals`](super::Pals) to the family of a point. n is the direction of a bond, and N
+//! has the components N_a = n_a². A sum over the family has the weight |ξ|² Ṽ per bond, unless a formula
+//! gives the terms.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 
