@@ -31,7 +31,8 @@ const _: () = assert!(
 
 /// Whether `mpi-sys` was built for Open MPI.
 const OF_OPEN_MPI: bool = {
-    // If the bindings belong to Open MPI, their constant shadows the fallback below.
+    // If the bindings belong to Open MPI, their `OMPI_MAJOR_VERSION` shadows the constant of the same name
+    // below, which is 0.
     #[allow(unused_imports)]
     use mpi_sys::*;
     OMPI_MAJOR_VERSION > 0

@@ -35,8 +35,8 @@ pub enum Calibration {
 pub struct BondEnergy {
     /// Critical work w_c, J/m⁶.
     pub critical: f64,
-    /// Factor α in the threshold of a point, see [`Self::threshold`]. It multiplies the smallest stretch
-    /// s_min of the point's intact bonds.
+    /// Factor α in the threshold of a point, see [`Self::threshold`]. α multiplies the smallest stretch s_min
+    /// of the point's intact bonds.
     pub alpha: f64,
     /// Critical stretch s0 for the same fracture energy; the threshold depends on α s_min/s0.
     pub stretch: f64,

@@ -1,7 +1,8 @@
 //! Criteria that break bonds. Both ends of a bond evaluate its criterion with the same operations, so that
 //! the results at both ends agree.
 //!
-//! - Stretches are compared by x of [`crate::material::bond`], which needs no root.
+//! - Stretches are compared by the relative square extension x, see [`crate::material::bond`]. No root is
+//!   needed for x.
 //! - Energies are compared by the work of the force states of the ends that act on the bond.
 //! - Stresses are compared by the mean of the stress measures of the ends that act on the bond.
 
@@ -224,8 +225,8 @@ impl Criterion {
         matches!(*self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] above which bonds are marked in [`Bond::beyond_series`]. If
-    /// [`Self::marks_all`], only marked bonds break.
+    /// Limit of |x|: bonds above this limit are marked in [`Bond::beyond_series`]. x is the relative square
+    /// extension, see [`crate::material::bond`]. If [`Self::marks_all`], only marked bonds break.
     #[inline(always)]
     pub fn limit(&self) -> f64 {
         match *self {

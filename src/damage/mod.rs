@@ -38,8 +38,8 @@ impl DamageLaw {
         }
     }
 
-    /// Factor α in the threshold of a point; 0 for the stress criterion. It multiplies the smallest stretch
-    /// of the point's intact bonds. See [`CriticalStretch::threshold`] and [`BondEnergy::threshold`].
+    /// Factor α in the threshold of a point; 0 for the stress criterion. α multiplies the smallest stretch of
+    /// the point's intact bonds. See [`CriticalStretch::threshold`] and [`BondEnergy::threshold`].
     pub fn alpha(&self) -> f64 {
         match self {
             Self::CriticalStretch(law) => law.alpha,

@@ -191,8 +191,8 @@ impl Grid {
         }
     }
 
-    /// Return the line that is displaced from line `index` by these numbers of cells in y and z, and lies in
-    /// the same band as line `index`; `None` if there is no such line.
+    /// Return the line that is displaced from line `index` by these numbers of cells in y and z, within the
+    /// same band; `None` if there is no such line.
     ///
     /// The wanted line is close to line `index` in memory, so the search begins at line `index`.
     pub(super) fn line_beside(&self, index: usize, [y, z]: [i64; 2]) -> Option<&Line> {

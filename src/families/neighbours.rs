@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::lanes::WIDTH;
 
 /// Flag of [`Compact::first`]. If it is set, the other bits are an index into the full groups. Local indices
-/// are always below this value.
+/// are always below the value of the flag.
 const IN_FULL: u32 = 1 << 31;
 
 /// A group of eight indices.

@@ -6,7 +6,8 @@
 
 use super::Lanes;
 
-/// Proof that the machine has an instruction set, and the operations that depend on it.
+/// Proof that the machine has an instruction set. The methods are the operations that depend on this
+/// instruction set.
 pub trait Simd: Copy + Send + Sync + 'static {
     /// a b + c, rounded once except by [`Portable`] without fused multiply-add.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
@@ -417,8 +418,9 @@ mod x86 {
 
     /// Make a value opaque to the compiler. The compiler then keeps the operations before and after this call
     /// in whole vectors instead of splitting them by lane. Measured with rustc 1.95 on AMD Zen 3 (AVX2):
-    /// without this call, the law `pmb` in lists reaches only 0.68 of its speed, and `ordinary` in lattices
-    /// 0.75. `pmb` in lattices does not need the call, and `correspondence` is faster without the call.
+    /// without this call, the law `pmb` in lists has only 0.68 times its speed with the call, and `ordinary`
+    /// in lattices 0.75 times. `pmb` in lattices does not need the call, and `correspondence` is faster
+    /// without the call.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {

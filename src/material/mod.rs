@@ -307,8 +307,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         rotation::IDENTITY
     }
 
-    /// Compute the stress of a point, for laws with a deformation gradient per point. `None` if the point
-    /// carries no stress, and for all other laws. The arguments are the sums of the first pass, the point
+    /// Compute the stress of a point, for laws with a deformation gradient per point. `None` for all other
+    /// laws, and if the point carries no stress. The arguments are the sums of the first pass, the point
     /// numbers, and the plastic state before or after the flow of a step.
     fn family_stress(
         &self,

@@ -103,8 +103,8 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Return the error if the deck has `calibration = "continuum"` and a surface correction, with which each
-/// point has its own influence functions.
+/// Return the error if the deck has `calibration = "continuum"` and a surface correction. With a surface
+/// correction, each point has its own influence functions, and its own family determines the yield value.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     let is_corrected = values.word(SURFACE_CORRECTION.name) != "none";
     (is_corrected && values.word(CALIBRATION.name) != "family").then(|| LawFault {

@@ -250,8 +250,8 @@ fn critical_stretch(given: &Given, strength: f64) -> f64 {
     })
 }
 
-/// Number of iterations that compute s0 from f_t. The largest stress depends weakly on sc/s0; an iteration
-/// gains more than half a digit.
+/// Number of iterations that compute s0 from f_t. The largest stress depends weakly on sc/s0. Therefore each
+/// iteration gains more than half a digit of s0.
 const STRENGTH_ITERATIONS: u32 = 8;
 
 /// Return s0 and sc from the keys of the deck. If no valid curve exists, sc is not above s0.
@@ -299,8 +299,8 @@ fn rounded(number: f64) -> String {
     digits.parse().map_or(digits, format_number)
 }
 
-/// Return the error message if sc is not above s0, so that bonds would break before they soften. With a long
-/// horizon, bonds at s0 store more than the fracture energy.
+/// Return the error message if sc is not above s0: bonds would then break before they soften. A cause is a
+/// long horizon, with which bonds at s0 store more than the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {

@@ -20,8 +20,8 @@ pub enum Creation {
 /// Open an existing file for reading; with a raw communicator, collectively.
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
     // No collective metadata reads: HDF5 1.10.8 deadlocks in such a read if the ranks have read different
-    // rows before, because the metadata caches of the ranks then differ. All metadata of a new file is in
-    // memory, so a new file is safe.
+    // rows before, because the metadata caches of the ranks then differ. Such reads are safe only for a new
+    // file, whose metadata is all in memory.
     options(raw, false)?.open(path)
 }
 

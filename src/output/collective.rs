@@ -34,8 +34,8 @@ const OBJECT_BYTES: u64 = 8192;
 ///
 /// # Kill and loss of power
 /// A killed process leaves the file in the state of the last flush, because metadata stays in memory between
-/// flushes. A loss of power leaves at least the state of the last [fsync](Self::sync): until the next fsync,
-/// flushed writes change values in place only, because a flush after growth includes an fsync.
+/// flushes. A loss of power leaves at least the state of the last [fsync](Self::sync). A flush after growth
+/// of the file includes an fsync. All other flushes only change values in place.
 ///
 /// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
 pub struct CollectiveFile<'a> {

@@ -11,8 +11,8 @@ pub struct AtCoarser<'a> {
     /// Indices, in steps of the level, at which the refinement of coarser levels creates nodes in addition to
     /// the grid of level 0. An index counts only if [`Pattern::is_possible`] holds there.
     finer: GridIndexSet,
-    /// Bits of those indices of a word that lie on the grid of level 0. All words that contain such indices
-    /// have the same bits.
+    /// Bits of a word whose indices lie on the grid of level 0. These bits are the same for all words that
+    /// contain indices of this grid.
     coarsest: u64,
     /// For each bit of a word: offsets to the words within the distance, and the bits of these words that lie
     /// within the distance.

@@ -224,7 +224,7 @@ impl<'a> Watch<'a> {
 }
 
 /// Return the time left in the Slurm job of this process; `None` if the environment variable
-/// `SLURM_JOB_END_TIME` is missing, as outside a job, or is not a time in seconds.
+/// `SLURM_JOB_END_TIME` is missing (outside a job) or is not a time in seconds.
 fn slurm_time_left() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;

@@ -157,8 +157,8 @@ impl<const D: usize> Law<D> for BondAssociated {
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_EXTENSION: bool = false;
     const HAS_BOND_STRESS_ACROSS: bool = true;
-    // An AVX-512 version would gain little: most of the time goes into the stresses, which are computed in a
-    // separate loop.
+    // An AVX-512 version would gain little: most of the time goes into the stresses. `Stress::of_bonds`
+    // computes the stresses, and is not compiled for AVX-512, because it is not inlined into the loop.
     const ISA_SET: IsaSet = IsaSet::Avx2;
 
     #[inline(always)]

@@ -87,9 +87,10 @@ pub const STRAIN_MEASURE: Key = Key {
 /// been returned to the yield surface could flow again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. After a
-/// return to the yield surface, the round-off of b_e is larger, because it scales with the square of the
-/// stretches. Heating can make the yield stress small compared with the round-off of the stress.
+/// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. With
+/// logarithmic strains, the round-off of a stress on the yield surface is larger than at small strains: it
+/// follows from b_e, whose round-off scales with the square of the stretches. With Johnson–Cook hardening,
+/// heating can make the yield stress small compared with the round-off of the stress.
 const WIDE_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys; `None` if there is no error.

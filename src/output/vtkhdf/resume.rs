@@ -269,9 +269,9 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     Ok(true)
 }
 
-/// Test whether a file can be continued in place. The conditions are: points that never change, the same
-/// number of points, the same deck and version, space for all expected steps, and no chunk that the
-/// truncation frees.
+/// Test whether a file can be continued in place. The conditions are: the points never change; the number of
+/// points, the deck and the version are the same; the file has space for all expected steps; the truncation
+/// frees no chunk.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,
