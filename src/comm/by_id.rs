@@ -144,8 +144,9 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
 /// Send rows of `values` to the other ranks, and write the received rows to a new array of length `size`.
 /// Rows that stay on this rank are copied. Collective.
 ///
-/// `from_rows` lists, for each rank, the rows of `values` to send. `to_rows` lists the rows of the result to
-/// receive from that rank, in the same order. `from` and `to` map a row to its range of values.
+/// For each rank q, `from_rows` lists the rows of `values` to send to q, and `to_rows` lists the rows of the
+/// result to receive from q, in the order in which q sends these rows. `from` and `to` map a row to its range
+/// of values.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),

@@ -64,7 +64,7 @@ pub trait Communicator {
     /// Send and receive all buffers, and call `during` while messages are in flight.
     ///
     /// Large messages progress only inside MPI calls. Therefore `during` should call its argument from time
-    /// to time. This call drives progress and returns true while any message is in flight.
+    /// to time. Each call of the argument drives progress and returns true while any message is in flight.
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>);
 
     /// Abort all ranks after an error that they can no longer report collectively.

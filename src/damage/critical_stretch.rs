@@ -63,8 +63,8 @@ impl CriticalStretch {
         (energy / (cost * horizon)).sqrt()
     }
 
-    /// Return the fracture energy G0 = K_Ic²/E′ (J/m²) of a fracture toughness (Pa·√m) (Irwin). E′ is E in
-    /// plane stress and uniaxial stress, and E/(1−ν²) otherwise.
+    /// Return the fracture energy G0 = K_Ic²/E′ (J/m²) for a fracture toughness K_Ic (Pa·√m) (Irwin). E′ is E
+    /// in plane stress and uniaxial stress, and E/(1−ν²) otherwise.
     pub fn energy_from_toughness(dimension: Dimension, elastic: Isotropic, toughness: f64) -> f64 {
         let effective = match dimension {
             Dimension::PlaneStress { .. }

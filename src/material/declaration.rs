@@ -38,7 +38,7 @@ pub struct Declaration {
     pub breaks_by_energy: bool,
     /// Whether the stress criterion can break bonds of this law.
     pub breaks_by_stress: bool,
-    /// Return the critical stretch of a fracture energy (J/m²); `None` if no stretch criterion can break the
+    /// Return the critical stretch for a fracture energy (J/m²); `None` if no stretch criterion can break the
     /// bonds.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.

@@ -53,7 +53,7 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Return the critical stretch s0 of a fracture energy (J/m²). Breaking a bond at s0 dissipates the same
+/// Return the critical stretch s0 for a fracture energy (J/m²). Breaking a bond at s0 dissipates the same
 /// energy as breaking an elastic bond at s_e, the critical stretch of `pmb` for this fracture energy.
 ///
 /// Breaking dissipates c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore

@@ -124,8 +124,8 @@ pub trait Described {
 ///    [`Self::pass_contribution`] → sums → [`Self::update_point`]. Then the numbers are sent to the ghosts.
 /// 3. In the force evaluation: [`Self::bond_history`] and [`Self::force_state`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
-    /// The numbers of a point that bonds read at both ends. The constants come first; the others are
-    /// recomputed before each force evaluation.
+    /// The numbers of a point that the loops over bonds read, at both ends of a bond. The constants come
+    /// first; the others are recomputed before each force evaluation.
     type Point: LaneTuple;
 
     /// The bond history: numbers stored per bond for each of its ends; initially 0.

@@ -89,7 +89,7 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// Return the critical stretch of a fracture energy (J/m²). For `form = "diehl2016"`, the critical stretch
+/// Return the critical stretch for a fracture energy (J/m²). For `form = "diehl2016"`, the critical stretch
 /// follows in the plane from eq. 16–17, and in space from the energy of all bonds across a plane. For
 /// `form = "energy"`, the result is the critical stretch of `pmb`.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {

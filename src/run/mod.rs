@@ -73,7 +73,8 @@ pub struct Outcome {
     pub stopped: Option<Reason>,
     /// Number of the step reached.
     pub number: u64,
-    /// Number of the last step of the whole run, if the time step does not change.
+    /// Expected number of the last step of the whole run. The present time step is assumed to stay the same
+    /// until the end of the stage.
     pub last: u64,
     /// Time reached, s.
     pub time: f64,

@@ -17,12 +17,12 @@ pub trait Observer {
     /// Called before the first step, with the state of step 0 or of the checkpoint.
     fn begin(&mut self, _now: &mut dyn RunState) {}
 
-    /// Called after each explicit step and each iteration of a load step. The scheduled output has been
+    /// Called after each explicit step and each iteration of a load step, when the scheduled output has been
     /// written.
     fn step(&mut self, _now: &mut dyn RunState) {}
 
-    /// Called after a row of the history has been computed. In a new run, the first row precedes the call of
-    /// [`Self::begin`].
+    /// Called after a row of the history has been computed. In a new run, the call for the first row precedes
+    /// the call of [`Self::begin`].
     fn row(&mut self, _now: &mut dyn RunState, _row: &Row) {}
 
     /// Called after the time loop. `complete` is true at the end of the run, false after a stop or a failure.
@@ -124,7 +124,8 @@ pub trait RunState {
     /// Return the number of the step reached.
     fn number(&self) -> u64;
 
-    /// Return the number of the last step of the whole run, if the time step does not change.
+    /// Return the expected number of the last step of the whole run. The present time step is assumed to stay
+    /// the same until the end of the stage.
     fn last(&self) -> u64;
 
     /// Return the time reached, s.

@@ -135,7 +135,7 @@ impl<const D: usize> Law<D> for Pals {
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
     type ReferenceSum = [Lanes; 2 * MONOMIALS];
-    /// θ, Σ σ|ξ| e Ṽ and Σ σ|ξ|² Ṽ (Pa) over the intact bonds.
+    /// θ, Σ σ|ξ| e Ṽ (Pa) and Σ σ|ξ|² Ṽ (Pa), all over the intact bonds.
     type Sum = [Lanes; 3];
     type Force = Along;
     const CONSTANTS: usize = 4 * D + OTHERS;
