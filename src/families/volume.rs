@@ -1,9 +1,9 @@
 //! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family. Without correction, the
 //! factor is 1 within the horizon and 0 beyond.
 //!
-//! - `linear`: the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families contain
-//!   points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). `LinearInside` is the form of
-//!   LAMMPS (Parks et al. 2008): the factor drops from 1/2 to 0 at δ.
+//! - `linear`: with the cell edge dx, the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so
+//!   families contain points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014).
+//!   `LinearInside` is the form of LAMMPS (Parks et al. 2008): the factor drops from 1/2 to 0 at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
 //!   Schweitzer 2016, eq. 2). This fraction has a closed form in 1-D and 2-D, and is computed by quadrature
 //!   over slices in 3-D.

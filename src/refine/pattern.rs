@@ -10,7 +10,7 @@ use super::grid_index_set::GridIndexSet;
 /// A node of a refined grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// Level of the node's block; the spacing of level l is dx₀/2^l.
+    /// Level of the node's block; the spacing of level l is dx₀/2^l, with the spacing dx₀ of level 0.
     pub level: u32,
     /// Ratio of the node's volume to the volume of a level-0 cell.
     pub volume_fraction: f64,

@@ -117,8 +117,8 @@ impl EnergyWatch {
     }
 
     /// Check the fracture energy of a row of the history. Return a warning at the first row in which breaking
-    /// bonds have added more than [`MAX_ADDED_FRACTION`] of the energy input. A correspondence law can store
-    /// more energy with fewer bonds.
+    /// bonds have added more than [`MAX_ADDED_FRACTION`] of the energy input. Breaking bonds can add energy
+    /// because a correspondence law can store more energy with fewer bonds.
     pub fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
         self.max_freed = self.max_freed.max(freed);
