@@ -30,8 +30,8 @@ use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 
-/// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, the few
-/// bonds with a large critical work hold the faces of cracks together.
+/// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, few bonds
+/// have a large critical work, and these bonds hold the faces of cracks together.
 const MOST_SQUARINGS: u32 = 1;
 
 /// Minimum of p.

@@ -164,7 +164,7 @@ impl<'a> CollectiveFile<'a> {
     /// Create a group; its parent must exist.
     ///
     /// # Errors
-    /// If the object exists, or the parent does not exist.
+    /// If an object with this path exists, or the parent does not exist.
     pub fn create_group(&mut self, path: &str) -> Result<()> {
         self.size += OBJECT_BYTES;
         self.collectively(&format!("cannot create the group {path}"), |file| {
@@ -203,7 +203,7 @@ impl<'a> CollectiveFile<'a> {
     /// Create a dataset of shape `[rows]` or `[rows, columns]`. Unwritten values are arbitrary.
     ///
     /// # Errors
-    /// If the object exists, or the parent group does not exist.
+    /// If an object with this path exists, or the parent group does not exist.
     pub fn create_dataset<T: hdf5::H5Type>(
         &mut self,
         path: &str,

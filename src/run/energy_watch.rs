@@ -47,7 +47,7 @@ pub struct EnergyWatch {
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
-    /// Whether the ratio of energy gain to energy input in the last row was above [`FATAL_GAIN`].
+    /// Whether the ratio of energy gain to energy input in the previous row was above [`FATAL_GAIN`].
     suspected: bool,
 }
 

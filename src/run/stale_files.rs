@@ -1,5 +1,5 @@
-//! Files in the output folder that an earlier run has written and that a new run does not replace: results of
-//! outputs, and tables of cracks, that the deck no longer has.
+//! Files in the output folder that an earlier run has written and that a new run does not replace: further
+//! results and tables of cracks, if the deck no longer has their output or crack.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};

@@ -301,8 +301,8 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let young = ["x", "y", "z"].map(|axis| of("youngs_modulus", axis));
     let mut compliance = Matrix6::zeros();
     for (k, young) in young.into_iter().enumerate() {
-        // The stiffness across a sheet may have any value, because these matrices do not couple it to the
-        // plane.
+        // The stiffness across a sheet may have any value, because the matrix of a sheet does not couple this
+        // stiffness to the plane.
         compliance[(k, k)] = if sheet && k == 2 { 1.0 } else { 1.0 / young };
     }
     for (axes, a, b) in [("yz", 1, 2), ("xz", 0, 2), ("xy", 0, 1)] {
