@@ -243,7 +243,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return the bond history of one end after a time step of length `_step` (s). `before` is the history at
-    /// the start of the step, and `_bond` has the deformation at its end.
+    /// the start of the step, and `_bond` has the deformation at the end of the step.
     #[inline(always)]
     fn bond_history(
         &self,

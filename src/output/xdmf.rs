@@ -84,7 +84,7 @@ impl SideCar {
         }
     }
 
-    /// Add a step with its time (s) and its number of points, and write the side-car if `MIN_INTERVAL` allows.
+    /// Add a step with its time (s) and number of points, and write the side-car if `MIN_INTERVAL` allows.
     ///
     /// # Errors
     /// If the side-car cannot be written.
