@@ -229,9 +229,9 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let bonds_bytes = total(speed.bond_bytes);
     let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
-    // `Speed::sent_without_overlap` counts only the exchange of displacements. Laws with two passes also
-    // exchange point numbers, so the measured time is multiplied by this ratio: all bytes of the steps,
-    // divided by the bytes of the displacements.
+    // `Speed::sent_without_overlap` measures only the exchange of displacements. Laws with two passes also
+    // exchange point numbers, such as the dilatation. The measured time is therefore multiplied by this
+    // ratio: all bytes that the steps send, divided by the bytes of the displacements.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let mut phases = vec![
         phase("bonds", times.forces.bonds),

@@ -369,8 +369,8 @@ impl File<'_> {
         self.mesh.elements.push(*kind, (number, line), nodes);
     }
 
-    /// Add the last element to its geometrical entity and to its physical groups. The tag 0 means no entity
-    /// and no group.
+    /// Add the last element to its geometrical entity and to its physical groups. A tag 0 means that there is
+    /// no entity or no group.
     fn add_to_groups(&mut self, dimension: usize, entity: i64, physical: &[i64]) {
         let last = self.mesh.elements.len() as u64 - 1;
         if entity != 0 {
@@ -645,8 +645,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Read a `size_t`. Every counted entry takes bytes, so a count that is too large fails at the end of the
-    /// file.
+    /// Read a `size_t`. If this number is a count that is too large, reading the counted entries fails at the
+    /// end of the file, because every entry takes bytes.
     fn size(&mut self) -> Result<u64> {
         match self.encoding {
             Encoding::Text => {

@@ -346,7 +346,8 @@ pub struct Measure {
     determinants: [f64; 2],
 }
 
-/// Largest det J of the opposite sign that counts as round-off, as a fraction of the largest |det J|.
+/// Values of det J whose absolute value is at most this fraction of the largest |det J| count as round-off.
+/// Their sign is ignored.
 const ROUND_OFF: f64 = 1e-9;
 
 impl Measure {

@@ -1,8 +1,8 @@
 //! Meshes of finite elements in the formats of other programs. Elements become points.
 //!
-//! A count in a file can be wrong. A reader therefore either reads the counted entries one by one, or compares
-//! the count with the size of the file before it allocates memory for the entries. A damaged file needs no
-//! more memory than a valid file of the same size.
+//! A count in a file can be wrong. A reader therefore either reads the counted entries one by one, or
+//! compares the count with the size of the file before it allocates memory for the entries. A damaged file
+//! needs no more memory than a valid file of the same size.
 
 mod abaqus;
 mod exodus;
@@ -26,7 +26,7 @@ use crate::error::{Error, Result, excerpt};
 use crate::message::nearest;
 use kind::KINDS;
 
-/// Kind of the groups in an Exodus file that have elements of one type.
+/// Kind of a group in an Exodus file: elements of one type.
 pub const BLOCK: &str = "block";
 
 /// Kind of a group of faces of elements. The group holds the elements, not the faces.

@@ -91,11 +91,13 @@ struct Root {
     depth: f64,
 }
 
-/// Return at most one root for each square cell of the picture. The returned roots are at least `reach` away
-/// from each other. The edge `cell` of a cell and `reach` are in pixels, and `reach` is at most `cell`.
+/// Return at most one of the candidates for each square cell of the picture. The returned candidates are at
+/// least `reach` away from each other. The edge `cell` of a cell and `reach` are in pixels, and `reach` is at
+/// most `cell`.
 ///
-/// Of each cell, only the root nearest to the camera is considered; among roots of equal depth, the root
-/// nearest to the centre of the cell. This root is left out if it is too close to the root of another cell.
+/// Of each cell, only the candidate nearest to the camera is considered; among candidates of equal depth, the
+/// candidate nearest to the centre of the cell. This candidate is left out if it is too close to the
+/// candidate of another cell.
 fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root> {
     let rank = |root: &Root, number: [i64; 2]| {
         let offset = [0, 1].map(|k| root.place[k] / cell - number[k] as f64 - 0.5);

@@ -124,10 +124,10 @@ impl<'a> Cubes<'a> {
         }
         let overlap = 2.0 * OVERLAP;
         self.paint_box((centre, depth), edge, [edge + overlap; 3], colour);
-        // If a face moves outwards by a distance d, its surface at a given pixel comes nearer by d divided by
-        // the cosine of the face. Each face of the larger cube is half of the growth farther out. The larger
-        // cube is shifted back by 4/3 of the largest approach that results, so it lies behind the faces of
-        // the cube itself. In a gap, the larger cube hides the sides of other cubes.
+        // If a face moves outwards by a distance d, its surface at a given pixel comes nearer to the camera
+        // by d divided by the cosine of the face. For the larger cube, d is half of the growth. The larger
+        // cube is shifted back by 4/3 of the largest of these approaches, so it lies behind the faces of the
+        // cube itself. In a gap, the larger cube hides the sides of other cubes.
         let visible = self
             .visible()
             .map(|axis| self.growth[axis] / self.cosines[axis]);
@@ -346,7 +346,7 @@ mod tests {
         let mut image = Image::new(300, 300);
         let mut cubes = Cubes::new(&mut image, Camera::isometric());
         for index in 0..20 {
-            // The distances of the cubes are stretched by a tenth.
+            // The distances between the cubes are stretched by a tenth.
             let y = 1.1 * 10.3 * f64::from(index);
             let [across, up] = isometric().project([0.0, y, 0.0]);
             let depth = Camera::isometric().depth([0.0, y, 0.0]);

@@ -272,11 +272,11 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// Fraction of the vectors, from the shortest vector on, whose arrows are never cut.
+/// Fraction of the vectors whose arrows are never cut: the shortest vectors.
 const WHOLE_ARROWS: f64 = 0.995;
 
-/// Arrows are cut if the longest vector has more than this many times the length of the longest vector of the
-/// fraction [`WHOLE_ARROWS`].
+/// Arrows are cut only if the longest of all vectors is more than this many times as long as the longest of
+/// the vectors in the fraction [`WHOLE_ARROWS`].
 const LONG_ARROWS: f64 = 4.0;
 
 /// The points of a scene to draw, in painting order.
@@ -475,7 +475,7 @@ mod tests {
             vectors: Some(vectors),
             ..scene(&positions, &[0.0; 3], view)
         };
-        // The second point is not in the slice, and z is along the view.
+        // The second point is not in the slice. The z component is parallel to the direction of view.
         assert_eq!(scene.marks().unwrap().longest_arrow(), 5.0);
     }
 

@@ -10,9 +10,9 @@ use super::{BodyPoints, Point, check_no_empty_body, file, mesh};
 
 /// Return the mean spacing of each body's points, m; `None` for the bodies that are not `wanted`. Collective.
 ///
-/// The mean spacing of N points from a file or a mesh, with the volume V in all, is (V/N)^(1/D) in D
-/// dimensions. V is divided by the thickness in the plane, and by the cross-section in 1-D. The mean spacing
-/// of a lattice is its spacing, or the geometric mean of the edges of a cell.
+/// The mean spacing of N points from a file or a mesh is (V/N)^(1/D) in D dimensions. V is the total volume
+/// of the points, divided in 2-D by the thickness and in 1-D by the cross-section. The mean spacing of a
+/// lattice is its spacing, or the geometric mean of the edges of a cell.
 ///
 /// Files and meshes are read, but no points are kept. Each rank reads a part of a file, and rank 0 reads the
 /// meshes. The result is the same on any number of ranks.
@@ -57,7 +57,8 @@ pub fn mean_spacings(
     }
     comm.sum(&mut counts);
     let volumes = reduce(comm, &mut volumes);
-    // The points of the other bodies are not counted.
+    // The points of bodies whose file or mesh was not read, and of lattices, are not counted. Assume one
+    // point for each of these bodies, so that the check accepts them.
     let assumed: Vec<u64> = (counts.iter().zip(&is_read))
         .map(|(count, is_read)| if *is_read { *count } else { 1 })
         .collect();

@@ -95,9 +95,9 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     difference.dot(&difference)
 }
 
-/// Generate this rank's piece of the points. Return the piece and the number of points of all ranks. The ids
-/// of a piece are contiguous per body. If several bodies share a file or mesh, the ids of the piece are
-/// contiguous per file or mesh. Collective.
+/// Generate this rank's piece of the points. Return the piece and the total number of points on all ranks.
+/// The ids of a piece are contiguous per body. If several bodies share a file or mesh, the ids of the piece
+/// are contiguous per file or mesh. Collective.
 ///
 /// # Errors
 /// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, cells of

@@ -16,8 +16,8 @@ const SAME_TIME: f64 = 1e-9;
 pub struct Subtrahend {
     path: PathBuf,
     result: ResultReader,
-    /// Time (s) of each output of the minuend, and index of the output of this result at the same time;
-    /// `None` if this result has no such output.
+    /// Time (s) of each output of the minuend, and index of the subtrahend's output at the same time; `None`
+    /// if the subtrahend has no such output.
     outputs: Vec<(f64, Option<usize>)>,
 }
 
@@ -53,10 +53,11 @@ impl Subtrahend {
         })
     }
 
-    /// Return the index of the output of this result at the time of output `index` of `minuend`.
+    /// Take the time of output `index` of `minuend`, and return the index of the subtrahend's output at this
+    /// time.
     ///
     /// # Errors
-    /// If this result has no output at the same time, or another number of points.
+    /// If the subtrahend has no output at this time, or has another number of points.
     pub fn find(&self, minuend: &ResultReader, index: usize) -> Result<usize> {
         let (_, own) = self.outputs[index];
         let own = own.ok_or_else(|| self.wrong("has no output", index))?;
@@ -66,11 +67,11 @@ impl Subtrahend {
         Ok(own)
     }
 
-    /// Subtract the values of this result from `values`. Before the call, `values` has the quantity of the
-    /// points `points` of output `index` of `minuend`.
+    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the quantity
+    /// at the points `points` of output `index` of `minuend`.
     ///
     /// # Errors
-    /// If this result has no output at the same time, or other points, or is damaged.
+    /// If the subtrahend has no output at the same time, has other points, or is damaged.
     pub fn subtract(
         &self,
         (minuend, index): (&ResultReader, usize),

@@ -59,7 +59,7 @@ pub(super) struct Placed {
 
 /// Position of an instance in the assembly: a translation, then a rotation.
 pub(super) struct Instance {
-    /// Name of the part of the instance, if the file has no such part.
+    /// If the file does not define the part of the instance: the name of this part.
     pub(super) missing_part: Option<String>,
     pub(super) place: Place,
     pub(super) translation: Vector3<f64>,
@@ -69,7 +69,8 @@ pub(super) struct Instance {
     pub(super) lines: usize,
 }
 
-/// If there are more than `limit` numbers, remove repeated ones and raise the limit.
+/// If there are more than `limit` numbers, remove repeated numbers and set a new limit of more than twice the
+/// remaining count.
 fn compact(numbers: &mut Vec<u64>, limit: &mut usize) {
     if numbers.len() > *limit {
         numbers.sort_unstable();
@@ -259,7 +260,7 @@ impl Reader {
     }
 
     /// Find the members of a set by its name, in `known` or among the groups of the mesh. With `instance`,
-    /// find the set with this name in this instance, which is a group of the mesh.
+    /// find the set of this instance: a group of the mesh with a name such as `INSTANCE.NAME`.
     fn find_set(
         &self,
         of: MemberKind,

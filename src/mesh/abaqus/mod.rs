@@ -131,8 +131,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Read an included file at the position of the `*INCLUDE` line, or of another keyword line, whose
-    /// `INPUT` parameter names the file.
+    /// Read an included file, as if its lines stood in the place of the keyword line that names the file.
+    /// `from` is the file with this keyword line, and `input` is the `INPUT` parameter of the line.
     fn include(&mut self, from: &Path, input: &str, depth: usize) -> Result<()> {
         self.included += 1;
         if depth == DEEPEST || self.included > MOST_INCLUDED {
@@ -235,7 +235,8 @@ impl Reader {
             }
             "INSTANCE" => {
                 let wanted = keyword.get("PART").unwrap_or_default();
-                // An instance without a part, or of a part without a mesh, has nodes and elements of its own.
+                // If the instance has no part, or its part has no mesh, the nodes and elements follow within
+                // the instance.
                 let part = self.parts.get(&wanted.to_ascii_uppercase()).cloned();
                 let missing_part = part.is_none().then(|| wanted.to_owned());
                 let part = Part {
