@@ -1,6 +1,6 @@
 //! Formatting of numbers, times and sizes.
 
-/// Absolute value from which on values are formatted without an SI prefix.
+/// Values of at least this absolute value are formatted without an SI prefix.
 const TOO_LARGE: f64 = 1e16;
 
 /// Format a value with four digits, an SI prefix and its unit, such as `50.00 µs`.

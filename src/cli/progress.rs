@@ -121,7 +121,8 @@ impl Progress {
     }
 }
 
-/// Return the time (s) from the start to the next line, if a line is printed at the time `elapsed` (s).
+/// Return the time of the line that follows a line printed at the time `elapsed`. Both times are measured
+/// from the start, s.
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE

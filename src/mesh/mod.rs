@@ -240,7 +240,7 @@ impl Mesh {
         self.elements.kind(element).dimension() == dimension || self.volume(element).is_some()
     }
 
-    /// Return the largest dimension of a group's elements; 0 for nodes.
+    /// Return the largest dimension of a group's elements; 0 for a group of nodes.
     pub fn dimension(&self, group: &Group) -> usize {
         match &group.members {
             Members::Nodes(_) => 0,
@@ -411,7 +411,8 @@ fn fault(path: &Path, line: u64, message: impl fmt::Display) -> Error {
     })
 }
 
-/// Return the position of a node, or an error if squares and volumes could overflow.
+/// Return the position of a node, or an error if a coordinate is so large that squared distances or volumes
+/// could overflow.
 fn position(place: [f64; 3]) -> std::result::Result<[f64; 3], String> {
     let near = |x: &f64| x.abs() <= FARTHEST;
     if place.iter().all(near) {

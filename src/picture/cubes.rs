@@ -244,7 +244,8 @@ mod tests {
     #[test]
     fn the_nearest_cube_is_seen_in_any_order_and_size() {
         // One small cube lies behind the upper face of a large cube, although the centre of the small cube is
-        // nearer. The other small cube lies in front of this face.
+        // nearer to the camera than the centre of the large cube. The other small cube lies in front of this
+        // face.
         let place = |[x, y, z]: [f64; 3]| {
             let [across, up] = isometric().project([x, y, z]);
             (

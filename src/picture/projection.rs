@@ -65,7 +65,7 @@ impl Camera {
     ///
     /// An outer edge belongs to one face that the camera sees and to one face that the camera does not see.
     /// Of the two outer edges along an axis, the ruler is at the edge that is lower in the picture. If these
-    /// edges rise to the right with a slope above 2, the ruler is at the left edge.
+    /// edges are vertical, or rise to the right with a slope above 2, the ruler is at the left edge.
     pub fn outer_edge(self, axis: Axis) -> Option<([bool; 3], [f64; 2])> {
         let step = |axis: Axis| {
             let index = axis.index();

@@ -272,7 +272,7 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// Fraction of the vectors whose arrows are never cut: the shortest vectors.
+/// The arrows of this fraction of the vectors, the shortest ones, are never cut.
 const WHOLE_ARROWS: f64 = 0.995;
 
 /// Arrows are cut only if the longest of all vectors is more than this many times as long as the longest of

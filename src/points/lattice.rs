@@ -8,7 +8,7 @@ use crate::problem::{Body, PointSource, Problem, Quadrature, Shape};
 use super::region::{Region, TOLERANCE};
 use super::{MAX_PER_RANK, Point, distance_squared, shape};
 
-/// Binary logarithm of the maximum number of cells per rank. Testing this number of cells takes some minutes.
+/// Binary logarithm of the maximum number of cells per rank. Testing so many cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
 /// Number of candidate cells that are sampled to estimate the fraction of candidate cells that belong to a

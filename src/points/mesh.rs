@@ -502,7 +502,8 @@ fn members(
     marks: &mut [bool],
 ) -> Runs {
     let mut ids = Vec::new();
-    // Sorted corners of each face, edge and point. The node of the first corner is marked in `marks`.
+    // Sorted corners of each face, edge, point element and node of the group. The first corner is marked in
+    // `marks`.
     let mut faces: Vec<Vec<u32>> = Vec::new();
     match group {
         Members::Nodes(nodes) => faces.extend(nodes.iter().map(|node| vec![node as u32])),

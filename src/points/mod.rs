@@ -178,12 +178,12 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     }
 }
 
-/// Set the ids of the sets that name groups of meshes. `meshes` contains the points of each mesh and the id
-/// of the first point.
+/// Set the point ids of the sets that name groups of meshes. `meshes` contains the points of each mesh and
+/// the id of the first of these points.
 ///
 /// # Errors
-/// If no mesh has a group of that name, or if the points differ from the points of an earlier call. Only rank
-/// 0 knows the names of the groups and can suggest similar names.
+/// If no mesh has the group that a set names, or if the points of a set differ from those of an earlier call.
+/// Only rank 0 knows the names of the groups and can suggest similar names.
 fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result<()> {
     for (index, set) in problem.sets.iter().enumerate() {
         let Selector::Mesh(group) = &set.selector else {

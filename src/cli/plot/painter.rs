@@ -271,8 +271,8 @@ impl<'a> Painter<'a> {
         is_slice || !self.clips.is_empty() || self.threshold.is_some()
     }
 
-    /// Return the values that `--threshold-field` names, of consecutive points of output `index`; `None`
-    /// without this option, because the threshold then applies to the drawn values.
+    /// Return the values of the field that `--threshold-field` names, for consecutive points of output
+    /// `index`. Return `None` without this option, because the threshold then applies to the drawn values.
     pub(super) fn threshold_values(
         &self,
         index: usize,

@@ -19,7 +19,7 @@ pub struct Table<'a> {
     columns: &'a [Column],
     references: &'a [Option<f64>],
     abscissa: Option<usize>,
-    /// Compute rates even without a reference: the runs differ in resolution, or `--x` is given.
+    /// Compute rates even without a reference, because the runs differ in resolution or `--x` is given.
     has_rates: bool,
     /// Values by run and column; `None` for incomplete runs and for values that are not finite.
     values: Vec<Option<Vec<Option<f64>>>>,

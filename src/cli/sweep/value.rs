@@ -45,8 +45,8 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// Expected number for a picked value. `name` is this value; `None` stands for the only picked value of the
-/// sweep.
+/// Expected number for a picked value. `name` is the column and rule of this value. If `name` is `None`, the
+/// number belongs to the only picked value of the sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     name: Option<Column>,

@@ -40,8 +40,8 @@ pub(super) struct Set {
     pub(super) numbers: Vec<u64>,
     /// Ranges of numbers: first, last and step.
     pub(super) ranges: Vec<[u64; 3]>,
-    /// Names of other sets, which this set includes, or numbers with the name of an instance, such as
-    /// `part-1-1.7`.
+    /// Names of other sets that this set includes. An entry may also be a single member, given by an instance
+    /// and a number, such as `part-1-1.7`.
     pub(super) names: Vec<String>,
     /// Whether the members are all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
