@@ -105,7 +105,7 @@ mod tests {
             assert_rates(&with, &[None, Some(p), Some(p), Some(p)]);
             let without = rates(&series(&sizes, value), None);
             assert_rates(&without, &[None, None, Some(p), Some(p)]);
-            // The order of the runs does not matter.
+            // The parameter may decrease or increase from row to row.
             let reversed: Vec<f64> = sizes.iter().rev().copied().collect();
             assert_rates(
                 &rates(&series(&reversed, value), None),

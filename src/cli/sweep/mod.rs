@@ -148,7 +148,8 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
 /// the table and pictures of all combinations.
 ///
 /// # Errors
-/// If the deck or an argument is wrong, a run fails, a file cannot be written, or a signal stops the sweep.
+/// If the deck or an argument is wrong, a run fails, a file cannot be written, or a signal or a time limit
+/// stops a run.
 pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
     let design = Design::new(&arguments.set, arguments.zip)?;
     let chosen = match &arguments.rows {
