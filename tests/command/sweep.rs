@@ -409,7 +409,7 @@ fn a_signal_stops_the_runs_and_the_same_command_continues() {
     expect(
         &output,
         75,
-        &["the sweep was stopped by a signal; the same command continues it"],
+        &["the sweep was stopped by a signal or a time limit; the same command continues it"],
     );
     assert!(sweep.folder.join("o/dx=1e-3/checkpoint_0.h5").exists());
     assert!(!sweep.folder.join("o/dx=1e-3/complete").exists());

@@ -214,7 +214,8 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
     })?;
     table.write(&folder, prints)?;
     if stopped {
-        let message = "the sweep was stopped by a signal; the same command continues it";
+        let message =
+            "the sweep was stopped by a signal or a time limit; the same command continues it";
         return Err(Error::stopped(message));
     }
     match &failed[..] {
