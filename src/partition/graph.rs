@@ -27,8 +27,8 @@ const FEW_CELLS_PER_PART: usize = 30;
 /// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
 ///   edge is proportional to the estimated number of bonds across it, multiplied by `ALONG_X` if its cells
 ///   differ along x.
-/// - With measured loads, cell weights are multiplied by the cost per point. Parts are numbered so that few
-///   points migrate.
+/// - With measured loads, the weight of a cell is its share of the time of its rank, in proportion to the
+///   estimated number of bonds. Parts are numbered so that few points migrate.
 ///
 /// # Errors
 /// If METIS fails.
@@ -71,9 +71,11 @@ pub fn partition(
             neighbours.push(vertex[other] as metis::Idx);
             bonds_across.push(across * if displaced[0] { ALONG_X } else { 1.0 });
         }
-        let cost = loads.map_or(1.0, |loads| loads.costs[*cell] as f64 / count);
-        bonds.push(sum * cost);
+        bonds.push(sum);
         starts.push(neighbours.len() as metis::Idx);
+    }
+    if let Some(loads) = loads {
+        share_times(&mut bonds, &occupied, loads, ranks);
     }
     let vertex_weights = to_integers(&bonds);
     let edge_weights = to_integers(&bonds_across);
@@ -99,6 +101,21 @@ pub fn partition(
         owner[*cell] = rank as u32;
     }
     Ok(owner)
+}
+
+/// Multiply the estimated numbers of bonds of the occupied cells by the measured time per estimated bond of
+/// the rank that has the cell at present.
+fn share_times(bonds: &mut [f64], occupied: &[usize], loads: &CellLoads, ranks: usize) {
+    let rank_of = |cell: usize| loads.ranks[cell] as usize;
+    let mut times = vec![0.0; ranks];
+    let mut sums = vec![0.0; ranks];
+    for (bonds, cell) in bonds.iter().zip(occupied) {
+        times[rank_of(*cell)] += loads.costs[*cell] as f64;
+        sums[rank_of(*cell)] += bonds;
+    }
+    for (bonds, cell) in bonds.iter_mut().zip(occupied) {
+        *bonds *= times[rank_of(*cell)] / sums[rank_of(*cell)];
+    }
 }
 
 /// Renumber parts so that few points migrate. `current` receives the index of a cell in `part`, and returns
@@ -239,6 +256,33 @@ mod tests {
         let sizes = plate.sizes(&plate.partition(Some(&loads), 2), 2);
         let ratio = f64::from(sizes[1]) / f64::from(sizes[0]);
         assert!((1.5..3.5).contains(&ratio), "{sizes:?}");
+    }
+
+    /// Points in a dense region have more bonds, and therefore take more time. This time must not be counted in
+    /// addition to the number of bonds: if both ranks take the same time, nothing moves.
+    #[test]
+    fn dense_regions_count_once() {
+        let mut plate = Plate::new();
+        let dense = plate.points.clone().into_iter();
+        let dense = dense.filter(|point| point.position[0] < 50.0);
+        for (k, mut point) in dense.enumerate() {
+            point.id = 4000 + k as u64;
+            point.position[1] += 0.5;
+            plate.points.push(point);
+        }
+        plate.occupation = plate.cells.occupation(&threads::alone(), &plate.points);
+        let first = plate.partition(None, 2);
+        let sizes = plate.sizes(&first, 2);
+        assert!(sizes[0].abs_diff(sizes[1]) > 500, "{sizes:?}");
+        let mut loads = plate.cells.loads(&threads::alone(), &plate.points, 1);
+        for (k, owner) in first.iter().enumerate() {
+            loads.ranks[k] = f64::from(*owner);
+            // Each rank takes 10 ms.
+            loads.costs[k] *= 10_000_000 / u64::from(sizes[*owner as usize]);
+        }
+        let second = plate.partition(Some(&loads), 2);
+        let moved = first.iter().zip(&second).filter(|(a, b)| a != b).count();
+        assert!(moved < first.len() / 20, "{moved} of {} cells", first.len());
     }
 
     #[test]
