@@ -192,9 +192,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 }
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
-/// faces normal to this axis. The sides of a prism or polygon are bounded by the smallest and the largest
-/// coordinate of the corners. A union has the lowest and the highest of the faces of its parts, and no flat
-/// faces if a part has none. A difference has the faces of its first part.
+/// faces normal to this axis. For the sides of a prism or polygon, even if they are slanted, these are the
+/// smallest and the largest coordinate of the corners. A union has the lowest and the highest of the faces of
+/// its parts, and no flat faces if a part has none. A difference has the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),

@@ -176,7 +176,7 @@ impl Section<'_> {
             let value = match constant {
                 Constant::Poisson => {
                     self.scope
-                        .within(number, &key, -1.0..0.5, "between -1 and 0.5")
+                        .within(number, &key, -1.0..0.5, "above -1 and below 0.5")
                 }
                 Constant::Lame => self.scope.number(number, &key),
                 Constant::Young | Constant::Bulk | Constant::Shear => {

@@ -2,7 +2,7 @@
 
 use crate::points::distance_squared;
 
-/// An offset of a lattice: one bond of every point whose family is complete.
+/// An offset of a lattice. Every point with a complete family has one bond with this reference vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
     /// ξ, m.

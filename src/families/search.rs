@@ -30,8 +30,8 @@ pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }
 
-/// The points of a domain, sorted by block, then by global id. The search returns indices into this order. If
-/// these indices are sorted, the neighbours are sorted by id.
+/// The points of a domain, sorted by block, then by global id. The search returns indices into this order,
+/// for one block of neighbours at a time. Sorting these indices therefore sorts the neighbours by id.
 struct Order {
     /// Local index of the point at each position in this order.
     local: Vec<u32>,

@@ -5,8 +5,8 @@ use super::translation::Translation;
 use super::tree::Node;
 use crate::error::Result;
 
-/// Largest cosine of the angle between bottom unit vector and normal at which the two count as perpendicular,
-/// and largest sine at which they count as parallel.
+/// Tolerance for the angle between the `Bottom Unit Vector` and the `Normal` of a rectangle. The two vectors
+/// count as perpendicular up to this cosine of the angle, and as parallel up to this sine.
 const SLANT: f64 = 1e-9;
 
 /// Write a pre-crack for each bond filter of a table.

@@ -205,12 +205,12 @@ impl Log {
         self.whole.borrow_mut().insert(table.id);
     }
 
-    /// Log that the new deck has the same meaning as a node.
+    /// Log that the new deck expresses a key (`node`) without a change of meaning.
     pub(super) fn taken(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Taken, note);
     }
 
-    /// Log that the new deck has a meaning similar to that of a node.
+    /// Log that the new deck expresses a key (`node`) with a similar meaning.
     pub(super) fn approximated(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Approximated, note);
     }
@@ -283,7 +283,7 @@ fn reason(key: &str) -> &'static str {
     known.map_or("unknown, or without a counterpart", |(_, reason)| reason)
 }
 
-/// Return the value of a node for the list of keys.
+/// Return the value of a node as text, for the printed list of keys.
 fn value(node: &Node) -> String {
     match &node.content {
         Content::Text(text) => shown(text),

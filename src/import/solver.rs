@@ -75,8 +75,8 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
 /// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
-/// If `node` has no solver that this module reads, the end is missing or not after the start, a value is not
-/// a number, or the numbers of `Time Steps` do not rise.
+/// If `node` has no solver that this module reads, if the end is missing or not after the start, if a value
+/// is not a number, or if the numbers of `Time Steps` do not rise.
 pub fn stage(
     translation: &Translation,
     node: &Node,

@@ -69,8 +69,8 @@ impl Lanes {
         self.map(libm::exp)
     }
 
-    /// Power with the same exponent in all lanes. A function that gives the same result on every processor is
-    /// called for each lane.
+    /// Power with the same exponent in all lanes. Calls `libm::pow` for each lane, because it gives the same
+    /// result on every processor.
     #[inline(always)]
     pub fn pow(self, exponent: f64) -> Self {
         self.map(|base| libm::pow(base, exponent))

@@ -90,7 +90,7 @@ impl Declaration {
         self.own_critical_stretch.is_some()
     }
 
-    /// Test whether the law exists in this dimension, with the defaults of its keys.
+    /// Test whether the law exists in this dimension if its keys have their defaults.
     pub fn is_for(&self, dimension: Dimension) -> bool {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }

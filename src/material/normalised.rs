@@ -34,7 +34,7 @@ pub struct Normalised {
 
 const FORM: Key = Key {
     name: "form",
-    meaning: "what is normalised: the energy of w = c s²|ξ|/2, or that of c s²/2 as printed by Diehl & \
+    meaning: "bond energy w whose sum over the family is normalised: c s²|ξ|/2, or c s²/2 as printed by Diehl & \
               Schweitzer (2016)",
     kind: Kind::Word(&[
         Word::new("energy"),

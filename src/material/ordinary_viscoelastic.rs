@@ -132,11 +132,11 @@ impl Relaxation {
     fn relaxed(&self, step: f64) -> [f64; 2] {
         let x = step / self.time;
         if x < 1e-3 {
-            // Series of (1 − e^−x)/x. The exponential function would take a sixth of the time of a step, and
-            // 1 − (1 − e^−x)/x would lose digits.
-            let lost =
+            // Series of 1 − (1 − e^−x)/x, which avoids cancellation. It also avoids the exponential function,
+            // which would take a sixth of the time of a step.
+            let beta =
                 x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0))));
-            [x - x * lost, lost]
+            [x - x * beta, beta]
         } else {
             let gone = -libm::expm1(-x);
             [gone, 1.0 - gone / x]

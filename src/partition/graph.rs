@@ -20,15 +20,15 @@ pub const NO_OWNER: u32 = u32::MAX;
 /// parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If there are
-/// at most as many cells with points as ranks, each of these cells gets its own rank.
+/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If the
+/// number of cells with points is at most the number of ranks, each of these cells gets its own rank.
 ///
 /// - `occupation` is the number of points in each cell.
 /// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
 ///   edge is proportional to the estimated number of bonds across it, multiplied by `ALONG_X` if its cells
 ///   differ along x.
-/// - With measured loads, the weight of a cell is its share of the time of its rank, in proportion to the
-///   estimated number of bonds. Parts are numbered so that few points migrate.
+/// - With measured loads, this weight is multiplied by the measured time per estimated bond of the rank that
+///   has the cell at present. Parts are numbered so that few points migrate.
 ///
 /// # Errors
 /// If METIS fails.
@@ -75,7 +75,7 @@ pub fn partition(
         starts.push(neighbours.len() as metis::Idx);
     }
     if let Some(loads) = loads {
-        share_times(&mut bonds, &occupied, loads, ranks);
+        weight_by_time(&mut bonds, &occupied, loads, ranks);
     }
     let vertex_weights = to_integers(&bonds);
     let edge_weights = to_integers(&bonds_across);
@@ -105,7 +105,7 @@ pub fn partition(
 
 /// Multiply the estimated numbers of bonds of the occupied cells by the measured time per estimated bond of
 /// the rank that has the cell at present.
-fn share_times(bonds: &mut [f64], occupied: &[usize], loads: &CellLoads, ranks: usize) {
+fn weight_by_time(bonds: &mut [f64], occupied: &[usize], loads: &CellLoads, ranks: usize) {
     let rank_of = |cell: usize| loads.ranks[cell] as usize;
     let mut times = vec![0.0; ranks];
     let mut sums = vec![0.0; ranks];
@@ -258,8 +258,8 @@ mod tests {
         assert!((1.5..3.5).contains(&ratio), "{sizes:?}");
     }
 
-    /// Points in a dense region have more bonds, and therefore take more time. This time must not be counted in
-    /// addition to the number of bonds: if both ranks take the same time, nothing moves.
+    /// Points in a dense region have more bonds, and therefore take more time. The weights must not count both
+    /// this time and the bonds: if both ranks take the same time, nothing moves.
     #[test]
     fn dense_regions_count_once() {
         let mut plate = Plate::new();

@@ -83,7 +83,8 @@ pub fn draw(
 struct Root {
     /// Pixel of the middle of the arrow.
     place: [f64; 2],
-    /// Vector from the tail to the tip of the arrow, to the right and down, in pixels.
+    /// Vector from the tail to the tip of the arrow, in pixels. Components are positive to the right and
+    /// downwards.
     arrow: [f64; 2],
     /// The vector is longer than the vector that the longest arrow represents, so the arrow is cut.
     is_cut: bool,

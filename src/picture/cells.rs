@@ -1,7 +1,7 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
-//! These cells are the Voronoi cells of the points. The volume of a point determines the distance from the
-//! point at which its cell ends, so borders, holes and open cracks of a body stay visible. At pixels with
+//! These cells are the Voronoi cells of the points. A cell ends at a distance from its point that depends
+//! on the volume of the point, so borders, holes and open cracks of a body stay visible. At pixels with
 //! points on all sides, cells extend farther to close gaps. In a slice, the plane of the slice cuts the
 //! Voronoi cells of the points in space.
 

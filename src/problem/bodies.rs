@@ -270,7 +270,7 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The mean of the stress measures of the bond's two points.
+    /// The mean of the stress measures of the ends that act on the bond and whose points carry stress.
     Stress(StressRule),
 }
 

@@ -63,8 +63,8 @@ pub struct Stage {
 pub enum Method {
     /// Integration of the equation of motion with velocity Verlet.
     Explicit,
-    /// One equilibrium per load step, by relaxation. The time t is the load parameter, and [`Time::step`] is
-    /// not used.
+    /// At least one equilibrium per load step, by relaxation; more if bonds break. The time t is the load
+    /// parameter, and [`Time::step`] is not used.
     Relaxation(Relaxation),
     /// Same as [`Method::Relaxation`], by Newton's method.
     Static(Static),

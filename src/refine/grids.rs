@@ -294,8 +294,8 @@ impl<'a> Grids<'a> {
         points.map(unrefined).collect()
     }
 
-    /// The points in the cells of `coarse`, which are level-0 points without refinement. The result begins
-    /// with these points, with updated volumes and blocks; finer points follow.
+    /// The points in the cells of `coarse`, the level-0 points as they are without refinement. The result
+    /// begins with these points, with updated volumes and blocks; finer points follow.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
         let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
             let grid = grid.as_ref()?;

@@ -162,7 +162,8 @@ impl Cost {
     }
 }
 
-/// Return the bytes of bond history that a body stores for each end of a bond: both histories of the bond.
+/// Return the bytes of bond history that a body stores at each end of a bond. Each end stores the histories
+/// of both ends.
 fn history_bytes(problem: &Problem, body: &Body) -> f64 {
     let law = block_laws(problem, &Block::unrefined(body)).law;
     let numbers = match problem.dimension.count() {

@@ -1,4 +1,5 @@
-//! Stiffness of bars with few points across, in tension, bending and torsion, compared with beam theory.
+//! Stiffness of bars with few points across, in tension, bending and torsion, compared with beam theory, and
+//! stable steps with surface corrections.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
@@ -142,8 +143,8 @@ fn surface_corrections_of_bars() {
     }
 }
 
-/// With a surface correction, the stable step of a bar is limited by its edges and corners. Before, the bound
-/// did not depend on the directions of the bonds, and the ratios were 0.52 and 0.24.
+/// With a surface correction, the edges and corners of a block limit its stable step. A bound that does not
+/// depend on the directions of the bonds would give ratios of 0.52 and 0.24.
 #[test]
 fn stable_steps_with_surface_corrections() {
     let stable_step = |law: &str, correction: &str| {
@@ -151,7 +152,7 @@ fn stable_steps_with_surface_corrections() {
             "dimension = '3d'
             grid = {{ spacing = 1, horizon = 3.015 }}
             material.solid.{law} = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, surface_correction = '{correction}' }}
-            body.bar = {{ material = 'solid', shape.box = {{ lower = [0, 0, 0], upper = [12, 10, 10] }} }}
+            body.block = {{ material = 'solid', shape.box = {{ lower = [0, 0, 0], upper = [12, 10, 10] }} }}
             time.end = 1
             "
         );

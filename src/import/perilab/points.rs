@@ -26,8 +26,8 @@ pub(super) enum MeshBlocks {
 }
 
 impl MeshBlocks {
-    /// Return the prefix that the new deck needs before the name of a node set of the mesh: the kind of the
-    /// groups that PeriLab uses as node sets, or an empty text.
+    /// Return the prefix that the new deck needs before the name of a node set of the mesh: `element set `
+    /// for Abaqus meshes, whose element sets PeriLab uses as node sets; otherwise an empty text.
     pub(super) fn prefix_of_sets(&self) -> &'static str {
         match self {
             Self::Sets(_) => "element set ",

@@ -81,7 +81,7 @@ fn pair_damage_is_possible(
     }
     if damage.rule.is_unmeasured() {
         let message =
-            "`calibration = \"opening\"` is measured on a block of one body; take \"energy\"";
+            "`calibration = \"opening\"` is not available for a pair of bodies; use \"energy\"";
         return error(message.to_owned());
     }
     let bodies = problem.bodies.iter().filter(|body| pair.has(body));

@@ -65,7 +65,8 @@ impl<const D: usize> Broken<D> {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Changes by the bonds that broke in the last [evaluation](Self::evaluate), by ascending point.
+    /// Return the changes that the bonds that broke in the last [evaluation](Self::evaluate) cause at their
+    /// points, in ascending order of the points.
     pub fn broken(&self) -> &[Broken<D>] {
         &self.broken
     }

@@ -261,7 +261,8 @@ impl<const D: usize> Forces<D> {
         (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
     }
 
-    /// Set the thresholds of the points. Called only if no threshold follows the smallest stretch.
+    /// Set the thresholds of the points. Called only if no threshold depends on the smallest stretch
+    /// of a family (α = 0 in all damage laws).
     /// Collective.
     fn set_thresholds(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let Self {

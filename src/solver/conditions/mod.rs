@@ -537,8 +537,8 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Set the velocities of supported points, and compute the reactions. Returns whether these velocities
-    /// and reactions are finite.
+    /// Set the supported components of the velocities, and compute the reactions. Returns whether these
+    /// velocities and reactions are finite.
     pub fn apply_velocities(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
@@ -547,8 +547,8 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Set the velocities of supported points to 0, and compute the reactions that keep these points at rest.
-    /// Returns whether the reactions are finite.
+    /// Set the supported components of the velocities to 0, and compute the reactions that keep the points at
+    /// rest in these components. Returns whether the reactions are finite.
     pub fn project_residual(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {

@@ -68,8 +68,8 @@ pub struct Contact<const D: usize> {
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
-    /// Owned points that touch a rigid body or will do so within the look-ahead, at the last evaluation and
-    /// at the evaluation before that.
+    /// Two lists, found at the last evaluation and at the evaluation before it: the owned points that touched
+    /// a rigid body or were going to touch one within the look-ahead.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
     /// Owned points that may touch another point to which no intact bond joins them.

@@ -61,8 +61,8 @@ pub(super) struct RigidBody {
     /// Inertia tensor in the body's axes (kg m²), and its inverse.
     inertia: [Matrix3<f64>; 2],
     response: Response,
-    /// Stiffness of the contact layer by block: modulus times out-of-plane measure over thickness (N/m³ in
-    /// 3-D).
+    /// Stiffness of the contact layer by block: modulus times out-of-plane measure, divided by the
+    /// depth of the layer (N/m³ in 3-D).
     layers: Vec<f64>,
 }
 
@@ -195,7 +195,7 @@ impl RigidBody {
         }
     }
 
-    /// Move a driven body to its position at a time (s) without velocity, for the next load step.
+    /// Move a driven body to its position at a time (s), and set its velocity to 0, for the next load step.
     pub fn place(&mut self, time: f64) {
         if let RigidMotion::Driven(displacement) = &self.problem.motion {
             let moved = Self::values(displacement, time);

@@ -69,7 +69,8 @@ pub struct Energies {
     pub strain: f64,
     /// Energy released by broken bonds.
     pub fracture: f64,
-    /// Part of the fracture energy above the criterion of the bonds when they broke.
+    /// Overshoot energy, a part of `fracture`: the energies of the broken bonds when they broke, minus the
+    /// energies at which they met their criterion.
     pub overshoot: f64,
     /// Kinetic energy of rigid bodies.
     pub rigid: f64,

@@ -55,8 +55,8 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
         if places.product::<f64>() > MOST_PLACES {
             let spacings = block.horizon / edges[0];
             let message = format!(
-                "[grid] horizon: is {spacings:.4e} spacings of level {}, too many for a refined grid; check that the \
-                 horizon is in metres",
+                "[grid] horizon: the horizon of level {} would be {spacings:.4e} spacings, too many for a refined \
+                 grid; check that `horizon` is in metres",
                 block.level
             );
             return Err(Error::input(message).at(&problem.places.horizon));
