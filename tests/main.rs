@@ -27,6 +27,7 @@ mod laws {
     mod correspondence;
     mod correspondence_plastic;
     mod declarations;
+    mod directional_correction;
     mod elasticity;
     mod fatigue;
     mod interfaces;

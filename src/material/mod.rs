@@ -19,6 +19,7 @@ pub mod bond;
 mod correspondence;
 mod declaration;
 mod elastic_plastic_pmb;
+mod ellipsoid;
 mod fatigue_pmb;
 mod force_state;
 mod influence;
@@ -28,14 +29,14 @@ mod normalised;
 mod ordinary;
 mod ordinary_plastic;
 mod ordinary_viscoelastic;
-mod pals;
 mod plastic_state;
 mod pmb;
+mod position_aware;
 mod registration;
 pub mod rotation;
 mod softening_pmb;
+mod surface_pmb;
 mod symmetric;
-mod tensor_pmb;
 
 pub use any::{AnyHistory, AnyPoint, Counts, MOST};
 pub use bond::Bond;
@@ -57,14 +58,18 @@ registration::register! {
     softening_pmb::SofteningPmb,
     fatigue_pmb::FatiguePmb,
     normalised::Normalised,
-    tensor_pmb::TensorPmb,
+    surface_pmb::TensorPmb,
+    surface_pmb::DirectionalPmb,
     linear_microelastic::LinearMicroelastic,
     ordinary::Ordinary,
-    pals::Pals,
+    position_aware::Pals,
+    position_aware::DirectionalOrdinary,
     ordinary_plastic::OrdinaryPlastic,
-    pals::PalsPlastic,
+    position_aware::PalsPlastic,
+    position_aware::DirectionalPlastic,
     ordinary_viscoelastic::OrdinaryViscoelastic,
-    pals::PalsViscoelastic,
+    position_aware::PalsViscoelastic,
+    position_aware::DirectionalViscoelastic,
     correspondence::Correspondence,
     correspondence::BondAssociated,
 }

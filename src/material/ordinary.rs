@@ -19,8 +19,8 @@
 
 use super::bond::Weights;
 use super::{
-    Along, AnyLaw, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law,
-    Pals, PlasticState, Property, Word,
+    Along, AnyLaw, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary, Given,
+    Influence, Key, Kind, Law, Pals, PlasticState, Property, Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -138,9 +138,13 @@ pub(super) const INFLUENCE: Key = Key {
 
 pub(super) const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
-    meaning: "what each point's own family corrects: nothing, or the influence functions of the dilatation and of the \
-              deviatoric energy",
-    kind: Kind::Word(&[Word::new("none"), Word::new("pals")]),
+    meaning: "surface correction of the dilatation and of the deviatoric energy of each point, from its own family: \
+              none, by extensions along the axes, or the position-aware linear solid",
+    kind: Kind::Word(&[
+        Word::new("none"),
+        Word::new("directional"),
+        Word::new("pals"),
+    ]),
 };
 
 impl Declared for Ordinary {
@@ -158,6 +162,7 @@ impl Declared for Ordinary {
             "poisson_ratio = -0.3, influence = 'inverse'",
             "poisson_ratio = 0.3, surface_correction = 'pals'",
             "poisson_ratio = 0.4, surface_correction = 'pals', influence = 'linear'",
+            "poisson_ratio = 0.3, surface_correction = 'directional'",
         ],
         ..Declaration::new(
             "ordinary",
@@ -169,8 +174,9 @@ impl Declared for Ordinary {
 
 fn build(given: &Given) -> Built {
     match given.values.word(SURFACE_CORRECTION.name) {
+        "none" => with_influence(Ordinary::of(given, influence(given)), given),
         "pals" => with_influence(Pals::of(given, influence(given)), given),
-        _ => with_influence(Ordinary::of(given, influence(given)), given),
+        _ => with_influence(DirectionalOrdinary::of(given, influence(given)), given),
     }
 }
 

@@ -28,8 +28,9 @@
 
 use super::ordinary::{Ordinary, SURFACE_CORRECTION, eased_force};
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind,
-    Law, LawFault, Pals, PalsPlastic, PlasticState, Property, Values, Word,
+    Along, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary, DirectionalPlastic,
+    Given, Influence, Invariants, Key, Kind, Law, LawFault, Pals, PalsPlastic, PlasticState,
+    Property, Values, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::{IsaSet, Lanes};
@@ -74,6 +75,7 @@ impl Declared for OrdinaryPlastic {
             "poisson_ratio = 0.3, yield_stress = 0.3",
             "poisson_ratio = 0.2, yield_stress = 0.4, calibration = 'continuum'",
             "poisson_ratio = 0.4, yield_stress = 0.3, surface_correction = 'pals'",
+            "poisson_ratio = 0.3, yield_stress = 0.3, surface_correction = 'directional'",
         ],
         ..Declaration::new(
             "ordinary_plastic",
@@ -85,11 +87,21 @@ impl Declared for OrdinaryPlastic {
 
 fn build(given: &Given) -> Built {
     let stress = given.values.number(YIELD_STRESS.name);
-    if given.values.word(SURFACE_CORRECTION.name) == "pals" {
-        let elastic = Pals::of(given, Influence::Constant);
-        let shear = given.elastic.shear_modulus();
-        return Built::plain(PalsPlastic::new(elastic, stress, shear));
+    let shear = given.elastic.shear_modulus();
+    match given.values.word(SURFACE_CORRECTION.name) {
+        "none" => without_correction(given, stress),
+        "pals" => {
+            let elastic = Pals::of(given, Influence::Constant);
+            Built::plain(PalsPlastic::new(elastic, stress, shear))
+        }
+        _ => {
+            let elastic = DirectionalOrdinary::of(given, Influence::Constant);
+            Built::plain(DirectionalPlastic::new(elastic, stress, shear))
+        }
     }
+}
+
+fn without_correction(given: &Given, stress: f64) -> Built {
     let factor = match given.dimension {
         Dimension::Space => 2.5,
         _ => 4.0 / 3.0,
@@ -109,7 +121,7 @@ fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     let is_corrected = values.word(SURFACE_CORRECTION.name) != "none";
     (is_corrected && values.word(CALIBRATION.name) != "family").then(|| LawFault {
         key: Some(CALIBRATION.name),
-        message: "with `surface_correction = \"pals\"`, the yield limit is always that of each point's own family; \
+        message: "with a `surface_correction`, the yield limit is always that of each point's own family; \
                   use \"family\""
             .to_owned(),
     })

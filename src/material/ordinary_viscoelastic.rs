@@ -18,8 +18,9 @@ use super::ordinary::{
     INFLUENCE, Ordinary, SURFACE_CORRECTION, eased_force, influence, with_influence,
 };
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Pals,
-    PalsViscoelastic, PlasticState, Property,
+    Along, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary,
+    DirectionalViscoelastic, Given, Invariants, Key, Kind, Law, Pals, PalsViscoelastic,
+    PlasticState, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
@@ -66,6 +67,7 @@ impl Declared for OrdinaryViscoelastic {
         examples: &[
             "poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.4",
             "poisson_ratio = 0.2, relaxation_time = 0.05, relaxing_share = 0.6, surface_correction = 'pals'",
+            "poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.5, surface_correction = 'directional'",
         ],
         ..Declaration::new(
             "ordinary_viscoelastic",
@@ -82,17 +84,21 @@ fn build(given: &Given) -> Built {
     };
     let influence = influence(given);
     match given.values.word(SURFACE_CORRECTION.name) {
-        "pals" => {
-            let elastic = Pals::of(given, influence);
-            with_influence(PalsViscoelastic::new(elastic, relaxation), given)
-        }
-        _ => {
+        "none" => {
             let elastic = Ordinary::of(given, influence);
             let law = OrdinaryViscoelastic {
                 elastic,
                 relaxation,
             };
             with_influence(law, given)
+        }
+        "pals" => {
+            let elastic = Pals::of(given, influence);
+            with_influence(PalsViscoelastic::new(elastic, relaxation), given)
+        }
+        _ => {
+            let elastic = DirectionalOrdinary::of(given, influence);
+            with_influence(DirectionalViscoelastic::new(elastic, relaxation), given)
         }
     }
 }

@@ -10,8 +10,8 @@ use std::f64::consts::PI;
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised,
-    Property, TensorPmb, Word,
+    Along, Bond, Built, Declaration, Declared, Described, DirectionalPmb, Given, Key, Kind, Law,
+    Normalised, Property, TensorPmb, Word,
 };
 use crate::dimension::{Constraint, Dimension};
 use crate::lanes::{Lanes, Simd};
@@ -79,8 +79,13 @@ impl Pmb {
 const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
     meaning: "surface correction of the micromodulus of each point, from its own family: none, \
-              by strain energy, or by elastic tensor",
-    kind: Kind::Word(&[Word::new("none"), Word::new("energy"), Word::new("tensor")]),
+              by strain energy, by strain energies along the axes, or by elastic tensor",
+    kind: Kind::Word(&[
+        Word::new("none"),
+        Word::new("energy"),
+        Word::new("directional"),
+        Word::new("tensor"),
+    ]),
 };
 
 impl Declared for Pmb {
@@ -93,6 +98,7 @@ impl Declared for Pmb {
             examples: &[
                 "",
                 "surface_correction = 'energy'",
+                "surface_correction = 'directional'",
                 "surface_correction = 'tensor'",
             ],
             ..Declaration::new("pmb", "prototype microelastic, f = c s e", build)
@@ -106,9 +112,12 @@ impl Declared for Pmb {
 
 fn build(given: &Given) -> Built {
     match given.values.word(SURFACE_CORRECTION.name) {
+        "none" => Built::plain(Pmb::of(given)),
+        // In 1-D all corrections are equal.
         "energy" => Built::plain(Normalised::classical(given)),
+        _ if given.dimension.count() == 1 => Built::plain(Normalised::classical(given)),
         "tensor" => Built::plain(TensorPmb::of(given)),
-        _ => Built::plain(Pmb::of(given)),
+        _ => Built::plain(DirectionalPmb::of(given)),
     }
 }
 

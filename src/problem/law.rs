@@ -254,7 +254,7 @@ mod tests {
         );
         assert_eq!(
             error(law("pmb").with("surface_correction", 0.1)),
-            "law `pmb`, surface_correction: must be \"none\", \"energy\" or \"tensor\", is 0.1"
+            "law `pmb`, surface_correction: must be \"none\", \"energy\", \"directional\" or \"tensor\", is 0.1"
         );
         assert_eq!(
             error(law("normalised_pmb").with("form", "energi")),

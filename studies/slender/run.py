@@ -27,8 +27,10 @@ from common import history, run  # noqa: E402
 LAWS = {
     "`pmb`, `\"none\"`": "pmb = { surface_correction = 'none', ",
     "`pmb`, `\"energy\"`": "pmb = { surface_correction = 'energy', ",
+    "`pmb`, `\"directional\"`": "pmb = { surface_correction = 'directional', ",
     "`pmb`, `\"tensor\"`": "pmb = { surface_correction = 'tensor', ",
     "`ordinary`, `\"none\"`": "ordinary = { surface_correction = 'none', ",
+    "`ordinary`, `\"directional\"`": "ordinary = { surface_correction = 'directional', ",
     "`ordinary`, `\"pals\"`": "ordinary = { surface_correction = 'pals', ",
     "`correspondence`": "correspondence = { ",
 }

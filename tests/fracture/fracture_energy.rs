@@ -734,7 +734,9 @@ fn between_bodies_of_different_horizons_by_stretch() {
         (pmb.to_owned(), "critical_stretch"),
         (pmb.to_owned(), "critical_stretch alpha = 0.25"),
         (tensor.to_owned(), "critical_stretch"),
+        (tensor.replace("tensor", "directional"), "critical_stretch"),
         (pals.to_owned(), "critical_stretch"),
+        (pals.replace("pals", "directional"), "critical_stretch"),
         (ordinary(0.3, "constant"), "critical_stretch"),
     ] {
         let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule, 0.5));

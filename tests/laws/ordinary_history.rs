@@ -81,11 +81,11 @@ fn stress_relaxes_as_that_of_a_standard_linear_solid() {
              relaxation_time = {time}, relaxing_share = {share}, surface_correction = '{correction}' }}"
         )
     };
-    fn check<const D: usize>(mut simulation: Simulation<D>, time: f64, share: f64, gamma: f64) {
+    fn check<const D: usize>(mut simulation: Simulation<D>, [time, share, gamma, bound]: [f64; 4]) {
         // The shear is applied suddenly and then held.
         shear(&mut simulation, gamma, 0.0);
         let [first, held, _] = centre(&mut simulation);
-        assert!((first / (SHEAR * gamma) - 1.0).abs() < 0.01, "{first}");
+        assert!((first / (SHEAR * gamma) - 1.0).abs() < bound, "{first}");
         for step in 1..=40 {
             shear(&mut simulation, gamma, 0.05);
             let [stress, energy, dissipated] = centre(&mut simulation);
@@ -108,11 +108,13 @@ fn stress_relaxes_as_that_of_a_standard_linear_solid() {
             );
         }
     }
-    for law in ["none", "pals"].map(law) {
+    // On a lattice, the shear modulus differs from that of the solid.
+    for (correction, bound) in [("none", 0.01), ("directional", 0.015), ("pals", 0.01)] {
+        let (law, numbers) = (law(correction), [time, share, gamma, bound]);
         for dimension in ["plane-strain", "plane-stress"] {
-            simulate::<2, _>(&deck(dimension, &law), |s| check(s, time, share, gamma));
+            simulate::<2, _>(&deck(dimension, &law), |s| check(s, numbers));
         }
-        simulate::<3, _>(&deck("3d", &law), |s| check(s, time, share, gamma));
+        simulate::<3, _>(&deck("3d", &law), |s| check(s, numbers));
     }
 }
 
@@ -242,13 +244,18 @@ struct Way {
 
 #[test]
 fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
-    fn check<const D: usize>(mut simulation: Simulation<D>, way: &Way, strength: f64, bound: f64) {
+    fn check<const D: usize>(
+        mut simulation: Simulation<D>,
+        way: &Way,
+        strength: f64,
+        [of_modulus, bound]: [f64; 2],
+    ) {
         let limit = strength * way.limit;
-        // The modulus of the lattice, which equals the modulus of the solid within 1 %.
+        // The modulus of the lattice differs from the modulus of the solid.
         strain(&mut simulation, 1e-3 * limit, way.over, 0.0);
         let modulus = (way.stress)(&whole_centre(&mut simulation).0) / (1e-3 * limit);
         let error = (modulus / way.modulus - 1.0).abs();
-        assert!(error < 0.01, "{modulus} for {}", way.modulus);
+        assert!(error < of_modulus, "{modulus} for {}", way.modulus);
         let yields = limit / modulus;
         let (mut plastic, mut wanted, mut before) = (0.0_f64, 0.0, 0.0);
         let mut now = 0.0;
@@ -309,19 +316,20 @@ fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
         )
     };
     // The weighted volume of the lattice differs from the weighted volume of a ball by some per cent.
-    for (more, bound) in [
-        ("", 0.01),
-        (", calibration = 'continuum'", 0.05),
-        (", surface_correction = 'pals'", 0.01),
+    for (more, bounds) in [
+        ("", [0.01, 0.01]),
+        (", calibration = 'continuum'", [0.01, 0.05]),
+        (", surface_correction = 'directional'", [0.015, 0.02]),
+        (", surface_correction = 'pals'", [0.01, 0.01]),
     ] {
         let law = law(more);
         for way in [&shear, &pull_in_the_plane] {
             for dimension in ["plane-strain", "plane-stress"] {
-                simulate::<2, _>(&deck(dimension, &law), |s| check(s, way, strength, bound));
+                simulate::<2, _>(&deck(dimension, &law), |s| check(s, way, strength, bounds));
             }
         }
         for way in [&shear, &pull] {
-            simulate::<3, _>(&deck("3d", &law), |s| check(s, way, strength, bound));
+            simulate::<3, _>(&deck("3d", &law), |s| check(s, way, strength, bounds));
         }
     }
 }

@@ -123,6 +123,8 @@ fn surface_corrections_of_bars() {
     for (law, correction, across, wanted) in [
         ("pmb", "none", 4, [0.71, 0.50]),
         ("pmb", "energy", 4, [1.45, 1.12]),
+        ("pmb", "directional", 4, [1.12, 0.86]),
+        ("pmb", "directional", 6, [1.08, 0.96]),
         ("pmb", "tensor", 4, [1.01, 0.80]),
         ("pmb", "tensor", 6, [1.02, 0.90]),
         ("ordinary", "none", 4, [1.47, 1.09]),
@@ -160,7 +162,12 @@ fn stable_steps_with_surface_corrections() {
             simulation.undeformed.stable_step
         })
     };
-    for (law, correction, least) in [("pmb", "tensor", 0.88), ("ordinary", "pals", 0.28)] {
+    for (law, correction, least) in [
+        ("pmb", "directional", 0.8),
+        ("pmb", "tensor", 0.88),
+        ("ordinary", "directional", 0.7),
+        ("ordinary", "pals", 0.28),
+    ] {
         let ratio = stable_step(law, correction) / stable_step(law, "none");
         assert!((least..1.0).contains(&ratio), "{law}: {ratio}");
     }

@@ -493,6 +493,8 @@ fn blocks_of_the_ordinary_law() {
 fn blocks_of_the_position_aware_law() {
     let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, surface_correction = 'pals' }";
     same_with_either_family("pals", &with_one_law(law));
+    let directional = law.replace("pals", "directional");
+    same_with_either_family("directional", &with_one_law(&directional));
 }
 
 #[test]

@@ -159,6 +159,9 @@ fn position_aware_bonds() {
     let grid = "horizon = 3\nvolume_correction = 'exact'";
     compare::<3>(&deck(SOLID, "ordinary", ratio, grid, "0"));
     compare::<2>(&deck(PLANE, "ordinary", ratio, grid, "0.25"));
+    let ratio = ratio.replace("pals", "directional");
+    compare::<3>(&deck(SOLID, "ordinary", &ratio, grid, "0"));
+    compare::<2>(&deck(PLANE, "ordinary", &ratio, grid, "0.25"));
 }
 
 #[test]

@@ -216,6 +216,9 @@ fn the_step_of_every_law_is_within_the_limit() {
         "linear_microelastic = { density = 2, youngs_modulus = 5 }".to_owned(),
         "linear_microelastic = { density = 2, youngs_modulus = 5, lambda = '5*exp(-r)' }".to_owned(),
         "proportional = { density = 2, youngs_modulus = 5, surface_correction = 'tensor' }".to_owned(),
+        "proportional = { density = 2, youngs_modulus = 5, surface_correction = 'directional' }".to_owned(),
+        "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4, surface_correction = 'directional' }"
+            .to_owned(),
         "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4, surface_correction = 'pals' }"
             .to_owned(),
         "ordinary_viscoelastic = { density = 2, youngs_modulus = 5, poisson_ratio = 0.1, surface_correction = 'pals', relaxation_time = 1e9, relaxing_share = 0.5 }"

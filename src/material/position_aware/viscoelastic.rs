@@ -1,6 +1,6 @@
-//! Standard linear solid with the influence functions of [`Pals`]: the deviatoric part of the force relaxes.
+//! Standard linear solid with the influence functions of [`PositionAware`]: the deviatoric part of the force relaxes.
 //!
-//! Each bond has a back extension e_b per end, which follows the deviatoric extension ε of [`Pals`]. With the
+//! Each bond has a back extension e_b per end, which follows the deviatoric extension ε of [`PositionAware`]. With the
 //! relaxing fraction λ ([`Relaxation`]),
 //!
 //! W = ½ k′θ² + ½ Σ σ (ε² + λ (e_b² − 2 ε e_b)) Ṽ,
@@ -8,22 +8,30 @@
 //! t = (k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ) ω|ξ| + σ (ε − λ e_b).
 
 use super::super::ordinary_viscoelastic::Relaxation;
+use super::directional::Directional;
+use super::nearest::Nearest;
 use super::{
-    Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, Pals,
-    PlasticState, Property, deviatoric,
+    Along, Bond, Declaration, Declared, Described, Form, Functions, Law, MONOMIALS, OTHERS,
+    PlasticState, PositionAware, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
+/// The law with a `surface_correction`.
+pub type PalsViscoelastic = PositionAwareViscoelastic<Nearest>;
+
+/// The law with `surface_correction = "directional"`.
+pub type DirectionalViscoelastic = PositionAwareViscoelastic<Directional>;
+
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PalsViscoelastic {
-    elastic: Pals,
+pub struct PositionAwareViscoelastic<F> {
+    elastic: PositionAware<F>,
     relaxation: Relaxation,
 }
 
-impl PalsViscoelastic {
+impl<F: Form> PositionAwareViscoelastic<F> {
     /// Create the law from its elastic law and its relaxation.
-    pub(in super::super) fn new(elastic: Pals, relaxation: Relaxation) -> Self {
+    pub(in super::super) fn new(elastic: PositionAware<F>, relaxation: Relaxation) -> Self {
         Self {
             elastic,
             relaxation,
@@ -31,12 +39,12 @@ impl PalsViscoelastic {
     }
 }
 
-/// No deck name: decks write `ordinary_viscoelastic` with `surface_correction = "pals"`.
-impl Declared for PalsViscoelastic {
+/// No deck name: decks write `ordinary_viscoelastic` with a `surface_correction`.
+impl<F: Form> Declared for PositionAwareViscoelastic<F> {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
 
-impl Described for PalsViscoelastic {
+impl<F: Form> Described for PositionAwareViscoelastic<F> {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
         facts.extend(self.relaxation.described());
@@ -44,8 +52,8 @@ impl Described for PalsViscoelastic {
     }
 }
 
-impl<const D: usize> Law<D> for PalsViscoelastic {
-    /// The numbers of [`Pals`], with k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) instead of k′θ − (1/d) Σ σ|ξ| ε Ṽ.
+impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
+    /// The numbers of [`PositionAware`], with k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) instead of k′θ − (1/d) Σ σ|ξ| ε Ṽ.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     /// e_b/|ξ|, ε/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];
@@ -71,7 +79,7 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
-    /// Pass 0: the sums of [`Pals`]. Pass 1: Σ σ|ξ| e_b Ṽ, Pa.
+    /// Pass 0: the sums of [`PositionAware`]. Pass 1: Σ σ|ξ| e_b Ṽ, Pa.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -82,7 +90,7 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
         if S == 0 {
             return self.elastic.pass_contribution::<0>(bond, point, &[]);
         }
-        let factor = deviatoric(bond, &point.0.1) * (bond.length * bond.length);
+        let factor = F::deviatoric(bond, &point.0.1) * (bond.length * bond.length);
         let nothing = Lanes::splat(0.0);
         [factor * *back, nothing, nothing]
     }
@@ -112,11 +120,11 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
     fn bond_history(
         &self,
         bond: &Bond<D>,
-        ((_, sigma), [_, _, even]): &Self::Point,
+        (functions, [_, _, even]): &Self::Point,
         history: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
-        let factor = deviatoric(bond, sigma) * (bond.length * bond.length);
+        let factor = F::deviatoric(bond, &functions.1) * (bond.length * bond.length);
         (self.relaxation).after(bond.stretch - *even, history, factor, step)
     }
 
@@ -135,12 +143,12 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        ((_, sigma), [_, _, even]): &Self::Point,
+        (functions, [_, _, even]): &Self::Point,
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
         let part = bond.stretch - *even;
         let square = part * part + self.relaxation.released(part, *back);
-        square * (bond.length * bond.length) * deviatoric(bond, sigma) * 0.5
+        square * (bond.length * bond.length) * F::deviatoric(bond, &functions.1) * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -162,7 +170,7 @@ impl<const D: usize> Law<D> for PalsViscoelastic {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        deviatoric(bond, &functions.1) * *ratio
+        F::deviatoric(bond, &functions.1) * *ratio
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
-//! Elastic–perfectly plastic solid with the influence functions of [`Pals`].
+//! Elastic–perfectly plastic solid with the influence functions of [`PositionAware`].
 //!
-//! Each bond has a plastic extension e_p per end. Energy and force are those of [`Pals`] at the elastic
+//! Each bond has a plastic extension e_p per end. Energy and force are those of [`PositionAware`] at the elastic
 //! extensions e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d Ṽ = 0:
 //!
 //! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
@@ -10,27 +10,39 @@
 //! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with
 //! r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore does not change θ.
 //!
-//! While all bonds are intact, ε_d is ε of [`Pals`]. If bonds are broken, ε = ε_d + c|ξ| with a number c of
+//! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a number c of
 //! the point. Flow then reduces the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ. Therefore 1 − r
 //! is limited to this value.
 
+use super::directional::Directional;
+use super::nearest::Nearest;
 use super::{
-    Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, Pals,
-    PlasticState, Property, deviatoric, quadratic_form,
+    Along, Bond, Declaration, Declared, Described, Form, Functions, Law, MONOMIALS, OTHERS,
+    PlasticState, PositionAware, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
+/// The law with a `surface_correction`.
+pub type PalsPlastic = PositionAwarePlastic<Nearest>;
+
+/// The law with `surface_correction = "directional"`.
+pub type DirectionalPlastic = PositionAwarePlastic<Directional>;
+
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PalsPlastic {
-    elastic: Pals,
+pub struct PositionAwarePlastic<F> {
+    elastic: PositionAware<F>,
     /// σ_y²/(3G), Pa.
     limit: f64,
 }
 
-impl PalsPlastic {
+impl<F: Form> PositionAwarePlastic<F> {
     /// Create the law from its elastic law, the yield stress (Pa) and the shear modulus (Pa).
-    pub(in super::super) fn new(elastic: Pals, yield_stress: f64, shear_modulus: f64) -> Self {
+    pub(in super::super) fn new(
+        elastic: PositionAware<F>,
+        yield_stress: f64,
+        shear_modulus: f64,
+    ) -> Self {
         Self {
             elastic,
             limit: yield_stress * yield_stress / (3.0 * shear_modulus),
@@ -38,12 +50,12 @@ impl PalsPlastic {
     }
 }
 
-/// No deck name: decks write `ordinary_plastic` with `surface_correction = "pals"`.
-impl Declared for PalsPlastic {
+/// No deck name: decks write `ordinary_plastic` with a `surface_correction`.
+impl<F: Form> Declared for PositionAwarePlastic<F> {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
 
-impl Described for PalsPlastic {
+impl<F: Form> Described for PositionAwarePlastic<F> {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
         facts.push(("yields", Property::Text("by each point's own family")));
@@ -59,8 +71,8 @@ fn elastic<const D: usize>(bond: &Bond<D>, plastic: Lanes) -> Bond<D> {
     bond
 }
 
-impl<const D: usize> Law<D> for PalsPlastic {
-    /// The numbers of [`Pals`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
+impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
+    /// The numbers of [`PositionAware`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
     type Point = (Functions<D>, [Lanes; OTHERS + 4]);
     /// e_p/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 2];
@@ -86,7 +98,7 @@ impl<const D: usize> Law<D> for PalsPlastic {
     }
 
     /// Pass 0: Σ ω|ξ| (e − e_p) Ṽ and Σ ω|ξ|² Ṽ. Pass 1: Σ σ ε_d² Ṽ and Σ σ|ξ| ε_d Ṽ, Pa. Pass 2: the sums of
-    /// [`Pals`] after the flow.
+    /// [`PositionAware`] after the flow.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -99,12 +111,12 @@ impl<const D: usize> Law<D> for PalsPlastic {
         let nothing = Lanes::splat(0.0);
         match S {
             0 => {
-                let weight = quadratic_form(&bond, &functions.0) * square;
+                let weight = F::dilatational(&bond, &functions.0) * square;
                 [weight * bond.stretch, weight, nothing]
             }
             1 => {
                 let part = bond.stretch - *mean;
-                let weighted = deviatoric(&bond, &functions.1) * square * part;
+                let weighted = F::deviatoric(&bond, &functions.1) * square * part;
                 [weighted * part, weighted, nothing]
             }
             _ => {
@@ -152,13 +164,13 @@ impl<const D: usize> Law<D> for PalsPlastic {
     fn bond_history(
         &self,
         bond: &Bond<D>,
-        ((_, sigma), [.., even, mean, shrunk]): &Self::Point,
+        (functions, [.., even, mean, shrunk]): &Self::Point,
         [plastic, loss]: &[Lanes; 2],
         _: f64,
     ) -> [Lanes; 2] {
         let stretch = bond.stretch - *plastic;
         let change = (stretch - *mean) * *shrunk;
-        let factor = deviatoric(bond, sigma) * (bond.length * bond.length);
+        let factor = F::deviatoric(bond, &functions.1) * (bond.length * bond.length);
         let taken = factor * (stretch - *even - change) * change;
         [*plastic + change, *loss + taken]
     }
@@ -204,6 +216,6 @@ impl<const D: usize> Law<D> for PalsPlastic {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        deviatoric(bond, &functions.1) * *ratio
+        F::deviatoric(bond, &functions.1) * *ratio
     }
 }

@@ -1,25 +1,14 @@
-//! Prototype microelastic material with a surface correction: the elastic tensor of every point is fitted to
-//! that of the solid.
-//!
-//! The micromodulus of an end is c n·H n, with the micromodulus c of an untruncated family, the direction n
-//! of the bond and a symmetric tensor H of the end.
-//! The elastic tensor of a family is ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ.
-//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here
-//! μ = 2 W₁/(d (d + 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
-//! H is the least-squares fit over all components of the elastic tensor. This fit is independent of the axes.
-//! In an untruncated family H is nearly I. Near a surface H is larger normal to the surface than along it.
-//!
-//! A bond has the mean of the micromoduli of points i and j, c_ij(n). A critical stretch s_c that follows
-//! from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. The method
-//! generalises the surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4), which fit
-//! energies along three axes with an ellipsoid. Le & Bobaru (2018) compare other corrections.
+//! The function h = n·H n with a symmetric tensor H, the least-squares fit over all components of the elastic
+//! tensor. This fit is independent of the axes. In an untruncated family H is nearly I. Near a surface H is
+//! larger normal to the surface than along it.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
-use super::monomials::{exponents, index_of, least_squares, multiplicity, write_monomials};
-use super::symmetric::{Symmetric, quadratic_form, to_entries};
-use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
-use crate::lanes::Lanes;
+use super::Form;
+use crate::lanes::{IsaSet, Lanes};
+use crate::material::Bond;
+use crate::material::monomials::{exponents, index_of, least_squares, multiplicity};
+use crate::material::symmetric::{Symmetric, quadratic_form};
 
 /// Smallest allowed eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are
 /// two or three points thick.
@@ -37,48 +26,25 @@ const LARGEST: f64 = 30.0;
 /// slightly bent strip one point wide.
 const RANK: f64 = 1e-2;
 
-/// Number of monomials of degree 6 in three variables.
-const MONOMIALS: usize = 28;
-
-/// The constants of the law.
+/// `surface_correction = "tensor"`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TensorPmb {
-    /// Micromodulus c of an untruncated family, N/m⁶.
-    micromodulus: f64,
-    /// Shear modulus μ of the solid, Pa.
-    shear_modulus: f64,
-    /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with the
-    /// micromodulus.
-    is_scaled: bool,
-}
+pub struct Tensor;
 
-impl TensorPmb {
-    /// Create the law of a body.
-    pub(super) fn of(given: &Given) -> Self {
-        let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
-        let d = given.dimension.count() as f64;
-        Self {
-            micromodulus: Pmb::of(given).micromodulus,
-            shear_modulus: 2.0 * energy / (d * (d + 2.0)),
-            is_scaled: given.from_fracture_energy,
-        }
+impl Form for Tensor {
+    const ISA_SET: IsaSet = IsaSet::Each;
+
+    /// Return ½ H.
+    fn fit<const D: usize>(
+        sums: &[f64],
+        micromodulus: f64,
+        shear_modulus: f64,
+    ) -> SMatrix<f64, D, D> {
+        limited(fit::<D>(sums, micromodulus, shear_modulus)) * 0.5
     }
-}
 
-/// No deck name: decks write `pmb` with `surface_correction = "tensor"`.
-impl Declared for TensorPmb {
-    const DECLARATIONS: &'static [Declaration] = &[];
-}
-
-impl Described for TensorPmb {
-    fn described(&self) -> Vec<(&'static str, Property)> {
-        vec![
-            (
-                "micromodulus inside",
-                Property::Number(self.micromodulus, "N/m⁶"),
-            ),
-            ("micromodulus at surfaces", Property::Text("by direction")),
-        ]
+    #[inline(always)]
+    fn half<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+        quadratic_form(bond, tensor)
     }
 }
 
@@ -144,67 +110,6 @@ fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     })
 }
 
-impl<const D: usize> Law<D> for TensorPmb {
-    /// The tensor ½ H.
-    type Point = Symmetric<D>;
-    type BondHistory = [Lanes; 0];
-    /// Sums of |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
-    type ReferenceSum = [Lanes; MONOMIALS];
-    type Sum = [Lanes; 0];
-    type Force = Along;
-    const CONSTANTS: usize = 2 * D;
-    const SCALED: bool = true;
-
-    #[inline(always)]
-    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; MONOMIALS] {
-        let mut sums = [Lanes::splat(0.0); MONOMIALS];
-        let directions = bond.reference.map(|xi| xi * bond.inverse);
-        write_monomials(6, directions, bond.length, &mut sums);
-        sums
-    }
-
-    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
-        let tensor = fit::<D>(sums, self.micromodulus, self.shear_modulus);
-        to_entries(&(limited(tensor) * 0.5), numbers);
-    }
-
-    #[inline(always)]
-    fn force_state(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
-        let micromodulus = quadratic_form(bond, end) * self.micromodulus;
-        Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
-    }
-
-    #[inline(always)]
-    fn bond_energy(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Lanes {
-        bond.stretch
-            * bond.stretch
-            * bond.length
-            * quadratic_form(bond, end)
-            * (0.5 * self.micromodulus)
-    }
-
-    #[inline(always)]
-    fn stiffness(&self, bond: &Bond<D>, end: &Symmetric<D>) -> Lanes {
-        quadratic_form(bond, end) * self.micromodulus / bond.length
-    }
-
-    #[inline(always)]
-    fn toughness_scale(
-        &self,
-        bond: &Bond<D>,
-        [here, there]: [&Symmetric<D>; 2],
-        other: &Self,
-    ) -> Lanes {
-        if !self.is_scaled || !other.is_scaled {
-            return Lanes::splat(1.0);
-        }
-        let micromodulus = quadratic_form(bond, here) * self.micromodulus
-            + quadratic_form(bond, there) * other.micromodulus;
-        let whole = 0.5 * (self.micromodulus + other.micromodulus);
-        (Lanes::splat(whole) / micromodulus).sqrt()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -212,7 +117,7 @@ mod tests {
     /// Return H of a point with neighbours of unit volume at these offsets. With the constants of this test,
     /// H in the middle of a disc with a radius of 3 is of the order of I.
     fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
-        let mut sums = [0.0; MONOMIALS];
+        let mut sums = [0.0; super::super::MONOMIALS];
         for [x, y] in offsets {
             let length = x.hypot(*y);
             for (sum, [a, b, c]) in sums.iter_mut().zip(exponents(6)) {

@@ -1,0 +1,45 @@
+//! Surface correction by axes: the factors of a point for its bonds form an ellipsoid.
+//!
+//! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. For each coordinate axis a, the factor g_a scales a sum over
+//! the family of a point, under unit extension along a, to the value of the solid. A bond of direction n has
+//! the factor g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
+//!
+//! In the sources, a bond has the ellipsoid of the mean semi-axes of both ends. Here each end has its own
+//! ellipsoid, and the bond the mean of both radii. The energy of a bond is then a sum over its ends, as in all
+//! laws. The difference is of second order in the difference of the semi-axes.
+//!
+//! The factors depend on the coordinate axes: they are not exact for extensions along other directions.
+
+use nalgebra::SMatrix;
+
+use super::Bond;
+use super::symmetric::{Symmetric, quadratic_form};
+use crate::lanes::Lanes;
+
+/// Largest allowed semi-axis. Without this limit, the stiffness of points with few neighbours, nearly in one
+/// plane, would be unbounded.
+const LARGEST: f64 = 30.0;
+
+/// Return the semi-axis g_a of the wanted value and the value of the family, at most [`LARGEST`].
+pub fn semi_axis(wanted: f64, found: f64) -> f64 {
+    if found * LARGEST > wanted {
+        wanted / found
+    } else {
+        LARGEST
+    }
+}
+
+/// Return the tensor T of [`radius`], for an ellipsoid with the semi-axes `scale` g_a.
+pub fn tensor<const D: usize>(semi_axes: [f64; D], scale: f64) -> SMatrix<f64, D, D> {
+    let entries = semi_axes.map(|axis| (scale * axis).powi(-2));
+    SMatrix::from_fn(|a, b| if a == b { entries[a] } else { 0.0 })
+}
+
+/// Return the radii (n·T n)^(−½) of an ellipsoid in the directions n of eight bonds.
+#[inline(always)]
+pub fn radius<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+    // T is 0 at points without bonds of their own. Their radius must be finite, because its product with the
+    // weight 0 of this end must be 0.
+    let square = quadratic_form(bond, tensor).max(Lanes::splat(f64::MIN_POSITIVE));
+    Lanes::splat(1.0) / square.sqrt()
+}

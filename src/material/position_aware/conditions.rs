@@ -1,0 +1,113 @@
+//! Conditions on the functions ω and σ of a point. n is the direction of a bond, and N has the components
+//! N_a = n_a². A sum over the family has the weight |ξ|² Ṽ per bond, unless a formula gives the terms.
+
+use crate::material::monomials::index_of;
+use crate::material::symmetric::mixed;
+
+/// The exponents and the coefficient of a monomial of degree 2 in the components of n or N.
+pub(super) type Monomial = ([usize; 3], f64);
+
+/// A polynomial of degree 2 in the components of n or N.
+pub(super) type Quadratic = [Monomial];
+
+/// Return the sum of the product of two polynomials over a family, from the sums of the monomials of degree
+/// 4.
+pub(super) fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
+    let mut total = 0.0;
+    for (a, of_a) in first {
+        for (b, of_b) in second {
+            let both: [usize; 3] = std::array::from_fn(|d| a[d] + b[d]);
+            total += of_a * of_b * sums[index_of(both)];
+        }
+    }
+    total
+}
+
+/// Return the exponents of the product of the components with the indices `a` and `b`.
+pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
+    let mut exponents = [0; 3];
+    exponents[a] += 1;
+    exponents[b] += 1;
+    exponents
+}
+
+/// The conditions on a function g of the bond direction: for each condition k, the sum of p_k g over the
+/// family must be wanted_k.
+pub struct Conditions<const D: usize> {
+    /// The constant c, which g is for an untruncated family.
+    pub(super) constant: f64,
+    /// The polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².
+    pub(super) one: Vec<Monomial>,
+    /// p_k and wanted_k: for unit extensions along the axes, then for shears between the axes.
+    pub(super) each: Vec<(Vec<Monomial>, f64)>,
+}
+
+impl<const D: usize> Conditions<D> {
+    /// Create the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab on ω, with m = Σ |ξ|² Ṽ (m⁵) and c = ω₀ = d/m.
+    ///
+    /// Mixed conditions have the weight √2, because each represents two components. Therefore the fitted
+    /// function rotates with the family.
+    pub(super) fn dilatational(weighted_volume: f64) -> Self {
+        let axes = (0..D).map(|a| (vec![(of_product(a, a), 1.0)], 1.0));
+        let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2_f64.sqrt())], 0.0));
+        Self {
+            constant: D as f64 / weighted_volume,
+            one: one_in_directions::<D>(),
+            each: axes.chain(shears).collect(),
+        }
+    }
+
+    /// Create the conditions Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H on σ/σ₀, with m = Σ |ξ|² Ṽ (m⁵) and
+    /// c = 1.
+    ///
+    /// The probe strains H are unit strains H_aa = 1 along the axes, and pure shears H_ab = H_ba = 1/√2
+    /// between the axes.
+    pub(super) fn deviatoric(weighted_volume: f64) -> Self {
+        let count = D as f64;
+        let axes = (0..D).map(|k| {
+            let part = |a: usize| {
+                if a == k {
+                    1.0 - 1.0 / count
+                } else {
+                    -1.0 / count
+                }
+            };
+            let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
+            let square = pairs.map(|(a, b)| (of_product(a, b), part(a) * part(b)));
+            (square.collect(), 1.0 - 1.0 / count)
+        });
+        let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2.0)], 1.0));
+        // The ratio 2G/σ₀ with σ₀ = A/m.
+        let modulus = 2.0 / (count * (count + 2.0)) * weighted_volume;
+        let conditions = axes.chain(shears);
+        Self {
+            constant: 1.0,
+            one: one_in_squares::<D>(),
+            each: conditions
+                .map(|(square, norm)| (square, norm * modulus))
+                .collect(),
+        }
+    }
+
+    /// Return the sum of p_k c over the family.
+    pub(super) fn of_constant(&self, sums: &[f64], polynomial: &Quadratic) -> f64 {
+        self.constant * product(sums, polynomial, &self.one)
+    }
+}
+
+/// Return the polynomial n·n = 1. The matrix of c n·n is Λ = c I.
+pub(super) fn one_in_directions<const D: usize>() -> Vec<Monomial> {
+    (0..D).map(|a| (of_product(a, a), 1.0)).collect()
+}
+
+/// Return the polynomial (Σ N_a)² = 1. The matrix of c (Σ N_a)² is S with S_ab = c.
+pub(super) fn one_in_squares<const D: usize>() -> Vec<Monomial> {
+    let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
+    pairs.map(|(a, b)| (of_product(a, b), 1.0)).collect()
+}
+
+/// Return the weighted volume Σ |ξ|² Ṽ (m⁵) from the sums of |ξ|² Ṽ times the monomials of n.
+pub(super) fn weighted_volume<const D: usize>(sums: &[f64]) -> f64 {
+    let one = one_in_directions::<D>();
+    product(sums, &one, &one)
+}

@@ -1,0 +1,69 @@
+//! Functions ω and σ that are radii of ellipsoids. The semi-axis a of ω/ω₀ is the dilatation of the solid
+//! divided by that with ω₀, for a unit strain along axis a. The semi-axis of σ/σ₀ is the same ratio of the
+//! deviatoric energies.
+
+use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
+use super::{Fit, Form};
+use crate::lanes::{IsaSet, Lanes};
+use crate::material::symmetric::Symmetric;
+use crate::material::{Bond, ellipsoid};
+
+/// `surface_correction = "directional"`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Directional;
+
+impl Form for Directional {
+    const ISA_SET: IsaSet = IsaSet::Each;
+
+    /// Return the tensors of the ellipsoids.
+    fn fit<const D: usize>(
+        [of_directions, of_squares]: [&[f64]; 2],
+        [dilatational, deviatoric]: [&Conditions<D>; 2],
+        reference: f64,
+    ) -> Fit<D> {
+        let omega = semi_axes(dilatational, of_directions);
+        let sigma = semi_axes(deviatoric, of_squares);
+        Fit {
+            omega: ellipsoid::tensor(omega, dilatational.constant),
+            sigma: ellipsoid::tensor(sigma, reference),
+            products: bounds(of_directions, [omega, sigma], reference),
+        }
+    }
+
+    #[inline(always)]
+    fn dilatational<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+        ellipsoid::radius(bond, tensor)
+    }
+
+    #[inline(always)]
+    fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+        ellipsoid::radius(bond, tensor)
+    }
+}
+
+/// Return the semi-axes from the conditions of the axes.
+fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; D] {
+    std::array::from_fn(|a| {
+        let (polynomial, wanted) = &conditions.each[a];
+        ellipsoid::semi_axis(*wanted, conditions.of_constant(sums, polynomial))
+    })
+}
+
+/// Return bounds for [`super::largest_ratio`]: upper bounds of R and Q, and a lower bound of τ. `omega` and `sigma` are the semi-axes of ω/ω₀ and σ/σ₀, and `sums` are the sums of
+/// |ξ|² Ṽ times the monomials of n. `reference` is σ₀, N/m⁷.
+///
+/// A radius g and its square are convex functions of the numbers n_a², whose sum is 1. Therefore
+/// g ≤ Σ g_a n_a² and g² ≤ Σ g_a² n_a² for each bond. With M_a = Σ |ξ|² n_a² Ṽ, Jensen's inequality for the
+/// sum over the family gives Σ |ξ|² g Ṽ ≥ m (Σ (M_a/m)/g_a²)^(−½).
+fn bounds<const D: usize>(sums: &[f64], [omega, sigma]: [[f64; D]; 2], reference: f64) -> [f64; 3] {
+    let weighted_volume = weighted_volume::<D>(sums);
+    let constant = D as f64 / weighted_volume;
+    let one = one_in_directions::<D>();
+    let moment = |a: usize| product(sums, &[(of_product(a, a), 1.0)], &one);
+    let sum = |factor: &dyn Fn(usize) -> f64| (0..D).map(|a| factor(a) * moment(a)).sum::<f64>();
+    let least = sigma.iter().copied().fold(f64::INFINITY, f64::min);
+    let r = constant * constant * sum(&|a| omega[a] * omega[a]) / (least * reference);
+    let q = reference * sum(&|a| sigma[a]);
+    let mean = sum(&|a| (omega[a] * omega[a]).recip()) / weighted_volume;
+    [r, q, D as f64 / mean.sqrt()]
+}

@@ -1,0 +1,157 @@
+//! Prototype microelastic material with a surface correction: the micromodulus of each point depends on the
+//! direction of the bond, and is fitted to the point's own family.
+//!
+//! The micromodulus of an end is c h(n), with the micromodulus c of an untruncated family, the direction n of
+//! the bond and the [`Form`] of the function h. The elastic tensor of a family is ½ c Σ |ξ| h(n) n⊗n⊗n⊗n Ṽ.
+//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here
+//! μ = 2 W₁/(d (d + 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
+//!
+//! A bond has the mean of the micromoduli of points i and j, c_ij(n). A critical stretch s_c that follows
+//! from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. Le & Bobaru
+//! (2018) compare other corrections.
+//!
+//! In 1-D, where all bonds have the same direction, [`Normalised`](super::Normalised) replaces this law.
+
+mod directional;
+mod tensor;
+
+use std::fmt::Debug;
+use std::marker::PhantomData;
+
+use nalgebra::SMatrix;
+
+use super::monomials::write_monomials;
+use super::symmetric::{Symmetric, to_entries};
+use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
+use crate::lanes::{IsaSet, Lanes};
+use directional::Directional;
+use tensor::Tensor;
+
+/// Number of monomials of degree 6 in three variables.
+const MONOMIALS: usize = 28;
+
+/// Form of the function h.
+pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
+    /// [`Law::ISA_SET`] of the law.
+    const ISA_SET: IsaSet;
+
+    /// Return the tensor of a point that determines ½ h, from the sums of |ξ| Ṽ times the monomials of degree
+    /// 6 of n, c and μ.
+    fn fit<const D: usize>(
+        sums: &[f64],
+        micromodulus: f64,
+        shear_modulus: f64,
+    ) -> SMatrix<f64, D, D>;
+
+    /// Return ½ h of eight bonds.
+    fn half<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes;
+}
+
+/// The law with `surface_correction = "tensor"`.
+pub type TensorPmb = SurfacePmb<Tensor>;
+
+/// The law with `surface_correction = "directional"`.
+pub type DirectionalPmb = SurfacePmb<Directional>;
+
+/// The constants of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePmb<F> {
+    /// Micromodulus c of an untruncated family, N/m⁶.
+    micromodulus: f64,
+    /// Shear modulus μ of the solid, Pa.
+    shear_modulus: f64,
+    /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with the
+    /// micromodulus.
+    is_scaled: bool,
+    form: PhantomData<F>,
+}
+
+impl<F: Form> SurfacePmb<F> {
+    /// Create the law of a body, in the plane or in space.
+    pub(super) fn of(given: &Given) -> Self {
+        let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
+        let d = given.dimension.count() as f64;
+        Self {
+            micromodulus: Pmb::of(given).micromodulus,
+            shear_modulus: 2.0 * energy / (d * (d + 2.0)),
+            is_scaled: given.from_fracture_energy,
+            form: PhantomData,
+        }
+    }
+}
+
+/// No deck name: decks write `pmb` or `proportional` with a `surface_correction`.
+impl<F: Form> Declared for SurfacePmb<F> {
+    const DECLARATIONS: &'static [Declaration] = &[];
+}
+
+impl<F: Form> Described for SurfacePmb<F> {
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![
+            (
+                "micromodulus inside",
+                Property::Number(self.micromodulus, "N/m⁶"),
+            ),
+            ("micromodulus at surfaces", Property::Text("by direction")),
+        ]
+    }
+}
+
+impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
+    /// The tensor that determines ½ h.
+    type Point = Symmetric<D>;
+    type BondHistory = [Lanes; 0];
+    /// Sums of |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
+    type ReferenceSum = [Lanes; MONOMIALS];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+    const ISA_SET: IsaSet = F::ISA_SET;
+    const CONSTANTS: usize = 2 * D;
+    const LEAST_DIMENSION: usize = 2;
+    const SCALED: bool = true;
+
+    #[inline(always)]
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; MONOMIALS] {
+        let mut sums = [Lanes::splat(0.0); MONOMIALS];
+        let directions = bond.reference.map(|xi| xi * bond.inverse);
+        write_monomials(6, directions, bond.length, &mut sums);
+        sums
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        let tensor = F::fit::<D>(sums, self.micromodulus, self.shear_modulus);
+        to_entries(&tensor, numbers);
+    }
+
+    #[inline(always)]
+    fn force_state(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
+        let micromodulus = F::half(bond, end) * self.micromodulus;
+        Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Lanes {
+        bond.stretch * bond.stretch * bond.length * F::half(bond, end) * (0.5 * self.micromodulus)
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, bond: &Bond<D>, end: &Symmetric<D>) -> Lanes {
+        F::half(bond, end) * self.micromodulus / bond.length
+    }
+
+    #[inline(always)]
+    fn toughness_scale(
+        &self,
+        bond: &Bond<D>,
+        [here, there]: [&Symmetric<D>; 2],
+        other: &Self,
+    ) -> Lanes {
+        if !self.is_scaled || !other.is_scaled {
+            return Lanes::splat(1.0);
+        }
+        let micromodulus =
+            F::half(bond, here) * self.micromodulus + F::half(bond, there) * other.micromodulus;
+        let whole = 0.5 * (self.micromodulus + other.micromodulus);
+        (Lanes::splat(whole) / micromodulus).sqrt()
+    }
+}
