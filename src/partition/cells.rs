@@ -38,12 +38,12 @@ pub struct Cells {
     counts: [usize; 3],
 }
 
-/// Costs and owners of the cells before a rebalance.
-pub struct CellLoads {
-    /// Measured computing time of the points of each cell, ns.
-    pub costs: Vec<u64>,
+/// Computing times of the ranks and owners of the cells before a rebalance.
+pub struct Loads {
+    /// Measured computing time of each rank, ns.
+    pub times: Vec<u64>,
     /// For each cell, the highest rank that owns points in the cell; −1 if the cell has no points.
-    pub ranks: Vec<f64>,
+    pub owners: Vec<f64>,
 }
 
 impl Cells {
@@ -143,18 +143,17 @@ impl Cells {
         occupation
     }
 
-    /// Costs and present owners of the cells. `each` is the cost per point on this rank, ns. Collective.
-    pub fn loads(&self, comm: &dyn Communicator, points: &[Point], each: u64) -> CellLoads {
-        let mut costs = vec![0; self.count()];
-        let mut ranks = vec![-1.0; self.count()];
+    /// Times of the ranks and present owners of the cells. `time` is the time of this rank, ns. Collective.
+    pub fn loads(&self, comm: &dyn Communicator, points: &[Point], time: u64) -> Loads {
+        let mut owners = vec![-1.0; self.count()];
         for point in points {
-            let cell = self.of(point.position);
-            costs[cell] += each;
-            ranks[cell] = comm.rank() as f64;
+            owners[self.of(point.position)] = comm.rank() as f64;
         }
-        comm.sum(&mut costs);
-        comm.max(&mut ranks);
-        CellLoads { costs, ranks }
+        comm.max(&mut owners);
+        Loads {
+            times: comm::all_gather(comm, time),
+            owners,
+        }
     }
 }
 

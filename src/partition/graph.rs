@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::error::{Error, Result};
 
-use super::cells::{CellLoads, Cells};
+use super::cells::{Cells, Loads};
 
 /// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
@@ -35,7 +35,7 @@ const FEW_CELLS_PER_PART: usize = 30;
 pub fn partition(
     cells: &Cells,
     occupation: &[u64],
-    loads: Option<&CellLoads>,
+    loads: Option<&Loads>,
     ranks: usize,
 ) -> Result<Vec<u32>> {
     let occupied: Vec<usize> = (0..cells.count())
@@ -75,7 +75,7 @@ pub fn partition(
         starts.push(neighbours.len() as metis::Idx);
     }
     if let Some(loads) = loads {
-        weight_by_time(&mut bonds, &occupied, loads, ranks);
+        weight_by_time(&mut bonds, &occupied, loads);
     }
     let vertex_weights = to_integers(&bonds);
     let edge_weights = to_integers(&bonds_across);
@@ -94,7 +94,7 @@ pub fn partition(
     cut.map_err(|error| failed(&error))?;
     fill_empty_parts(&mut part, ranks);
     if let Some(loads) = loads {
-        let current = |k: usize| (loads.ranks[occupied[k]] as usize, occupation[occupied[k]]);
+        let current = |k: usize| (loads.owners[occupied[k]] as usize, occupation[occupied[k]]);
         renumber(&mut part, ranks, current);
     }
     for (cell, rank) in occupied.iter().zip(part) {
@@ -104,17 +104,19 @@ pub fn partition(
 }
 
 /// Multiply the estimated numbers of bonds of the occupied cells by the measured time per estimated bond of
-/// the rank that has the cell at present.
-fn weight_by_time(bonds: &mut [f64], occupied: &[usize], loads: &CellLoads, ranks: usize) {
-    let rank_of = |cell: usize| loads.ranks[cell] as usize;
-    let mut times = vec![0.0; ranks];
-    let mut sums = vec![0.0; ranks];
+/// the rank that has the cell at present, divided by the mean of this time over all bonds.
+fn weight_by_time(bonds: &mut [f64], occupied: &[usize], loads: &Loads) {
+    let rank_of = |cell: usize| loads.owners[cell] as usize;
+    let mut sums = vec![0.0; loads.times.len()];
     for (bonds, cell) in bonds.iter().zip(occupied) {
-        times[rank_of(*cell)] += loads.costs[*cell] as f64;
         sums[rank_of(*cell)] += bonds;
     }
+    // A time of 0 would give weights of 0.
+    let time = |rank: usize| loads.times[rank].max(1) as f64;
+    let mean = (0..sums.len()).map(time).sum::<f64>() / sums.iter().sum::<f64>();
     for (bonds, cell) in bonds.iter_mut().zip(occupied) {
-        *bonds *= times[rank_of(*cell)] / sums[rank_of(*cell)];
+        let rank = rank_of(*cell);
+        *bonds *= time(rank) / sums[rank] / mean;
     }
 }
 
@@ -211,7 +213,7 @@ mod tests {
             }
         }
 
-        fn partition(&self, loads: Option<&CellLoads>, ranks: usize) -> Vec<u32> {
+        fn partition(&self, loads: Option<&Loads>, ranks: usize) -> Vec<u32> {
             partition(&self.cells, &self.occupation, loads, ranks).unwrap()
         }
 
@@ -239,20 +241,18 @@ mod tests {
     #[test]
     fn a_rank_with_costly_cells_gets_fewer_and_few_cells_move() {
         let plate = Plate::new();
-        let mut loads = plate.cells.loads(&threads::alone(), &plate.points, 10);
         let first = plate.partition(None, 2);
-        for (rank, owner) in loads.ranks.iter_mut().zip(&first) {
+        let mut loads = Loads {
+            times: vec![1000; 2],
             // Swap the owners.
-            *rank = f64::from(1 - *owner);
-        }
+            owners: first.iter().map(|rank| f64::from(1 - *rank)).collect(),
+        };
         let same = plate.partition(Some(&loads), 2);
         let pairs = first.iter().zip(&same);
         let moved = pairs.filter(|(a, b)| **a != 1 - **b).count();
         let all = plate.cells.count();
         assert!(moved < all / 5, "{moved} of {all} cells");
-        for (cost, rank) in loads.costs.iter_mut().zip(&loads.ranks) {
-            *cost *= if *rank == 0.0 { 3 } else { 1 };
-        }
+        loads.times[0] *= 3;
         let sizes = plate.sizes(&plate.partition(Some(&loads), 2), 2);
         let ratio = f64::from(sizes[1]) / f64::from(sizes[0]);
         assert!((1.5..3.5).contains(&ratio), "{sizes:?}");
@@ -274,12 +274,10 @@ mod tests {
         let first = plate.partition(None, 2);
         let sizes = plate.sizes(&first, 2);
         assert!(sizes[0].abs_diff(sizes[1]) > 500, "{sizes:?}");
-        let mut loads = plate.cells.loads(&threads::alone(), &plate.points, 1);
-        for (k, owner) in first.iter().enumerate() {
-            loads.ranks[k] = f64::from(*owner);
-            // Each rank takes 10 ms.
-            loads.costs[k] *= 10_000_000 / u64::from(sizes[*owner as usize]);
-        }
+        let loads = Loads {
+            times: vec![1000; 2],
+            owners: first.iter().map(|rank| f64::from(*rank)).collect(),
+        };
         let second = plate.partition(Some(&loads), 2);
         let moved = first.iter().zip(&second).filter(|(a, b)| a != b).count();
         assert!(moved < first.len() / 20, "{moved} of {} cells", first.len());

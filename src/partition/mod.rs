@@ -11,7 +11,7 @@ use crate::comm::{Communicator, agree};
 use crate::error::Result;
 use crate::points::Point;
 
-use cells::{CellLoads, Cells, max_cells};
+use cells::{Cells, Loads, max_cells};
 
 /// Partition the points, migrate them to their owners and find the ghosts. Collective.
 ///
@@ -26,54 +26,38 @@ pub fn distribute(
     total: u64,
     cutoff: f64,
 ) -> Result<Domain> {
-    distribute_by_cost(comm, pieces, total, cutoff, None)
+    distribute_by_time(comm, pieces, total, cutoff, None)
 }
 
-/// Same as [`distribute`], with the measured cost of this rank's points. Cells are weighted by cost, and few
-/// points migrate.
+/// Same as [`distribute`], with the measured computing time of this rank's points (ns). Cells are weighted by
+/// the time of their present rank, and few points migrate.
 ///
 /// # Errors
 /// Same as for [`distribute`].
-pub fn distribute_by_cost(
+pub fn distribute_by_time(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
     total: u64,
     cutoff: f64,
-    cost: Option<Cost>,
+    time: Option<u64>,
 ) -> Result<Domain> {
     let most = max_cells(comm.size());
-    distribute_by_cells(comm, pieces, total, cutoff, most, cost)
+    distribute_by_cells(comm, pieces, total, cutoff, most, time)
 }
 
-/// The computing cost of a rank's points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cost {
-    /// Time per point, ns.
-    each: u64,
-}
-
-impl Cost {
-    /// Create the cost of `points` points, which took `time` (ns) in total.
-    pub fn of(time: u64, points: usize) -> Self {
-        Self {
-            each: (time / points.max(1) as u64).max(1),
-        }
-    }
-}
-
-/// Same as [`distribute_by_cost`], with at most `most` partition cells.
+/// Same as [`distribute_by_time`], with at most `most` partition cells.
 fn distribute_by_cells(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
     total: u64,
     cutoff: f64,
     most: usize,
-    cost: Option<Cost>,
+    time: Option<u64>,
 ) -> Result<Domain> {
     let cells = Cells::new(comm, &pieces, total, cutoff, most);
     let occupation = cells.occupation(comm, &pieces);
-    let cost = cost.filter(|_| comm.size() > 1);
-    let loads = cost.map(|cost| cells.loads(comm, &pieces, cost.each));
+    let time = time.filter(|_| comm.size() > 1);
+    let loads = time.map(|time| cells.loads(comm, &pieces, time));
     let owner = owners(comm, &cells, &occupation, loads.as_ref())?;
     drop(loads);
     drop(occupation);
@@ -86,7 +70,7 @@ fn owners(
     comm: &dyn Communicator,
     cells: &Cells,
     occupation: &[u64],
-    loads: Option<&CellLoads>,
+    loads: Option<&Loads>,
 ) -> Result<Vec<u32>> {
     if comm.size() == 1 {
         return Ok(vec![0; cells.count()]);

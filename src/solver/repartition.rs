@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 
 use crate::comm::{self, IdOrder, all_gather};
 use crate::error::Result;
-use crate::partition::Cost;
 use crate::points::Point;
 use crate::problem::Balance;
 
@@ -129,13 +128,12 @@ impl<const D: usize> Simulation<'_, D> {
         let pieces = self.pieces();
         let mut before: Vec<u64> = pieces.iter().map(|point| point.id).collect();
         before.sort_unstable();
-        let cost = Cost::of(time, pieces.len());
         self.release();
         let mut other = Self::of_points(
             self.problem,
             self.comm,
             (pieces, self.grids.clone()),
-            Some(cost),
+            Some(time),
             &mut || Ok(()),
         )?;
         let order = other.id_order();

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
-use crate::partition::{Cost, distribute_by_cost};
+use crate::partition::distribute_by_time;
 use crate::points::Point;
 use crate::problem::{Action, Condition, Damage, Initial, Problem, Time};
 use crate::refine::Grids;
@@ -155,13 +155,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Distribute the points of the given grids over the ranks, and create the bonds of these points.
     /// `pieces` are the points of this rank before the distribution. Initial values are not set, and forces
-    /// are not evaluated. Collective. `cost` is the computing cost of this rank's points; `None` if the cost
-    /// is not known. `between` is the same as for [`Self::set_up`].
+    /// are not evaluated. Collective. `time` is the measured computing time of this rank's points (ns); `None`
+    /// if it is not known. `between` is the same as for [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
         (pieces, refined): (Vec<Point>, Grids<'a>),
-        cost: Option<Cost>,
+        time: Option<u64>,
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
         let cutoffs = cutoffs(problem);
@@ -169,7 +169,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // With this slack, both ends of a bond of the largest length exist on the rank, for any rounding of
         // the bond length.
-        let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
+        let mut domain = distribute_by_time(comm, pieces, total, longest * (1.0 + SLACK), time)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
