@@ -172,6 +172,23 @@ impl EnergyWatch {
     }
 }
 
+/// Check that the energies in a row of the history are finite. They can overflow while all motions and forces
+/// are finite.
+///
+/// # Errors
+/// If an energy is not finite. The error is the same on all ranks.
+pub fn check_finite(row: &HistoryRow, clock: &Clock) -> Result<()> {
+    // The error of the balance contains all other energies.
+    if row.energies.error.is_finite() {
+        return Ok(());
+    }
+    Err(Error::run(format!(
+        "step {} (t = {:.6e} s): an energy is not finite; a load, a velocity or a stiffness is too large",
+        clock.number(),
+        clock.time(),
+    )))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

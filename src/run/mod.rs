@@ -350,6 +350,12 @@ impl<'a> Job<'a> {
                     }
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
+                if let Some(row) = recorder.row_of(&clock)
+                    && let Err(error) = energy_watch::check_finite(row, &clock)
+                {
+                    recorder.write_failure(stepper.at_full_step())?;
+                    return Ok(LoopEnd::Failed(error));
+                }
                 if let (Some(energy), Some(row), false) =
                     (&mut energy, recorder.row_of(&clock), is_quasi_static)
                 {

@@ -94,6 +94,27 @@ fn a_value_that_is_not_finite() {
     assert_eq!(messages.len(), 1, "the same point on any number of ranks");
 }
 
+/// Motions of 1e300 m/s are finite, but their energy is not. No energy balance is tested in decks with a
+/// temperature.
+#[test]
+fn an_energy_that_is_not_finite() {
+    let folder = Folder::new("energy");
+    let load = "
+    condition.push = { set = 'all', body_force = [1e300, 0] }
+    condition.warm = { set = 'all', temperature = 300 }
+    history.every_steps = 1
+    ";
+    let expands = "youngs_modulus = 5, thermal_expansion = 1e-5, reference_temperature = 293";
+    let text = bar("end = 2, step = 0.5").replace("youngs_modulus = 5", expands) + load;
+    let deck = folder.write("deck.toml", &text);
+    for ranks in [1, 2] {
+        let out = folder.join(format!("out{ranks}"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        failing(&mut command, "an energy is not finite", 1);
+    }
+}
+
 /// Run a deck until the disc is full; the run must print one error.
 fn fill(ranks: usize, deck: &Path, out: &Path) {
     let mut command = fissure(ranks);
