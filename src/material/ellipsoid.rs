@@ -5,8 +5,8 @@
 //! the factor g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
 //!
 //! In the sources, a bond has the ellipsoid of the mean semi-axes of both ends. Here each end has its own
-//! ellipsoid, and the bond the mean of both radii. The energy of a bond is then a sum over its ends, as in all
-//! laws. The difference is of second order in the difference of the semi-axes.
+//! ellipsoid, because the force state of a point depends on the numbers of this point only, and a bond-based
+//! bond has the mean of both radii. The difference is of second order in the difference of the semi-axes.
 //!
 //! The factors depend on the coordinate axes: they are not exact for extensions along other directions.
 
@@ -19,6 +19,10 @@ use crate::lanes::Lanes;
 /// Largest allowed semi-axis. Without this limit, the stiffness of points with few neighbours, nearly in one
 /// plane, would be unbounded.
 const LARGEST: f64 = 30.0;
+
+/// Diagonal entry of the tensor of points without bonds of their own. Their radii are nearly 0, such that
+/// this end has no share in the bonds from other points.
+pub const WITHOUT_BONDS: f64 = 1e300;
 
 /// Return the semi-axis g_a of the wanted value and the value of the family, at most [`LARGEST`].
 pub fn semi_axis(wanted: f64, found: f64) -> f64 {
@@ -38,8 +42,7 @@ pub fn tensor<const D: usize>(semi_axes: [f64; D], scale: f64) -> SMatrix<f64, D
 /// Return the radii (n·T n)^(−½) of an ellipsoid in the directions n of eight bonds.
 #[inline(always)]
 pub fn radius<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
-    // T is 0 at points without bonds of their own. Their radius must be finite, because its product with the
-    // weight 0 of this end must be 0.
+    // Padding bonds have n = 0. Their radii must be finite, because they are multiplied by 0.
     let square = quadratic_form(bond, tensor).max(Lanes::splat(f64::MIN_POSITIVE));
     Lanes::splat(1.0) / square.sqrt()
 }

@@ -113,8 +113,8 @@ impl Declared for Pmb {
 fn build(given: &Given) -> Built {
     match given.values.word(SURFACE_CORRECTION.name) {
         "none" => Built::plain(Pmb::of(given)),
-        // In 1-D all corrections are equal.
         "energy" => Built::plain(Normalised::classical(given)),
+        // In 1-D all bonds have the same direction, so these corrections, without their limits, are equal.
         _ if given.dimension.count() == 1 => Built::plain(Normalised::classical(given)),
         "tensor" => Built::plain(TensorPmb::of(given)),
         _ => Built::plain(DirectionalPmb::of(given)),

@@ -1,5 +1,5 @@
 //! Energies with `surface_correction = "directional"`, compared with sums over the neighbours computed here
-//! from the formulas of Madenci & Oterkus (2014).
+//! from the formulas in docs/src/theory/corrections.md.
 
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -11,7 +11,7 @@ const YOUNG: f64 = 5.0;
 const HORIZON: f64 = 3.0;
 const EDGES: [i32; 3] = [5, 4, 3];
 
-/// Displacement gradient. The stretches of its bonds are linear in it up to a relative error of 1e-6.
+/// Displacement gradient. Terms of second order are negligible.
 const GRADIENT: [[f64; 3]; 3] = [
     [3e-6, 1e-6, -2e-6],
     [2e-6, -4e-6, 1e-6],

@@ -146,7 +146,7 @@ fn surface_corrections_of_bars() {
 }
 
 /// With a surface correction, the edges and corners of a block limit its stable step. A bound that does not
-/// depend on the directions of the bonds would give ratios of 0.52 and 0.24.
+/// depend on the directions of the bonds would give ratios of 0.52 for "tensor" and 0.24 for "pals".
 #[test]
 fn stable_steps_with_surface_corrections() {
     let stable_step = |law: &str, correction: &str| {

@@ -31,10 +31,10 @@ pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
     exponents
 }
 
-/// The conditions on a function g of the bond direction: for each condition k, the sum of p_k g over the
-/// family must be wanted_k.
+/// The conditions on a function g of the bond direction. For each condition k, wanted_k is the value that the
+/// sum of p_k g over the family has in the solid.
 pub struct Conditions<const D: usize> {
-    /// The constant c, which g is for an untruncated family.
+    /// The value c of g in an untruncated family of the continuum.
     pub(super) constant: f64,
     /// The polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².
     pub(super) one: Vec<Monomial>,
@@ -45,8 +45,8 @@ pub struct Conditions<const D: usize> {
 impl<const D: usize> Conditions<D> {
     /// Create the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab on ω, with m = Σ |ξ|² Ṽ (m⁵) and c = ω₀ = d/m.
     ///
-    /// Mixed conditions have the weight √2, because each represents two components. Therefore the fitted
-    /// function rotates with the family.
+    /// Mixed conditions have the weight √2, because each represents two components. Therefore the function of
+    /// [`Nearest`](super::Nearest) rotates with the family.
     pub(super) fn dilatational(weighted_volume: f64) -> Self {
         let axes = (0..D).map(|a| (vec![(of_product(a, a), 1.0)], 1.0));
         let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2_f64.sqrt())], 0.0));

@@ -4,7 +4,7 @@
 
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use super::{Fit, Form};
-use crate::lanes::{IsaSet, Lanes};
+use crate::lanes::Lanes;
 use crate::material::symmetric::Symmetric;
 use crate::material::{Bond, ellipsoid};
 
@@ -13,7 +13,7 @@ use crate::material::{Bond, ellipsoid};
 pub struct Directional;
 
 impl Form for Directional {
-    const ISA_SET: IsaSet = IsaSet::Each;
+    const WITHOUT_BONDS: f64 = ellipsoid::WITHOUT_BONDS;
 
     /// Return the tensors of the ellipsoids.
     fn fit<const D: usize>(
@@ -49,7 +49,8 @@ fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; 
     })
 }
 
-/// Return bounds for [`super::largest_ratio`]: upper bounds of R and Q, and a lower bound of τ. `omega` and `sigma` are the semi-axes of ω/ω₀ and σ/σ₀, and `sums` are the sums of
+/// Return bounds for [`super::largest_ratio`]: upper bounds of R and Q, and a lower bound of τ. `omega` and
+/// `sigma` are the semi-axes of ω/ω₀ and σ/σ₀, and `sums` are the sums of
 /// |ξ|² Ṽ times the monomials of n. `reference` is σ₀, N/m⁷.
 ///
 /// A radius g and its square are convex functions of the numbers n_a², whose sum is 1. Therefore

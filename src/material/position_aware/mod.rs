@@ -10,7 +10,8 @@
 //! with the number of dimensions d, the force state along the bond t, and k′, A and m of [`Ordinary`].
 //!
 //! At a small homogeneous strain H, a bond of direction n has e = |ξ| n·H n.
-//! The functions ω and σ of a solid satisfy, for probe strains H along the axes and in shear between the axes,
+//! In an untruncated family of the continuum, ω and σ satisfy, for probe strains H along the axes and in
+//! shear between the axes,
 //!
 //! Σ ω|ξ| e Ṽ = tr H, Σ σ ε² Ṽ = 2G dev H : dev H.
 //!
@@ -41,7 +42,7 @@ use super::symmetric::{Symmetric, to_entries};
 use super::{
     Along, Bond, Declaration, Declared, Described, Given, Influence, Law, PlasticState, Property,
 };
-use crate::lanes::{IsaSet, Lanes};
+use crate::lanes::Lanes;
 use conditions::{Conditions, weighted_volume};
 use directional::Directional;
 use nearest::Nearest;
@@ -64,11 +65,11 @@ pub struct Fit<const D: usize> {
 
 /// Form of the functions ω and σ.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// [`Law::ISA_SET`] of the elastic law.
-    const ISA_SET: IsaSet;
+    /// Diagonal entries of the tensors of a point without bonds of its own, for which ω and σ are nearly 0.
+    const WITHOUT_BONDS: f64;
 
-    /// Fit ω and σ to the conditions on both. `sums` are the sums of |ξ|² Ṽ times the monomials of degree 4 of
-    /// n and of N, and `reference` is σ₀, N/m⁷.
+    /// Fit ω and σ to the conditions on both. `sums` are the sums of |ξ|² Ṽ times the monomials of degree 4
+    /// of n and of N, and `reference` is σ₀, N/m⁷.
     fn fit<const D: usize>(
         sums: [&[f64]; 2],
         conditions: [&Conditions<D>; 2],
@@ -149,13 +150,14 @@ impl<F: Form> Described for PositionAware<F> {
 /// The tensors of a point that determine ω and σ.
 type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 
-/// Return the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ for all extensions e, in `d` dimensions.
+/// Return an upper bound of the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ for all extensions e, in `d`
+/// dimensions.
 ///
 /// In the scalar product ⟨a, b⟩ = Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|.
-/// The inputs are R ≥ ⟨r, r⟩, Q = ⟨|ξ|, |ξ|⟩ and τ = ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. These give the components of ε
-/// along r and normal to r.
-/// λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². For τ ≤ d, λ
-/// grows with R and Q and decreases with τ.
+/// The inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. With equality, they give the
+/// components of ε along r and normal to r.
+/// Then λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². It grows
+/// with R and Q and decreases with τ, because λ ≥ 1.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
     let determinant = bulk_modulus * r + (1.0 - tau / d).powi(2);
@@ -176,8 +178,8 @@ fn squares<const D: usize>(bond: &Bond<D>) -> [Lanes; D] {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
-    /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Then k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa)
-    /// and θ/d.
+    /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Then k′θ − (1/d) Σ σ|ξ| ε Ṽ
+    /// (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
@@ -185,7 +187,6 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
     /// θ, Σ σ|ξ| e Ṽ (Pa) and Σ σ|ξ|² Ṽ (Pa), all over the intact bonds.
     type Sum = [Lanes; 3];
     type Force = Along;
-    const ISA_SET: IsaSet = F::ISA_SET;
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
@@ -210,6 +211,9 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
         let weighted_volume = weighted_volume::<D>(of_directions);
         // True for a point without bonds.
         if weighted_volume <= 0.0 {
+            let nothing = SMatrix::<f64, D, D>::identity() * F::WITHOUT_BONDS;
+            to_entries(&nothing, numbers);
+            to_entries(&nothing, &mut numbers[2 * D..]);
             return;
         }
         let reference = self.ordinary.extensional() / weighted_volume;
@@ -375,8 +379,16 @@ mod tests {
         }
     }
 
-    /// Return ω and σ of the bonds, and λ.
+    /// Return ω and σ of the bonds of a point, and λ.
     fn functions<F: Form>(family: &[Vector3<f64>]) -> (Vec<[f64; 2]>, f64) {
+        functions_of::<F>(family, family)
+    }
+
+    /// Return ω and σ of these bonds at a point with a family, and λ of this point.
+    fn functions_of<F: Form>(
+        family: &[Vector3<f64>],
+        bonds: &[Vector3<f64>],
+    ) -> (Vec<[f64; 2]>, f64) {
         let mut numbers = [0.0; 16];
         Law::<3>::constants(&law::<F>(), &sums(family), &mut numbers);
         let [omega, sigma] = [0, 6].map(|first| -> Symmetric<3> {
@@ -387,7 +399,7 @@ mod tests {
             let bond = bond(xi);
             [F::dilatational(&bond, &omega), F::deviatoric(&bond, &sigma)].map(|lanes| lanes.0[0])
         };
-        (family.iter().map(of_bond).collect(), numbers[12])
+        (bonds.iter().map(of_bond).collect(), numbers[12])
     }
 
     #[test]
@@ -434,6 +446,22 @@ mod tests {
                 );
             }
             assert!(least > 0.0, "{name}: {least}");
+        }
+    }
+
+    /// A bond from a point with a larger horizon must keep its critical stretch, up to the factor √2 that the
+    /// missing share of this end gives.
+    #[test]
+    fn points_without_bonds_have_no_share() {
+        for functions in [
+            functions_of::<Nearest>(&[], &family(|_| true)),
+            functions_of::<Directional>(&[], &family(|_| true)),
+        ] {
+            let of_ordinary = law::<Nearest>().whole();
+            for [omega, sigma] in functions.0 {
+                assert!((0.0..1e-100).contains(&omega), "{omega}");
+                assert!((0.0..1e-100 * of_ordinary).contains(&sigma), "{sigma}");
+            }
         }
     }
 

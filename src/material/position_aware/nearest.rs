@@ -1,5 +1,6 @@
-//! The functions ω and σ nearest to ω₀ and σ₀ that satisfy all [`Conditions`]: ω = n·Λ n and σ = N·S N. Because
-//! ω is quadratic in n, the dilatation is exact for every homogeneous strain, not only for the probe strains.
+//! The functions ω and σ nearest to ω₀ and σ₀ that satisfy all [`Conditions`]: ω = n·Λ n and σ = N·S N.
+//! Because ω is quadratic in n, the dilatation is exact for every homogeneous strain, not only for the probe
+//! strains.
 //!
 //! The distance of ω from ω₀ is Σ |ξ|² (ω − ω₀)² Ṽ, and that of σ from σ₀ is Σ |ξ|² (σ − σ₀)² Ṽ.
 
@@ -7,7 +8,7 @@ use nalgebra::{DMatrix, DVector, SMatrix};
 
 use super::conditions::{Conditions, Quadratic, of_product, one_in_squares, product};
 use super::{Fit, Form, squares};
-use crate::lanes::{IsaSet, Lanes};
+use crate::lanes::Lanes;
 use crate::material::Bond;
 use crate::material::monomials::{least_squares, multiplicity};
 use crate::material::symmetric::{Symmetric, mixed, quadratic_form, quadratic_form_of};
@@ -32,7 +33,7 @@ const RANK: f64 = 5e-3;
 pub struct Nearest;
 
 impl Form for Nearest {
-    const ISA_SET: IsaSet = IsaSet::Each;
+    const WITHOUT_BONDS: f64 = 0.0;
 
     /// Return Λ and S.
     fn fit<const D: usize>(

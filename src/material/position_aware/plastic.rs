@@ -1,7 +1,8 @@
 //! Elastic–perfectly plastic solid with the influence functions of [`PositionAware`].
 //!
-//! Each bond has a plastic extension e_p per end. Energy and force are those of [`PositionAware`] at the elastic
-//! extensions e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d Ṽ = 0:
+//! Each bond has a plastic extension e_p per end. Energy and force are those of [`PositionAware`] at the
+//! elastic extensions e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d
+//! Ṽ = 0:
 //!
 //! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
@@ -10,9 +11,9 @@
 //! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with
 //! r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore does not change θ.
 //!
-//! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a number c of
-//! the point. Flow then reduces the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ. Therefore 1 − r
-//! is limited to this value.
+//! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a
+//! number c of the point. Flow then reduces the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ.
+//! Therefore 1 − r is limited to this value.
 
 use super::directional::Directional;
 use super::nearest::Nearest;
@@ -22,7 +23,7 @@ use super::{
 };
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with a `surface_correction`.
+/// The law with `surface_correction = "pals"`.
 pub type PalsPlastic = PositionAwarePlastic<Nearest>;
 
 /// The law with `surface_correction = "directional"`.
@@ -72,7 +73,8 @@ fn elastic<const D: usize>(bond: &Bond<D>, plastic: Lanes) -> Bond<D> {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
-    /// The numbers of [`PositionAware`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
+    /// The numbers of [`PositionAware`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 −
+    /// r.
     type Point = (Functions<D>, [Lanes; OTHERS + 4]);
     /// e_p/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 2];

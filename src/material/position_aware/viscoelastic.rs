@@ -1,7 +1,8 @@
-//! Standard linear solid with the influence functions of [`PositionAware`]: the deviatoric part of the force relaxes.
+//! Standard linear solid with the influence functions of [`PositionAware`]: the deviatoric part of the force
+//! relaxes.
 //!
-//! Each bond has a back extension e_b per end, which follows the deviatoric extension ε of [`PositionAware`]. With the
-//! relaxing fraction λ ([`Relaxation`]),
+//! Each bond has a back extension e_b per end, which follows the deviatoric extension ε of [`PositionAware`].
+//! With the relaxing fraction λ ([`Relaxation`]),
 //!
 //! W = ½ k′θ² + ½ Σ σ (ε² + λ (e_b² − 2 ε e_b)) Ṽ,
 //!
@@ -16,7 +17,7 @@ use super::{
 };
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with a `surface_correction`.
+/// The law with `surface_correction = "pals"`.
 pub type PalsViscoelastic = PositionAwareViscoelastic<Nearest>;
 
 /// The law with `surface_correction = "directional"`.
@@ -53,7 +54,8 @@ impl<F: Form> Described for PositionAwareViscoelastic<F> {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
-    /// The numbers of [`PositionAware`], with k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) instead of k′θ − (1/d) Σ σ|ξ| ε Ṽ.
+    /// The numbers of [`PositionAware`], with k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) instead of k′θ − (1/d) Σ
+    /// σ|ξ| ε Ṽ.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     /// e_b/|ξ|, ε/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];

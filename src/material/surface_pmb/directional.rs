@@ -1,10 +1,10 @@
-//! The function h that is the radius of an ellipsoid. Its semi-axes are fitted to the energy densities at unit
-//! extension along each axis, which are half of the components aaaa of the elastic tensor.
+//! The function h that is the radius of an ellipsoid. Its semi-axes are fitted to the energy densities at
+//! unit extension along each axis, which are half of the components aaaa of the elastic tensor.
 
 use nalgebra::SMatrix;
 
 use super::Form;
-use crate::lanes::{IsaSet, Lanes};
+use crate::lanes::Lanes;
 use crate::material::monomials::index_of;
 use crate::material::symmetric::Symmetric;
 use crate::material::{Bond, ellipsoid};
@@ -14,30 +14,44 @@ use crate::material::{Bond, ellipsoid};
 pub struct Directional;
 
 impl Form for Directional {
-    const ISA_SET: IsaSet = IsaSet::Each;
-
     /// Return the tensor of the ellipsoid with the radius ½ h.
     fn fit<const D: usize>(
         sums: &[f64],
         micromodulus: f64,
         shear_modulus: f64,
     ) -> SMatrix<f64, D, D> {
-        let semi_axes = std::array::from_fn(|a| {
+        let found: [f64; D] = std::array::from_fn(|a| {
             // n_a⁴ = n_a⁴ n·n, a sum of monomials of degree 6.
-            let with_square = (0..D).map(|b| {
+            let terms = (0..D).map(|b| {
                 let mut exponents = [0; 3];
                 exponents[a] += 4;
                 exponents[b] += 2;
                 sums[index_of(exponents)]
             });
-            let found = 0.5 * micromodulus * with_square.sum::<f64>();
-            ellipsoid::semi_axis(3.0 * shear_modulus, found)
+            0.5 * micromodulus * terms.sum::<f64>()
         });
-        ellipsoid::tensor::<D>(semi_axes, 0.5)
+        if found.iter().all(|found| *found == 0.0) {
+            return SMatrix::identity() * ellipsoid::WITHOUT_BONDS;
+        }
+        let semi_axes = found.map(|found| ellipsoid::semi_axis(3.0 * shear_modulus, found));
+        ellipsoid::tensor(semi_axes, 0.5)
     }
 
     #[inline(always)]
     fn half<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
         ellipsoid::radius(bond, tensor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MONOMIALS;
+    use super::*;
+
+    #[test]
+    fn a_point_without_bonds_has_no_share() {
+        let tensor = Directional::fit::<3>(&[0.0; MONOMIALS], 1.0, 1.0);
+        let wanted = SMatrix::<f64, 3, 3>::identity() * ellipsoid::WITHOUT_BONDS;
+        assert!(tensor == wanted, "{tensor}");
     }
 }

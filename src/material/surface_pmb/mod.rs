@@ -1,10 +1,10 @@
 //! Prototype microelastic material with a surface correction: the micromodulus of each point depends on the
 //! direction of the bond, and is fitted to the point's own family.
 //!
-//! The micromodulus of an end is c h(n), with the micromodulus c of an untruncated family, the direction n of
-//! the bond and the [`Form`] of the function h. The elastic tensor of a family is ½ c Σ |ξ| h(n) n⊗n⊗n⊗n Ṽ.
-//! The elastic tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here
-//! μ = 2 W₁/(d (d + 2)), with the number of dimensions d and the energy density W₁ at unit isotropic stretch.
+//! The micromodulus of an end is c h(n): c is that of an untruncated family, and n the direction of the bond.
+//! A [`Form`] defines the function h. The elastic tensor of a family is ½ c Σ |ξ| h(n) n⊗n⊗n⊗n Ṽ. The elastic
+//! tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the
+//! number of dimensions d and the energy density W₁ at unit isotropic stretch.
 //!
 //! A bond has the mean of the micromoduli of points i and j, c_ij(n). A critical stretch s_c that follows
 //! from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. Le & Bobaru
@@ -23,7 +23,7 @@ use nalgebra::SMatrix;
 use super::monomials::write_monomials;
 use super::symmetric::{Symmetric, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
-use crate::lanes::{IsaSet, Lanes};
+use crate::lanes::Lanes;
 use directional::Directional;
 use tensor::Tensor;
 
@@ -32,9 +32,6 @@ const MONOMIALS: usize = 28;
 
 /// Form of the function h.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// [`Law::ISA_SET`] of the law.
-    const ISA_SET: IsaSet;
-
     /// Return the tensor of a point that determines ½ h, from the sums of |ξ| Ṽ times the monomials of degree
     /// 6 of n, c and μ.
     fn fit<const D: usize>(
@@ -105,7 +102,6 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
     type ReferenceSum = [Lanes; MONOMIALS];
     type Sum = [Lanes; 0];
     type Force = Along;
-    const ISA_SET: IsaSet = F::ISA_SET;
     const CONSTANTS: usize = 2 * D;
     const LEAST_DIMENSION: usize = 2;
     const SCALED: bool = true;

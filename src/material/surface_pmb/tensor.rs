@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
 use super::Form;
-use crate::lanes::{IsaSet, Lanes};
+use crate::lanes::Lanes;
 use crate::material::Bond;
 use crate::material::monomials::{exponents, index_of, least_squares, multiplicity};
 use crate::material::symmetric::{Symmetric, quadratic_form};
@@ -31,8 +31,6 @@ const RANK: f64 = 1e-2;
 pub struct Tensor;
 
 impl Form for Tensor {
-    const ISA_SET: IsaSet = IsaSet::Each;
-
     /// Return ½ H.
     fn fit<const D: usize>(
         sums: &[f64],
