@@ -76,8 +76,8 @@ impl EnergyWatch {
     /// `is_last`: whether this is the last row of the run. The result is the same on all ranks.
     ///
     /// # Errors
-    /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, above
-    /// [`CERTAIN_GAIN`] in one row, or NaN.
+    /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, or above
+    /// [`CERTAIN_GAIN`] in one row.
     pub fn check(
         &mut self,
         row: &HistoryRow,
@@ -103,8 +103,7 @@ impl EnergyWatch {
         };
         let steps = || format!("time step {:.3e} s, stable {stable:.3e} s", clock.step());
         let fatal = relative_gain > FATAL_GAIN;
-        let certain = relative_gain.is_nan() || relative_gain > CERTAIN_GAIN;
-        if certain || (fatal && (self.suspected || is_last)) {
+        if relative_gain > CERTAIN_GAIN || (fatal && (self.suspected || is_last)) {
             let message = format!("{}; reduce the time step ({})", text(), steps());
             return Err(Error::run(message));
         }

@@ -389,6 +389,8 @@ fn a_plate_that_is_torn_while_it_flows_keeps_its_energy() {
         "ordinary_viscoelastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, relaxation_time = 1e-5, relaxing_share = 0.8 }",
         "ordinary_plastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, yield_stress = 1.5e6, surface_correction = 'pals' }",
         "ordinary_viscoelastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, relaxation_time = 1e-5, relaxing_share = 0.8, surface_correction = 'pals' }",
+        "ordinary_plastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, yield_stress = 1.5e6, surface_correction = 'directional' }",
+        "ordinary_viscoelastic = { density = 1200, youngs_modulus = 3e9, poisson_ratio = 0.35, relaxation_time = 1e-5, relaxing_share = 0.8, surface_correction = 'directional' }",
     ] {
         let [coarse, fine] = [0.8, 0.2].map(|safety| torn(law, safety));
         // At long steps, bonds break late, and the released energy may decrease by less than 1e-4 of the
