@@ -89,7 +89,7 @@ impl<F: Form> Described for SurfacePmb<F> {
                 "micromodulus inside",
                 Property::Number(self.micromodulus, "N/m⁶"),
             ),
-            ("micromodulus at surfaces", Property::Text("by direction")),
+            ("at surfaces", Property::Text("by direction")),
         ]
     }
 }
