@@ -178,7 +178,11 @@ impl Group<'_> {
     pub fn indices(self) -> [u32; WIDTH] {
         match self {
             Self::Compact(first, differences) => {
-                differences.map(|difference| first + u32::from(difference))
+                let mut indices = [first; WIDTH];
+                for (index, difference) in indices.iter_mut().zip(differences) {
+                    *index += u32::from(*difference);
+                }
+                indices
             }
             Self::Full(indices) => *indices,
         }
@@ -187,12 +191,20 @@ impl Group<'_> {
     /// A base index, and the differences of the eight indices from the base index.
     #[inline(always)]
     pub fn base_and_offsets(self) -> (usize, [usize; WIDTH]) {
+        let mut offsets = [0; WIDTH];
         match self {
-            Self::Compact(first, differences) => (
-                first as usize,
-                std::array::from_fn(|k| differences[k] as usize),
-            ),
-            Self::Full(indices) => (0, std::array::from_fn(|k| indices[k] as usize)),
+            Self::Compact(first, differences) => {
+                for (offset, difference) in offsets.iter_mut().zip(differences) {
+                    *offset = usize::from(*difference);
+                }
+                (first as usize, offsets)
+            }
+            Self::Full(indices) => {
+                for (offset, index) in offsets.iter_mut().zip(indices) {
+                    *offset = *index as usize;
+                }
+                (0, offsets)
+            }
         }
     }
 }

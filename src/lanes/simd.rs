@@ -181,7 +181,10 @@ mod x86 {
         #[inline(always)]
         fn whole(self, a: Lanes) -> Lanes {
             // SAFETY: `self` proves that the machine has AVX2.
-            unsafe { joined(halves(a).map(|half| opaque_half(half))) }
+            unsafe {
+                let [low, high] = halves(a);
+                joined([opaque_half(low), opaque_half(high)])
+            }
         }
     }
 
@@ -394,9 +397,8 @@ mod x86 {
         // numbers of `b` directly from memory, so it needs no shuffle.
         let halves = |a: usize, b: usize, first: usize| {
             // SAFETY: each row has eight numbers, and `first` is 0 or 4.
-            let [a, b] =
-                [a, b].map(|row| unsafe { _mm256_loadu_pd(rows[row].as_ptr().add(first)) });
-            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(a), b)
+            let half = |row: usize| unsafe { _mm256_loadu_pd(rows[row].as_ptr().add(first)) };
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(half(a)), half(b))
         };
         let columns = |first: usize| {
             let [a, b] = [halves(0, 2, first), halves(1, 3, first)];
@@ -413,7 +415,17 @@ mod x86 {
             ]
         };
         let ([a, b, c, d], [e, f, g, h]) = (columns(0), columns(4));
-        [a, b, c, d, e, f, g, h].map(|column| lanes(opaque(column)))
+        let column = |column| lanes(opaque(column));
+        [
+            column(a),
+            column(b),
+            column(c),
+            column(d),
+            column(e),
+            column(f),
+            column(g),
+            column(h),
+        ]
     }
 
     /// Make a value opaque to the compiler. The compiler then keeps the operations before and after this call

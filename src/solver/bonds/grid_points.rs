@@ -374,7 +374,10 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             weights: match vector.weighted {
                 [false, _] => Weights::One,
                 [true, false] => Weights::Same(Lanes::splat(offset.weights[0])),
-                [true, true] => Weights::Each(offset.weights.map(Lanes::splat)),
+                [true, true] => {
+                    let [own, far] = offset.weights;
+                    Weights::Each([Lanes::splat(own), Lanes::splat(far)])
+                }
             },
             own: &here.numbers,
             far: numbers,

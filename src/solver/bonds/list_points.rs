@@ -195,7 +195,10 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         // SAFETY: `new` has checked the length.
         let nodes = unsafe { self.nodes.get_unchecked(first..) };
         // SAFETY: as above.
-        let columns = simd.transpose(distances.map(|k| unsafe { &nodes.get_unchecked(k).0 }));
+        let node = |k: usize| unsafe { &nodes.get_unchecked(distances[k]).0 };
+        let [a, b, c, d] = [node(0), node(1), node(2), node(3)];
+        let [e, f, g, h] = [node(4), node(5), node(6), node(7)];
+        let columns = simd.transpose([a, b, c, d, e, f, g, h]);
         let xi: [Lanes; D] = LaneTuple::each(|d| columns[d] - here.reference[d]);
         let eta = LaneTuple::each(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
         let mut square = xi[0] * xi[0];
