@@ -374,7 +374,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             walk(
                 Part::all(model, fields, bond_inputs),
                 on_parts,
-                |part, on| work(part, Here::new(all, on)),
+                &|part, on| work(part, Here::new(all, on)),
             )
         })
     }

@@ -184,7 +184,7 @@ impl<const D: usize> Simulation<'_, D> {
             Method::Explicit => 0.0,
         };
         let (model, fields) = (&self.model, &self.fields);
-        let squares = sums(model, fields, |point, _| {
+        let squares = sums(model, fields, &|point, _| {
             let force = load_on(model, fields, point);
             [force.iter().map(|force| force * force).sum()]
         });

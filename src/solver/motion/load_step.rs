@@ -227,7 +227,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Compute the residual. Returns ‖f‖, N. Collective.
     pub(super) fn find_residual(&mut self) -> f64 {
         let (model, fields) = (&self.model, &self.fields);
-        let mut squares = sums(model, fields, |point, density| {
+        let mut squares = sums(model, fields, &|point, density| {
             balance(model, fields, point, density)
         });
         let squares = reduce(self.comm, &mut squares);
@@ -291,7 +291,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// is larger. Collective.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
-        let [loads, mut reactions] = sums(model, fields, |point, _| {
+        let [loads, mut reactions] = sums(model, fields, &|point, _| {
             let of = |field: &Option<[Vec<f64>; D]>| {
                 let square = |f: &[Vec<f64>; D]| f.iter().map(|f| f[point].powi(2)).sum::<f64>();
                 model.volume[point].powi(2) * field.as_ref().map_or(0.0, square)
@@ -416,7 +416,7 @@ impl<const D: usize> Simulation<'_, D> {
 pub(super) fn sums<const D: usize, const N: usize>(
     model: &Model<D>,
     fields: &Fields<D>,
-    terms: impl Fn(usize, f64) -> [f64; N] + Sync,
+    terms: &(dyn Fn(usize, f64) -> [f64; N] + Sync),
 ) -> [ExactSum; N] {
     let density = fields.relaxation_density();
     (0..model.owned().div_ceil(CHUNK))

@@ -287,13 +287,21 @@ impl<const D: usize> Vectors<D> {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {
             let inverse = &self.inverse_diagonal[d];
-            let both = self.force[d].par_iter_mut().zip(&mut self.residual[d]);
-            both.with_min_len(CHUNK)
-                .enumerate()
-                .for_each(|(point, (force, residual))| {
+            in_chunks(&mut self.force[d], &|first, chunk| {
+                for (point, force) in (first..).zip(chunk) {
                     *force = fields.total_force(model, d, point);
-                    *residual = if inverse[point] > 0.0 { *force } else { 0.0 };
-                });
+                }
+            });
+            let force = &self.force[d];
+            in_chunks(&mut self.residual[d], &|first, chunk| {
+                for (point, residual) in (first..).zip(chunk) {
+                    *residual = if inverse[point] > 0.0 {
+                        force[point]
+                    } else {
+                        0.0
+                    };
+                }
+            });
         }
     }
 
@@ -324,10 +332,11 @@ impl<const D: usize> Vectors<D> {
             };
             power = own;
             for (direction, preconditioned) in self.direction.iter_mut().zip(&self.preconditioned) {
-                let pairs = direction.par_iter_mut().zip(preconditioned);
-                pairs
-                    .with_min_len(CHUNK)
-                    .for_each(|(direction, new)| *direction = new + kept * *direction);
+                in_chunks(direction, &|first, chunk| {
+                    for (direction, new) in chunk.iter_mut().zip(&preconditioned[first..]) {
+                        *direction = new + kept * *direction;
+                    }
+                });
             }
             self.multiply(simulation);
             let curvature = dot(simulation, &self.direction, &self.product);
@@ -348,7 +357,7 @@ impl<const D: usize> Vectors<D> {
     /// Return ‖f − K x‖, N. Collective.
     fn residual_norm(&self, simulation: &Simulation<'_, D>) -> f64 {
         let (model, fields) = (&simulation.model, &simulation.fields);
-        let square = sums(model, fields, |point, _| {
+        let square = sums(model, fields, &|point, _| {
             let force = |d: usize| model.volume[point] * self.residual[d][point];
             [(0..D).map(|d| f64::powi(force(d), 2)).sum()]
         });
@@ -371,14 +380,15 @@ impl<const D: usize> Vectors<D> {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {
             let (force, inverse) = (&self.force[d], &self.inverse_diagonal[d]);
-            let product = self.product[d].par_iter_mut().with_min_len(CHUNK);
-            product.enumerate().for_each(|(point, product)| {
-                let change = force[point] - fields.total_force(model, d, point);
-                *product = if inverse[point] > 0.0 {
-                    change / shift
-                } else {
-                    0.0
-                };
+            in_chunks(&mut self.product[d], &|first, chunk| {
+                for (point, product) in (first..).zip(chunk) {
+                    let change = force[point] - fields.total_force(model, d, point);
+                    *product = if inverse[point] > 0.0 {
+                        change / shift
+                    } else {
+                        0.0
+                    };
+                }
             });
         }
     }
@@ -390,13 +400,14 @@ impl<const D: usize> Vectors<D> {
         for d in 0..D {
             let (residual, inverse) = (&self.residual[d], &self.inverse_diagonal[d]);
             let coarse = &self.coarse;
-            let column = self.preconditioned[d].par_iter_mut().with_min_len(CHUNK);
-            column.enumerate().for_each(|(point, value)| {
-                *value = if inverse[point] > 0.0 {
-                    inverse[point] * residual[point] + coarse.displacement(model, d, point)
-                } else {
-                    0.0
-                };
+            in_chunks(&mut self.preconditioned[d], &|first, chunk| {
+                for (point, value) in (first..).zip(chunk) {
+                    *value = if inverse[point] > 0.0 {
+                        inverse[point] * residual[point] + coarse.displacement(model, d, point)
+                    } else {
+                        0.0
+                    };
+                }
             });
         }
     }
@@ -444,7 +455,7 @@ impl<const D: usize> Vectors<D> {
     /// Return the product x·f of the correction and the total forces at the present positions, J. Collective.
     fn power(&self, simulation: &Simulation<'_, D>) -> f64 {
         let (model, fields) = (&simulation.model, &simulation.fields);
-        let power = sums(model, fields, |point, _| {
+        let power = sums(model, fields, &|point, _| {
             let of = |d: usize| self.correction[d][point] * fields.total_force(model, d, point);
             [model.volume[point] * (0..D).map(of).sum::<f64>()]
         });
@@ -461,27 +472,29 @@ impl<const D: usize> Vectors<D> {
         let owned = model.owned();
         let family = &simulation.undeformed.family_volume;
         let mut intact = forces.intact_families(model).volume;
-        let shares = intact.par_iter_mut().with_min_len(CHUNK).enumerate();
-        shares.for_each(|(point, share)| {
-            *share = if family[point] > 0.0 {
-                (*share / family[point]).max(LEAST_INTACT)
-            } else {
-                0.0
-            };
+        in_chunks(&mut intact, &|first, chunk| {
+            for (point, share) in (first..).zip(chunk) {
+                *share = if family[point] > 0.0 {
+                    (*share / family[point]).max(LEAST_INTACT)
+                } else {
+                    0.0
+                };
+            }
         });
         let is_free = simulation.conditions.free_components(owned);
         let density = simulation.fields.fictitious_density.as_deref();
         let density = density.expect("a run with equilibria has fictitious densities");
         for (inverse, is_free) in self.inverse_diagonal.iter_mut().zip(&is_free) {
-            let each = inverse.par_iter_mut().with_min_len(CHUNK).enumerate();
-            each.for_each(|(point, inverse)| {
-                let stiffness = density[point] * intact[point];
-                let takes_part = is_free[point] == 1.0 && stiffness.is_finite();
-                *inverse = if takes_part && stiffness > 0.0 {
-                    1.0 / stiffness
-                } else {
-                    0.0
-                };
+            in_chunks(inverse, &|first, chunk| {
+                for (point, inverse) in (first..).zip(chunk) {
+                    let stiffness = density[point] * intact[point];
+                    let takes_part = is_free[point] == 1.0 && stiffness.is_finite();
+                    *inverse = if takes_part && stiffness > 0.0 {
+                        1.0 / stiffness
+                    } else {
+                        0.0
+                    };
+                }
             });
         }
         if simulation.progress.newton.diagonal.is_nan() {
@@ -534,7 +547,7 @@ impl<const D: usize> Vectors<D> {
         let [direction, product, inverse] =
             [&self.direction, &self.product, &self.inverse_diagonal];
         let (model, fields) = (&simulation.model, &simulation.fields);
-        let both = sums(model, fields, |point, _| {
+        let both = sums(model, fields, &|point, _| {
             let mut terms = [0.0; 2];
             for d in (0..D).filter(|d| inverse[*d][point] > 0.0) {
                 terms[0] += model.volume[point] * direction[d][point] * product[d][point];
@@ -628,20 +641,31 @@ fn move_from<const D: usize>(
     direction: &[Vec<f64>; D],
 ) {
     for d in 0..D {
-        let displacement = simulation.fields.displacement[d].par_iter_mut();
-        let both = displacement.zip(base[d].par_iter().zip(&direction[d]));
-        both.with_min_len(CHUNK)
-            .for_each(|(displacement, (base, direction))| {
+        let (base, direction) = (&base[d], &direction[d]);
+        let owned = &mut simulation.fields.displacement[d][..base.len()];
+        in_chunks(owned, &|first, chunk| {
+            let both = base[first..].iter().zip(&direction[first..]);
+            for (displacement, (base, direction)) in chunk.iter_mut().zip(both) {
                 *displacement = base + length * direction;
-            });
+            }
+        });
     }
+}
+
+/// Call `change` on several threads, with the first index and the entries of each chunk of a column.
+fn in_chunks(column: &mut [f64], change: &(dyn Fn(usize, &mut [f64]) + Sync)) {
+    let chunks = column.par_chunks_mut(CHUNK).enumerate();
+    chunks.for_each(|(k, chunk)| change(k * CHUNK, chunk));
 }
 
 /// Add `factor` times `vector` to `to`.
 fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; D]) {
     for (to, vector) in to.iter_mut().zip(vector) {
-        let both = to.par_iter_mut().zip(vector).with_min_len(CHUNK);
-        both.for_each(|(to, value)| *to += factor * value);
+        in_chunks(to, &|first, chunk| {
+            for (to, value) in chunk.iter_mut().zip(&vector[first..]) {
+                *to += factor * value;
+            }
+        });
     }
 }
 
@@ -653,7 +677,7 @@ fn dot<const D: usize>(
     b: &[Vec<f64>; D],
 ) -> f64 {
     let (model, fields) = (&simulation.model, &simulation.fields);
-    let sum = sums(model, fields, |point, _| {
+    let sum = sums(model, fields, &|point, _| {
         let products = (0..D).map(|d| a[d][point] * b[d][point]);
         [model.volume[point] * products.sum::<f64>()]
     });

@@ -128,7 +128,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
         fields.relaxation_velocity = velocity;
         let fields = &self.fields;
-        let [power, inertia] = sums(model, fields, |point, density| {
+        let [power, inertia] = sums(model, fields, &|point, density| {
             let velocity = |d: usize| {
                 fields
                     .relaxation_velocity
@@ -147,7 +147,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// start from rest. Collective.
     fn look(&mut self, before: Option<Before>) {
         let (model, fields) = (&self.model, &self.fields);
-        let [power, free, loads, reactions, stiffness] = sums(model, fields, |point, density| {
+        let [power, free, loads, reactions, stiffness] = sums(model, fields, &|point, density| {
             let of = |d: usize| {
                 let velocity = fields.relaxation_velocity.as_ref();
                 velocity.map_or(0.0, |velocity| velocity[d][point])

@@ -196,14 +196,14 @@ fn halves<C, const D: usize>(
 }
 
 /// Call `work` with each part of the points and the entry of `each` for this part. Returns whether all calls
-/// returned true.
+/// returned true. `work` is a trait object, so that the loop is compiled once for all callers.
 ///
 /// # Panics
 /// If `each` does not have one entry per part.
 pub fn walk<'a, C: Send, const D: usize>(
     all: Part<'a, D>,
     each: &'a mut [C],
-    work: impl Fn(&mut Part<'_, D>, &mut C) -> bool + Sync,
+    work: &(dyn Fn(&mut Part<'_, D>, &mut C) -> bool + Sync),
 ) -> bool {
     assert_eq!(each.len(), parts(all.count()), "one entry a part");
     split((all, each), halves::<C, D>)

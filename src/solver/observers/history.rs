@@ -673,7 +673,7 @@ pub(in crate::solver) fn point_sums<const D: usize>(
             sums[2].add(freed[point]);
         }
     };
-    sums_over(model.owned(), 3 + D, add)
+    sums_over(model.owned(), 3 + D, &add)
 }
 
 /// Axes of the angular momentum: z in 2-D, all in 3-D, none in 1-D.
@@ -690,7 +690,7 @@ fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
 fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<ExactSum> {
     let (model, fields) = (&simulation.model, &simulation.fields);
     let axes = rotation_axes(D);
-    sums_over(model.owned(), axes.len(), |sums, point| {
+    sums_over(model.owned(), axes.len(), &|sums, point| {
         let mass = model.density_of(point) * model.volume[point];
         let place = |d: usize| model.reference[d][point] + fields.displacement[d][point];
         for (sum, axis) in sums.iter_mut().zip(axes.clone()) {
@@ -706,7 +706,7 @@ fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Exact
 fn sums_over(
     count: usize,
     width: usize,
-    add: impl Fn(&mut [ExactSum], usize) + Sync,
+    add: &(dyn Fn(&mut [ExactSum], usize) + Sync),
 ) -> Vec<ExactSum> {
     (0..count.div_ceil(CHUNK))
         .into_par_iter()
