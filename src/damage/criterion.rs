@@ -141,14 +141,10 @@ impl Sense {
     }
 }
 
-/// Data of both ends of eight bonds.
+/// Data of both ends of eight bonds that only criteria read.
 #[derive(Clone, Copy)]
-pub struct Ends<'a, L, P> {
-    /// Laws of points i and j.
-    pub laws: &'a [L; 2],
-    /// Point numbers of points i and j.
-    pub points: [&'a P; 2],
-    /// Data of points i and j. Only criteria read these data.
+pub struct Ends<'a> {
+    /// Data of points i and j.
     pub limits: [&'a Limits; 2],
     /// Influence function times volume correction of the bonds.
     pub weights: Weights,
@@ -254,14 +250,15 @@ impl Criterion {
         }
     }
 
-    /// Return one bit per bond, set if the bond meets the criterion. `work` (J/m⁶) is read only if
-    /// [`Self::reads_work`].
+    /// Return one bit per bond, set if the bond meets the criterion. `laws` and `points` are the laws and the
+    /// point numbers of points i and j. `work` (J/m⁶) is read only if [`Self::reads_work`].
     #[inline(always)]
     pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
         &self,
         simd: S,
         bond: &Bond<D>,
-        ends: Ends<'_, L, L::Point>,
+        (laws, points): (&[L; 2], [&L::Point; 2]),
+        ends: Ends<'_>,
         work: Lanes,
     ) -> u8 {
         match *self {
@@ -274,7 +271,7 @@ impl Criterion {
             ),
             Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 let [i, j] = ends.weights.acting();
-                let spent = simd.at_least(work, self.threshold(simd, bond, ends)) & (i | j);
+                let spent = simd.at_least(work, self.threshold(simd, bond, ends, None)) & (i | j);
                 rule.sense.select(spent, bond)
             }
             // The points of laws with forces along the bonds have no stress.
@@ -286,7 +283,8 @@ impl Criterion {
                     [i.stresses, j.stresses],
                     ends.weights.acting(),
                 ));
-                let reached = simd.at_least(stress, self.threshold(simd, bond, ends)) & acting;
+                let reached =
+                    simd.at_least(stress, self.threshold(simd, bond, ends, None)) & acting;
                 rule.sense.select(reached, bond)
             }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
@@ -294,26 +292,35 @@ impl Criterion {
             | Self::Thresholds(..)
             | Self::StretchBetween(..)
             | Self::ThresholdsBetween(..) => {
-                let threshold = self.threshold(simd, bond, ends);
+                let scale = if L::SCALED {
+                    Some(laws[0].toughness_scale(bond, points, &laws[1]))
+                } else {
+                    None
+                };
+                let threshold = self.threshold(simd, bond, ends, scale);
                 let threshold = threshold * (Lanes::splat(2.0) + threshold);
                 simd.at_least(bond.relative_square_extension, threshold)
             }
         }
     }
 
-    /// Return the stretch, work or stress at which each bond breaks.
+    /// Return the stretch, work or stress at which each bond breaks. `scale` is the factor
+    /// [`Law::toughness_scale`] on critical stretches; `None` for laws that do not scale them.
     #[inline(always)]
-    fn threshold<S: Simd, L: Law<D>, const D: usize>(
+    fn threshold<S: Simd, const D: usize>(
         &self,
         simd: S,
         bond: &Bond<D>,
-        ends: Ends<'_, L, L::Point>,
+        ends: Ends<'_>,
+        scale: Option<Lanes>,
     ) -> Lanes {
-        let scale = || ends.laws[0].toughness_scale(bond, ends.points, &ends.laws[1]);
         match *self {
             Self::Never => Lanes::splat(f64::INFINITY),
-            Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) | Self::Stress(critical, _) => Lanes::splat(critical),
+            Self::Stretch(critical) => match scale {
+                Some(scale) => Lanes::splat(critical) * scale,
+                None => Lanes::splat(critical),
+            },
+            Self::Stress(critical, _) => Lanes::splat(critical),
             Self::StressThresholds(_) => (ends.limits[0].thresholds).min(ends.limits[1].thresholds),
             Self::Work([i, j], rule) => {
                 rule.sum_of_acting(simd, [Lanes::splat(i), Lanes::splat(j)], ends)
@@ -321,17 +328,16 @@ impl Criterion {
             Self::StretchBetween(critical, conversion) => {
                 let both = [Lanes::splat(critical[0]), Lanes::splat(critical[1])];
                 let threshold = conversion.convert(simd, both, ends.weights.acting());
-                if L::SCALED {
-                    threshold * scale()
-                } else {
-                    threshold
+                match scale {
+                    Some(scale) => threshold * scale,
+                    None => threshold,
                 }
             }
             Self::Thresholds(critical, ref directions)
             | Self::ThresholdsBetween(critical, _, ref directions) => {
                 let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
-                if L::SCALED {
-                    let growth = scale() - Lanes::splat(1.0);
+                if let Some(scale) = scale {
+                    let growth = scale - Lanes::splat(1.0);
                     here += growth * critical[0];
                     there += growth * critical[1];
                 }
@@ -365,16 +371,18 @@ impl Criterion {
 
     /// Return the fraction of the energy of each broken bond that exceeds the criterion: 1 − (s_c/s)²,
     /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0, with the threshold s_c, w_c or σ_c. Bonds exceed the criterion
-    /// because it is checked only once per step. Criteria of stretch read [`Bond::stretch`].
+    /// because it is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`, the
+    /// factor [`Law::toughness_scale`] of laws that scale critical stretches.
     #[inline(always)]
-    pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
+    pub fn overshoot<S: Simd, const D: usize>(
         &self,
         simd: S,
         bond: &Bond<D>,
-        ends: Ends<'_, L, L::Point>,
+        ends: Ends<'_>,
+        scale: Option<Lanes>,
         work: Lanes,
     ) -> Lanes {
-        let threshold = self.threshold(simd, bond, ends);
+        let threshold = self.threshold(simd, bond, ends, scale);
         let ratio = if self.reads_work() {
             threshold / work
         } else {
@@ -420,12 +428,7 @@ impl WorkRule {
     /// out, because array methods are not always inlined. Without inlining, all data of a bond stay in memory
     /// instead of registers.
     #[inline(always)]
-    fn sum_of_acting<S: Simd, L, P>(
-        self,
-        simd: S,
-        [i, j]: [Lanes; 2],
-        ends: Ends<'_, L, P>,
-    ) -> Lanes {
+    fn sum_of_acting<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], ends: Ends<'_>) -> Lanes {
         let [acts_i, acts_j] = ends.weights.acting();
         let critical_i = simd.keep(self.corrected(i, ends.limits[0]), acts_i);
         let critical_j = simd.keep(self.corrected(j, ends.limits[1]), acts_j);

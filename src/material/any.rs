@@ -4,8 +4,8 @@
 use nalgebra::SMatrix;
 
 use super::{
-    AnyLaw, Bond, COUNTS, Described, FamilyStress, ForceState, Law, PlasticState, Property,
-    Rotation, with_law,
+    AnyLaw, Bond, COUNTS, Described, FamilyStress, ForceState, Law, PairLaw, PlasticState,
+    Property, Rotation, with_law, with_pair,
 };
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
@@ -161,6 +161,26 @@ impl AnyLaw {
     /// Return [`Law::counts`] in `D` dimensions.
     pub fn counts<const D: usize>(&self) -> Counts {
         with_law!(self, law => Law::<D>::counts(law))
+    }
+}
+
+impl PairLaw {
+    /// Return [`Law::toughness_scale`] of eight bonds, from the numbers of points i and j; `None` for laws
+    /// that do not define it.
+    #[inline(never)]
+    pub fn toughness_scale<const D: usize>(
+        &self,
+        bond: &Bond<D>,
+        points: [&AnyPoint; 2],
+    ) -> Option<Lanes> {
+        fn of<L: Law<D>, const D: usize>(
+            laws: &[L; 2],
+            bond: &Bond<D>,
+            [i, j]: [&AnyPoint; 2],
+        ) -> Option<Lanes> {
+            (L::SCALED).then(|| laws[0].toughness_scale(bond, [&first(i), &first(j)], &laws[1]))
+        }
+        with_pair!(self, laws => of(laws, bond, points))
     }
 }
 

@@ -105,6 +105,19 @@ impl Weights {
         }
     }
 
+    /// Return the weights without volume correction: 1 at the ends whose force states act on the bond, and 0
+    /// at the other ends.
+    #[inline(always)]
+    pub fn uncorrected<S: Simd>(self, simd: S) -> Self {
+        match self {
+            Self::One | Self::Same(_) => Self::One,
+            Self::Each(_) => {
+                let ([i, j], one) = (self.acting(), Lanes::splat(1.0));
+                Self::Each([simd.keep(one, i), simd.keep(one, j)])
+            }
+        }
+    }
+
     /// Return the weighted sum of the contributions of i and j. Both ends compute the same bits.
     #[inline(always)]
     pub fn sum(self, here: Lanes, there: Lanes) -> Lanes {

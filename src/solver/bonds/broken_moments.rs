@@ -29,7 +29,6 @@ pub struct MomentSums;
 
 impl<const D: usize> Kernel<D> for MomentSums {
     type Sums = [Lanes; 14];
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];

@@ -13,13 +13,14 @@ use crate::material::bond::stretch_of;
 use crate::material::{Law, MOST, with_law, with_pair};
 use crate::solver::model::Model;
 
+use super::breaking::BreakingBonds;
 use super::broken::Broken;
 use super::force::{BondUpdate, Force};
 use super::list_points;
 use super::point_numbers::PlasticColumns;
 use super::point_stresses::StressInputs;
 use super::point_sums::{PassSum, SmallestStretch};
-use super::sweep::{PointData, sweep};
+use super::sweep::{PointData, sweep, sweep_and_break};
 use super::{Forces, Pass};
 
 /// Number of points that one task processes.
@@ -355,11 +356,18 @@ impl<const D: usize> Forces<D> {
                         Criterion::Never
                     };
                     let influence = interaction.influence;
+                    let breaking = BreakingBonds {
+                        laws: interaction.laws.laws(),
+                        criterion,
+                        influence,
+                    };
                     with_pair!(interaction.laws, laws => {
                         let kernel = Force { laws, criterion, influence, bond_update };
                         let results = force.each_mut().map(Vec::as_mut_slice);
                         let bonds = &mut interaction.bonds;
-                        let broken_sums = sweep(bonds, points.clone(), results, &kernel, source);
+                        let points = points.clone();
+                        let broken_sums =
+                            sweep_and_break(bonds, points, results, &kernel, &breaking, source);
                         broken.extend(broken_sums.iter().map(Broken::new));
                     });
                 });

@@ -1,6 +1,6 @@
 //! The kernel that sums bond forces and breaks the bonds that meet their criterion.
 
-use crate::damage::{Criterion, Ends};
+use crate::damage::Criterion;
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::{Wanted, Weights};
 use crate::material::{ForceState, Law};
@@ -38,12 +38,7 @@ impl BondUpdate {
 
 /// Kernel that sums the forces of the intact bonds: force density by component, N/m³.
 ///
-/// Bonds that break in this sweep are excluded. For these bonds, the kernel sums
-///
-/// - their number;
-/// - the energy that they release at the point, J;
-/// - the part of this energy above the criterion, J;
-/// - their forces, N/m³.
+/// Bonds that break in this sweep are excluded.
 #[derive(Clone, Copy)]
 pub struct Force<L> {
     /// Laws of points i and j.
@@ -89,13 +84,10 @@ impl<L> Force<L> {
         if !self.criterion.reads_work() {
             return Lanes::splat(0.0);
         }
-        let weights = match group.weights {
-            weights if self.influence => weights,
-            Weights::One | Weights::Same(_) => Weights::One,
-            Weights::Each(_) => {
-                let ([i, j], one) = (group.weights.acting(), Lanes::splat(1.0));
-                Weights::Each([simd.keep(one, i), simd.keep(one, j)])
-            }
+        let weights = if self.influence {
+            group.weights
+        } else {
+            group.weights.uncorrected(simd)
         };
         if L::Force::CENTRAL {
             let total = if self.influence {
@@ -153,38 +145,27 @@ impl<L> Force<L> {
     where
         L: Law<D>,
     {
+        let laws = (&self.laws, group.points());
         let breaking =
-            (self.criterion).breaking::<S, L, D>(simd, &group.bond, self.ends(group), work);
+            (self.criterion).breaking::<S, L, D>(simd, &group.bond, laws, group.ends(), work);
         group.intact & group.breakable & (breaking | self.worn_out(simd, group))
-    }
-
-    #[inline(always)]
-    fn ends<'a, const D: usize>(&'a self, group: &'a Group<'_, Self, D>) -> Ends<'a, L, L::Point>
-    where
-        L: Law<D>,
-    {
-        Ends {
-            laws: &self.laws,
-            points: group.points(),
-            limits: [group.limits_i, &group.limits_j],
-            weights: group.weights,
-        }
     }
 }
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Sums = [Lanes; D];
-    type Broken = ([Lanes; 3], [Lanes; D]);
     type Point = L::Point;
     type Far = L::Point;
     type BondHistory = L::BondHistory;
     type Rotation = <L::Force as ForceState<D>>::Rotation;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const ISA_SET: IsaSet = L::ISA_SET;
-    const HAS_FAST_PATH: bool = L::ISA_SET.is_each()
+    // One-dimensional bodies are small.
+    const ISA_SET: IsaSet = if D == 1 { IsaSet::Avx2 } else { L::ISA_SET };
+    const HAS_FAST_PATH: bool = <Self as Kernel<D>>::ISA_SET.is_each()
         && !L::LINEAR
         && L::BondHistory::COUNT == 0
         && (L::FORCE_READS_STRETCH || L::FORCE_READS_EXTENSION);
+    const BREAKS: bool = true;
     const READS_STRESSES: bool = !L::Force::CENTRAL;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
@@ -227,36 +208,5 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
         let total = self.weighted(simd, group, group.weights);
         total.add(simd, &group.bond, group.force_volume, group.intact, force);
-    }
-
-    #[inline(always)]
-    fn add_broken<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        (counts, lost): &mut Self::Broken,
-    ) {
-        let total = self.weighted(simd, group, group.weights);
-        let work = self.work(simd, group, total);
-        let broken = self.breaks(simd, group, work);
-        group.intact &= !broken;
-        let bond = group.bond.with_stretch(L::LINEAR);
-        let share = group.weights.own() * group.own_volume * group.volume;
-        let energy = self.laws[0].bond_energy(&bond, group.own, &group.history[0]) * share;
-        let ends = self.ends(group);
-        let late = self.criterion.overshoot::<S, L, D>(simd, &bond, ends, work);
-        let overshoot = if self.criterion.reads_work() {
-            // The work of a bond is divided equally between the ends whose force states act.
-            let [own, far] = ends.weights.acting();
-            let half = simd.keep(Lanes::splat(0.5), own & far);
-            let part = simd.select(half, own & far, simd.keep(Lanes::splat(1.0), own));
-            work * part * share * late
-        } else {
-            energy * late
-        };
-        counts[0] += simd.keep(Lanes::splat(1.0), broken);
-        counts[1] += simd.keep(energy, broken);
-        counts[2] += simd.keep(overshoot, broken);
-        total.add(simd, &bond, group.force_volume, broken, lost);
     }
 }

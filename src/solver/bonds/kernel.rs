@@ -3,7 +3,7 @@
 //! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel serves both storages of
 //! bonds: the eight bonds belong to one point (lists) or to eight points (lattices).
 
-use crate::damage::{Criterion, Limits};
+use crate::damage::{Criterion, Ends, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
@@ -55,6 +55,15 @@ where
 }
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
+    /// The data of both ends that the criterion reads.
+    #[inline(always)]
+    pub fn ends(&self) -> Ends<'_> {
+        Ends {
+            limits: [self.limits_i, &self.limits_j],
+            weights: self.weights,
+        }
+    }
+
     /// Bits of the intact bonds within the horizon of point i.
     #[inline(always)]
     pub fn family(&self) -> u8 {
@@ -90,10 +99,6 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// combined; see [`Self::COMBINE`].
     type Sums: LaneTuple;
 
-    /// Sums over the bonds that break in this sweep, eight lanes per quantity. A sweep returns these sums
-    /// only for points with such bonds.
-    type Broken: LaneTuple;
-
     /// Point numbers of points i that the kernel reads.
     type Point: LaneTuple;
 
@@ -108,6 +113,10 @@ pub trait Kernel<const D: usize>: Copy + Sync {
 
     /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
+
+    /// Whether [`Self::add`] can break bonds. The kernel must then run in
+    /// [`sweep_and_break`](super::sweep::sweep_and_break).
+    const BREAKS: bool = false;
 
     /// Operation that combines the sums with the columns, and the lanes of a sum if they belong to one point.
     const COMBINE: Combine = Combine::Add;
@@ -202,16 +211,5 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     #[inline(always)]
     fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
         self.add(simd, group, sums);
-    }
-
-    /// Clear the intact bits of breaking bonds and add these bonds to `broken`. If [`Self::add`], which works
-    /// on a copy of the intact bits, broke a bond, a second loop over the bonds calls this function. The
-    /// second loop is out of line to save registers.
-    fn add_broken<S: Simd>(
-        &self,
-        _simd: S,
-        _group: &mut Group<'_, Self, D>,
-        _broken: &mut Self::Broken,
-    ) {
     }
 }

@@ -32,7 +32,6 @@ pub struct Stored {
 
 impl<const D: usize> Kernel<D> for Stored {
     type Sums = [Lanes; 4];
-    type Broken = [Lanes; 0];
     type Point = AnyPoint;
     type Far = [Lanes; 0];
     type BondHistory = AnyHistory;
@@ -75,7 +74,6 @@ pub struct IntactFamilies;
 
 impl<const D: usize> Kernel<D> for IntactFamilies {
     type Sums = [Lanes; 2];
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
@@ -105,7 +103,6 @@ pub struct Softened {
 
 impl<const D: usize> Kernel<D> for Softened {
     type Sums = [Lanes; 1];
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = AnyHistory;
@@ -151,7 +148,6 @@ pub struct Stiffness {
 
 impl<const D: usize> Kernel<D> for Stiffness {
     type Sums = [Lanes; 6];
-    type Broken = [Lanes; 0];
     type Point = AnyPoint;
     type Far = AnyPoint;
     type BondHistory = [Lanes; 0];
@@ -207,7 +203,6 @@ pub struct Stress {
 
 impl<const D: usize> Kernel<D> for Stress {
     type Sums = [Lanes; 6];
-    type Broken = [Lanes; 0];
     type Point = AnyPoint;
     type Far = [Lanes; 0];
     type BondHistory = AnyHistory;
@@ -237,7 +232,6 @@ pub struct StressAcross {
 
 impl<const D: usize> Kernel<D> for StressAcross {
     type Sums = [Lanes; 1];
-    type Broken = [Lanes; 0];
     type Point = AnyPoint;
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
@@ -267,7 +261,6 @@ pub struct FamilyTensors {
 
 impl<const D: usize> Kernel<D> for FamilyTensors {
     type Sums = FamilyShare<D>;
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
@@ -300,7 +293,6 @@ pub struct EnergyRate {
 
 impl<const D: usize> Kernel<D> for EnergyRate {
     type Sums = [Lanes; 1];
-    type Broken = [Lanes; 0];
     type Point = ([Lanes; D], AnyPoint);
     type Far = [Lanes; D];
     type BondHistory = AnyHistory;
@@ -338,7 +330,6 @@ pub struct Dilatation {
 
 impl<const D: usize> Kernel<D> for Dilatation {
     type Sums = [Lanes; 2];
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];

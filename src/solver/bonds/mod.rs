@@ -11,6 +11,7 @@
 //! depend on broken bonds are then recomputed, see `broken.rs`.
 
 mod bond_inputs;
+mod breaking;
 mod broken;
 mod broken_moments;
 mod evaluate;

@@ -29,7 +29,6 @@ pub struct PassSum<L, const N: usize> {
 
 impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Sums = L::Sum;
-    type Broken = [Lanes; 0];
     type Point = L::Point;
     type Far = [Lanes; 0];
     type BondHistory = L::BondHistory;
@@ -83,7 +82,6 @@ pub struct FamilySum<const D: usize> {
 
 impl<const D: usize> Kernel<D> for FamilySum<D> {
     type Sums = <AnyLaw as Law<D>>::ReferenceSum;
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
@@ -127,7 +125,6 @@ pub struct SmallestStretch;
 
 impl<const D: usize> Kernel<D> for SmallestStretch {
     type Sums = [Lanes; 1];
-    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];

@@ -13,6 +13,7 @@ use crate::lanes::simd::{Avx2, Avx512};
 use crate::lanes::simd::{Portable, Task};
 use crate::lanes::{Column, Instructions, IsaSet, LaneTuple, Lanes, Simd, WIDTH};
 
+use super::breaking::BreakingBonds;
 use super::grid_points::{GridPoints, GridValues};
 use super::kernel::{Combine, Kernel};
 use super::limit_columns::LimitColumns;
@@ -53,12 +54,12 @@ type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::Col
 pub struct BrokenSums {
     /// Local index of the point.
     pub point: usize,
-    /// The sums; 0 for quantities that the kernel does not have.
+    /// The sums of [`BreakingBonds`]; 0 for components beyond the dimension.
     pub sums: [f64; MAX_BROKEN_SUMS],
 }
 
-/// Maximum number of quantities of [`Kernel::Broken`].
-pub const MAX_BROKEN_SUMS: usize = 6;
+/// Number of sums of [`BreakingBonds`] in three dimensions.
+const MAX_BROKEN_SUMS: usize = 6;
 
 /// A part of the bonds of two blocks.
 trait Part: Sized + Send {
@@ -91,7 +92,7 @@ trait Runner<P: Part>: Sync {
 }
 
 /// Run a kernel over the bonds of the owned points in a range of local indices. The results are columns
-/// over all owned points. Return the sums over breaking bonds, by ascending point.
+/// over all owned points.
 ///
 /// # Panics
 /// If an array that the kernel reads is too short for the bonds, if the point data of a lattice belong to
@@ -102,8 +103,8 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
     results: Results<'_, K, D>,
     kernel: &K,
     source: PointData<'_, D>,
-) -> Vec<BrokenSums> {
-    sweep_from(bonds, points, 0, results, kernel, source)
+) {
+    sweep_from(bonds, points, 0, results, kernel, source);
 }
 
 /// Same as [`sweep`], with results that are columns over the owned points from `base` on.
@@ -114,9 +115,34 @@ pub fn sweep_from<K: Kernel<D>, const D: usize>(
     results: Results<'_, K, D>,
     kernel: &K,
     source: PointData<'_, D>,
+) {
+    const { assert!(!K::BREAKS) };
+    sweep_existing(bonds, points, base, results, (kernel, None), source);
+}
+
+/// Same as [`sweep`], for a kernel that breaks bonds. Clear the intact bits of the bonds that break, and
+/// return the sums of `breaking` over these bonds, by ascending point.
+pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
+    bonds: &mut BlockBonds,
+    points: Range<usize>,
+    results: Results<'_, K, D>,
+    kernel: &K,
+    breaking: &BreakingBonds,
+    source: PointData<'_, D>,
+) -> Vec<BrokenSums> {
+    sweep_existing(bonds, points, 0, results, (kernel, Some(breaking)), source)
+}
+
+fn sweep_existing<K: Kernel<D>, const D: usize>(
+    bonds: &mut BlockBonds,
+    points: Range<usize>,
+    base: usize,
+    results: Results<'_, K, D>,
+    kernels: (&K, Option<&BreakingBonds>),
+    source: PointData<'_, D>,
 ) -> Vec<BrokenSums> {
     if const { K::EXISTS } {
-        sweep_blocks(bonds, points, base, results, kernel, source)
+        sweep_blocks(bonds, points, base, results, kernels, source)
     } else {
         unreachable!("the kernel is not implemented in {D} dimensions")
     }
@@ -127,7 +153,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
     points: Range<usize>,
     base: usize,
     results: Results<'_, K, D>,
-    kernel: &K,
+    (kernel, breaking): (&K, Option<&BreakingBonds>),
     source: PointData<'_, D>,
 ) -> Vec<BrokenSums> {
     let instructions = source.instructions;
@@ -150,8 +176,17 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
             } = source;
             let rows = list.rows_below(points.start)..list.rows_below(points.end);
             let leaf = leaf(LEAF, list.groups_a_row());
-            let points = ListPoints::new(kernel, list.reach(), nodes, numbers, limits, is_thermal);
-            let runner = OverRows { kernel, points };
+            let reach = list.reach();
+            let points = ListPoints::new(kernel, reach, nodes, numbers, limits, is_thermal);
+            let breaking = breaking.map(|kernel| BreakingInRows {
+                kernel,
+                points: ListPoints::new(kernel, reach, nodes, numbers, limits, is_thermal),
+            });
+            let runner = OverRows {
+                kernel,
+                points,
+                breaking,
+            };
             split(list.rows(rows), base, results, &runner, leaf, instructions)
         }
         BlockBonds::Lattice(lattice) => {
@@ -168,9 +203,14 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
                 "the values are those of another grid than the lattice's"
             );
             let points = GridPoints::new(kernel, values, volumes);
+            let breaking = breaking.map(|kernel| BreakingInVectors {
+                kernel,
+                points: GridPoints::new(kernel, values, volumes),
+            });
             let runner = OverVectors {
                 kernel,
                 points,
+                breaking,
                 whole,
             };
             let most = if kernel.is_undeformed() {
@@ -317,7 +357,17 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
     }
 }
 
-/// Return the sums over breaking bonds; quantities that the kernel does not have are 0.
+/// The bits of the bonds of a row or of a lane group that break, with the indices of their groups.
+type BreakingBits = Vec<(usize, u8)>;
+
+/// Record the bonds of a group that break. Out of line to save registers.
+#[cold]
+#[inline(never)]
+fn note_group(breaking: &mut BreakingBits, group: usize, bits: u8) {
+    breaking.push((group, bits));
+}
+
+/// Return the sums over breaking bonds; components beyond the dimension are 0.
 #[inline(always)]
 fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MAX_BROKEN_SUMS] {
     LaneTuple::each(|k| {
@@ -373,14 +423,13 @@ impl FastPathGate {
         }
     }
 
-    /// Sum over the bonds of a lane group. Return the sums, and a bit for each point (lane) with a breaking
-    /// bond.
+    /// Sum over the bonds of a lane group, without the bonds that break.
     #[inline(always)]
     fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
         simd: S,
         task: WholeVector<'_, '_, '_, K, D>,
-    ) -> (K::Sums, u8) {
+    ) -> K::Sums {
         if const { !K::HAS_FAST_PATH } {
             return task.run(simd);
         }
@@ -388,7 +437,7 @@ impl FastPathGate {
             // SAFETY: the points of a task belong to the grid of its lane group.
             let sums = unsafe { fast_vector(simd, task.kernel, task.points, task.vector) };
             if let Some(sums) = sums {
-                return (sums, 0);
+                return sums;
             }
             self.skipped = FAST_PATH_BACKOFF;
         } else {
@@ -439,8 +488,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over all bonds of a lane group. The task returns the sums, and a bit for each point (lane)
-/// with a breaking bond.
+/// Task that sums over all bonds of a lane group, without the bonds that break.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.
@@ -448,16 +496,17 @@ struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     /// The bits of all bonds, including broken bonds; `None` if the kernel does not read these bits.
     whole: Option<&'t [u8]>,
     vector: &'t mut VectorBonds<'v>,
+    /// The task adds the bonds that break.
+    breaking: &'t mut BreakingBits,
 }
 
 impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
-    type Output = (K::Sums, u8);
+    type Output = K::Sums;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> (K::Sums, u8) {
+    fn run<S: Simd>(self, simd: S) -> K::Sums {
         let (kernel, points, vector) = (self.kernel, self.points, self.vector);
         let mut sums = kernel.start();
-        let mut gone = 0;
         // SAFETY: `points` belongs to the grid of the lane group.
         let own = unsafe { points.load_point_i(vector.slot) };
         for o in 0..vector.offsets.len() {
@@ -468,72 +517,90 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
             }
             let before = bonds.intact;
             kernel.add(simd, &mut bonds, &mut sums);
-            gone |= before ^ bonds.intact;
+            if K::BREAKS && before != bonds.intact {
+                note_group(self.breaking, o, before ^ bonds.intact);
+            }
             if K::BondHistory::COUNT > 0 && kernel.stores_history() {
                 store_history(vector.groups.history(o), &bonds.history, before);
             }
         }
-        (sums, gone)
+        sums
     }
+}
+
+/// The kernel of breaking bonds and the points of a grid.
+struct BreakingInVectors<'a, const D: usize> {
+    kernel: &'a BreakingBonds,
+    points: GridPoints<'a, BreakingBonds, D>,
 }
 
 /// Task that sums over the breaking bonds of a lane group and clears their intact bits.
-struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
-    kernel: K,
-    /// Points of the grid of the lane group.
-    points: GridPoints<'p, K, D>,
+struct BrokenOfVector<'t, 'v, 'p, const D: usize> {
+    breaking: &'t BreakingInVectors<'p, D>,
     vector: &'t mut VectorBonds<'v>,
+    bits: &'t [(usize, u8)],
 }
 
-impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
+impl<const D: usize> Task for BrokenOfVector<'_, '_, '_, D> {
     type Output = [Lanes; MAX_BROKEN_SUMS];
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let (kernel, points, vector) = (self.kernel, self.points, self.vector);
-        let mut broken = K::Broken::splat(0.0);
-        // SAFETY: `points` belongs to the grid of the lane group.
+        let BreakingInVectors { kernel, points } = *self.breaking;
+        let vector = self.vector;
+        let mut sums = kernel.start();
+        // SAFETY: the points of a task belong to the grid of its lane group.
         let own = unsafe { points.load_point_i(vector.slot) };
-        for o in 0..vector.offsets.len() {
+        for (o, bits) in self.bits {
             // SAFETY: as above.
-            let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
-            kernel.add_broken(simd, &mut bonds, &mut broken);
-            vector.groups.intact[o] = bonds.intact;
+            let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, *o) };
+            bonds.intact = *bits;
+            kernel.add(simd, &mut bonds, &mut sums);
+            vector.groups.intact[*o] &= !bits;
         }
-        all_broken(&broken)
+        all_broken(&sums)
     }
 }
 
-/// Task that sums over the breaking bonds of a row and clears their intact bits.
-struct BrokenOfRow<'t, 'r, 'p, K: Kernel<D>, const D: usize> {
-    kernel: K,
-    /// Points of the list of the row.
-    points: ListPoints<'p, K, D>,
-    row: &'t mut Row<'r>,
+/// The kernel of breaking bonds and the points of a list.
+struct BreakingInRows<'a, const D: usize> {
+    kernel: &'a BreakingBonds,
+    points: ListPoints<'a, BreakingBonds, D>,
 }
 
-impl<K: Kernel<D>, const D: usize> Task for BrokenOfRow<'_, '_, '_, K, D> {
+/// Task that sums over the breaking bonds of a row and clears their intact bits.
+struct BrokenOfRow<'t, 'r, 'p, const D: usize> {
+    breaking: &'t BreakingInRows<'p, D>,
+    row: &'t mut Row<'r>,
+    bits: &'t [(usize, u8)],
+}
+
+impl<const D: usize> Task for BrokenOfRow<'_, '_, '_, D> {
     type Output = [Lanes; MAX_BROKEN_SUMS];
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let (kernel, points, row) = (self.kernel, self.points, self.row);
-        let mut broken = K::Broken::splat(0.0);
-        // SAFETY: `points` was made for the list of the row.
+        let BreakingInRows { kernel, points } = *self.breaking;
+        let row = self.row;
+        let mut sums = kernel.start();
+        // SAFETY: the points of a task belong to the list of its row.
         let own = unsafe { points.load_point_i(row.point) };
-        for group in 0..row.neighbours.len() {
+        for (group, bits) in self.bits {
             // SAFETY: as above.
-            let mut bonds = unsafe { points.load(simd, &own, row, group) };
-            kernel.add_broken(simd, &mut bonds, &mut broken);
-            row.groups.intact[group] = bonds.intact;
+            let mut bonds = unsafe { points.load(simd, &own, row, *group) };
+            bonds.intact = *bits;
+            kernel.add(simd, &mut bonds, &mut sums);
+            row.groups.intact[*group] &= !bits;
         }
-        all_broken(&broken)
+        all_broken(&sums)
     }
 }
 
 struct OverRows<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: ListPoints<'a, K, D>,
+    /// `None` for kernels that break no bonds.
+    breaking: Option<BreakingInRows<'a, D>>,
 }
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
@@ -549,11 +616,11 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
         mut results: Results<'_, K, D>,
     ) -> Vec<BrokenSums> {
         let mut broken_sums = Vec::new();
+        let mut bits = BreakingBits::new();
         let (kernel, points) = (*self.kernel, self.points);
         for k in 0..rows.len() {
             let mut row: Row<'_> = rows.row(k);
             let mut sums = kernel.start();
-            let mut gone = 0;
             // SAFETY: the rows belong to the list for whose reach `points` was made.
             let here = unsafe { points.load_point_i(row.point) };
             for group in 0..row.neighbours.len() {
@@ -561,7 +628,9 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };
                 let before = bonds.intact;
                 kernel.add(simd, &mut bonds, &mut sums);
-                gone |= before ^ bonds.intact;
+                if K::BREAKS && before != bonds.intact {
+                    note_group(&mut bits, group, before ^ bonds.intact);
+                }
                 if K::BondHistory::COUNT > 0 && kernel.stores_history() {
                     store_history(row.groups.history(group), &bonds.history, before);
                 }
@@ -575,15 +644,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let column = K::Sums::column_mut(&mut results, quantity);
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
-            if K::Broken::COUNT > 0 && gone != 0 {
-                let point = row.point;
-                let row = &mut row;
+            if K::BREAKS && !bits.is_empty() {
                 let broken = simd.aside(BrokenOfRow {
-                    kernel,
-                    points,
-                    row,
+                    breaking: (self.breaking.as_ref()).expect("a kernel that breaks bonds"),
+                    row: &mut row,
+                    bits: &bits,
                 });
-                note_point(&mut broken_sums, point, &broken);
+                note_point(&mut broken_sums, row.point, &broken);
+                bits.clear();
             }
         }
         broken_sums
@@ -593,6 +661,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
 struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
+    /// `None` for kernels that break no bonds.
+    breaking: Option<BreakingInVectors<'a, D>>,
     /// The bits of all bonds of all lane groups, including broken bonds; empty if the kernel does not need
     /// these bits.
     whole: Vec<u8>,
@@ -616,6 +686,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         let mut gate = FastPathGate::new(&kernel, &points);
         let is_undeformed = kernel.is_undeformed();
         let mut known = Known(FxHashMap::default());
+        let mut bits = BreakingBits::new();
         for k in 0..vectors.len() {
             let mut vector: VectorBonds<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
@@ -624,18 +695,19 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
             } else {
                 None
             };
-            let (sums, gone) = match known_sums {
-                Some(sums) => (sums, 0),
+            let sums = match known_sums {
+                Some(sums) => sums,
                 None => {
                     let task = WholeVector {
                         kernel,
                         points,
                         whole,
                         vector: &mut vector,
+                        breaking: &mut bits,
                     };
                     let found = gate.sum(simd, task);
                     if is_undeformed {
-                        known.insert(&vector, found.0);
+                        known.insert(&vector, found);
                     }
                     found
                 }
@@ -650,15 +722,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     }
                 }
             }
-            if K::Broken::COUNT > 0 && gone != 0 {
-                let point = vector.point;
-                let vector = &mut vector;
+            if K::BREAKS && !bits.is_empty() {
                 let broken = simd.aside(BrokenOfVector {
-                    kernel,
-                    points,
-                    vector,
+                    breaking: (self.breaking.as_ref()).expect("a kernel that breaks bonds"),
+                    vector: &mut vector,
+                    bits: &bits,
                 });
-                note_vector(&mut broken_sums, point, &broken);
+                note_vector(&mut broken_sums, vector.point, &broken);
+                bits.clear();
             }
         }
         broken_sums

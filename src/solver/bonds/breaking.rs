@@ -1,0 +1,100 @@
+//! The kernel that sums over the bonds that break in a step.
+
+use crate::damage::Criterion;
+use crate::lanes::{Lanes, Simd};
+use crate::material::bond::Wanted;
+use crate::material::{AnyHistory, AnyLaw, AnyPoint, ForceState, Law, PairLaw};
+
+use super::kernel::{Group, Kernel};
+use super::measures::wanted;
+
+/// Kernel that sums over breaking bonds, which the caller selects by [`Group::intact`]:
+///
+/// - their number;
+/// - the energy that they release at the point, J;
+/// - the part of this energy above the criterion, J;
+/// - their forces, N/m³.
+///
+/// Few bonds break, so all laws share this kernel and its loops.
+#[derive(Clone, Copy)]
+pub struct BreakingBonds {
+    /// Laws of points i and j.
+    pub laws: [AnyLaw; 2],
+    /// Failure criterion of the bonds.
+    pub criterion: Criterion,
+    /// Whether the weights of the bonds contain no volume correction, but only the influence function.
+    pub influence: bool,
+}
+
+impl BreakingBonds {
+    /// Return the work of the force states of both ends, J/m⁶, as `Force` computes it; 0 if the criterion
+    /// does not read the work.
+    #[inline(always)]
+    fn work<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> Lanes {
+        if !self.criterion.reads_work() {
+            return Lanes::splat(0.0);
+        }
+        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, group.points());
+        let ([history_i, history_j], bond) = (&group.history, &group.bond);
+        let i = law_i.end_work(simd, bond, point_i, history_i, group.rotation_i);
+        let j = law_j.end_work(simd, bond, point_j, history_j, &group.rotation_j);
+        if self.influence {
+            group.weights.sum(i, j)
+        } else {
+            group.weights.uncorrected(simd).sum(i, j)
+        }
+    }
+}
+
+impl<const D: usize> Kernel<D> for BreakingBonds {
+    type Sums = ([Lanes; 3], [Lanes; D]);
+    type Point = AnyPoint;
+    type Far = AnyPoint;
+    type BondHistory = AnyHistory;
+    type Rotation = [Lanes; 4];
+    const READS_STRESSES: bool = true;
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = wanted(false);
+
+    fn is_linear(&self) -> bool {
+        self.laws[0].is_linear::<D>()
+    }
+
+    #[inline(always)]
+    fn criterion(&self) -> Criterion {
+        self.criterion
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
+        let (counts, lost) = sums;
+        let (breaking, points) = (group.intact, group.points());
+        let bond = group.bond.with_stretch(Kernel::<D>::is_linear(self));
+        let work = self.work(simd, group);
+        let share = group.weights.own() * group.own_volume * group.volume;
+        let energy = self.laws[0].bond_energy(&bond, group.own, &group.history[0]) * share;
+        let scale = PairLaw::new(self.laws[0], self.laws[1]).toughness_scale(&bond, points);
+        let late = (self.criterion).overshoot(simd, &bond, group.ends(), scale, work);
+        let overshoot = if self.criterion.reads_work() {
+            // The work of a bond is divided equally between the ends whose force states act.
+            let [own, far] = group.weights.acting();
+            let half = simd.keep(Lanes::splat(0.5), own & far);
+            let part = simd.select(half, own & far, simd.keep(Lanes::splat(1.0), own));
+            work * part * share * late
+        } else {
+            energy * late
+        };
+        counts[0] += simd.keep(Lanes::splat(1.0), breaking);
+        counts[1] += simd.keep(energy, breaking);
+        counts[2] += simd.keep(overshoot, breaking);
+        let total = AnyLaw::bond_force(
+            simd,
+            &self.laws,
+            &bond,
+            points,
+            &group.history,
+            group.weights,
+        );
+        total.add(simd, &bond, group.force_volume, breaking, lost);
+    }
+}
