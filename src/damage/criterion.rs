@@ -141,10 +141,10 @@ impl Sense {
     }
 }
 
-/// Data of both ends of eight bonds that only criteria read.
+/// Data of both ends of eight bonds that criteria read, besides laws and point numbers.
 #[derive(Clone, Copy)]
 pub struct Ends<'a> {
-    /// Data of points i and j.
+    /// Data of points i and j that only criteria read.
     pub limits: [&'a Limits; 2],
     /// Influence function times volume correction of the bonds.
     pub weights: Weights,

@@ -178,6 +178,7 @@ impl Group<'_> {
     pub fn indices(self) -> [u32; WIDTH] {
         match self {
             Self::Compact(first, differences) => {
+                // Not `map`: see the rules for loops in docs/src/developers/performance.md.
                 let mut indices = [first; WIDTH];
                 for (index, difference) in indices.iter_mut().zip(differences) {
                     *index += u32::from(*difference);

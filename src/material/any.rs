@@ -1,5 +1,5 @@
-//! Dynamic dispatch over all laws: for computations per point, for set-up and outputs, and for bonds between
-//! different laws.
+//! Dynamic dispatch over all laws: for computations per point, for set-up and outputs, for breaking bonds,
+//! and for bonds between different laws.
 
 use nalgebra::SMatrix;
 
@@ -165,8 +165,8 @@ impl AnyLaw {
 }
 
 impl PairLaw {
-    /// Return [`Law::toughness_scale`] of eight bonds, from the numbers of points i and j; `None` for laws
-    /// that do not define it.
+    /// Return [`Law::toughness_scale`] of eight bonds, from the numbers of points i and j; `None` if the law
+    /// does not define it, or if the laws of points i and j differ.
     #[inline(never)]
     pub fn toughness_scale<const D: usize>(
         &self,
@@ -184,8 +184,8 @@ impl PairLaw {
     }
 }
 
-/// This implementation serves bonds between different laws. These bonds are never linear, because a linear
-/// law is paired only with itself. Functions that are called per bond are not inlined; otherwise every loop
+/// This implementation serves bonds between different laws, and breaking bonds of all laws (`BreakingBonds`).
+/// Bonds between different laws are never linear, because a linear law is paired only with itself. Functions that are called per bond are not inlined; otherwise every loop
 /// would contain the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;

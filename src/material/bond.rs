@@ -105,8 +105,8 @@ impl Weights {
         }
     }
 
-    /// Return the weights without volume correction: 1 at the ends whose force states act on the bond, and 0
-    /// at the other ends.
+    /// Return the weights without volume correction and influence function: 1 at the ends whose force states
+    /// act on the bond, and 0 at the other ends.
     #[inline(always)]
     pub fn uncorrected<S: Simd>(self, simd: S) -> Self {
         match self {

@@ -27,8 +27,8 @@ pub struct BreakingBonds {
 }
 
 impl BreakingBonds {
-    /// Return the work of the force states of both ends, J/m⁶, as `Force` computes it; 0 if the criterion
-    /// does not read the work.
+    /// Return the work of the force states of both ends, J/m⁶, equal to `Force::work` up to rounding; 0 if
+    /// the criterion does not read the work.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> Lanes {
         if !self.criterion.reads_work() {

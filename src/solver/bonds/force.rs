@@ -159,7 +159,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type BondHistory = L::BondHistory;
     type Rotation = <L::Force as ForceState<D>>::Rotation;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    // One-dimensional bodies are small.
+    // One-dimensional bodies are small: one version of the loops, without a fast path, is enough.
     const ISA_SET: IsaSet = if D == 1 { IsaSet::Avx2 } else { L::ISA_SET };
     const HAS_FAST_PATH: bool = <Self as Kernel<D>>::ISA_SET.is_each()
         && !L::LINEAR

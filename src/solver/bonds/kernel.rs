@@ -35,7 +35,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub rotation_j: K::Rotation,
     /// Bond history for point i and for point j.
     pub history: [K::BondHistory; 2],
-    /// One bit per bond, set if the bond is intact.
+    /// One bit per bond, set if the bond is intact; for `BreakingBonds`, set if the bond breaks.
     pub intact: u8,
     /// One bit per lane, set if the lane has a bond, intact or broken; only with [`Kernel::READS_BROKEN`].
     pub whole: u8,
@@ -114,7 +114,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
 
-    /// Whether [`Self::add`] can break bonds. The kernel must then run in
+    /// Whether [`Self::add`] can break bonds. Such a kernel is run by
     /// [`sweep_and_break`](super::sweep::sweep_and_break).
     const BREAKS: bool = false;
 
@@ -195,8 +195,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::Sums::splat(0.0)
     }
 
-    /// Add eight bonds to the sums, except the bonds that break. Clear the intact bits of the breaking bonds.
-    /// May change the bond history.
+    /// Add the bonds in [`Group::intact`] to the sums. A kernel with [`Self::BREAKS`] omits the bonds that
+    /// break, and clears their bits in [`Group::intact`]. May change the bond history.
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
 
     /// Whether bonds within the series limit (see [`Self::HAS_FAST_PATH`]) can neither break nor change their

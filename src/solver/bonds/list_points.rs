@@ -196,6 +196,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         let nodes = unsafe { self.nodes.get_unchecked(first..) };
         // SAFETY: as above.
         let node = |k: usize| unsafe { &nodes.get_unchecked(distances[k]).0 };
+        // Not `map`: see the rules for loops in docs/src/developers/performance.md.
         let [a, b, c, d] = [node(0), node(1), node(2), node(3)];
         let [e, f, g, h] = [node(4), node(5), node(6), node(7)];
         let columns = simd.transpose([a, b, c, d, e, f, g, h]);

@@ -117,7 +117,7 @@ pub fn sweep_from<K: Kernel<D>, const D: usize>(
     source: PointData<'_, D>,
 ) {
     const { assert!(!K::BREAKS) };
-    sweep_existing(bonds, points, base, results, (kernel, None), source);
+    sweep_if_exists(bonds, points, base, results, (kernel, None), source);
 }
 
 /// Same as [`sweep`], for a kernel that breaks bonds. Clear the intact bits of the bonds that break, and
@@ -130,10 +130,12 @@ pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
     breaking: &BreakingBonds,
     source: PointData<'_, D>,
 ) -> Vec<BrokenSums> {
-    sweep_existing(bonds, points, 0, results, (kernel, Some(breaking)), source)
+    sweep_if_exists(bonds, points, 0, results, (kernel, Some(breaking)), source)
 }
 
-fn sweep_existing<K: Kernel<D>, const D: usize>(
+/// Run a kernel that is implemented in `D` dimensions. Kernels that break bonds need the kernel of breaking
+/// bonds, too.
+fn sweep_if_exists<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
     base: usize,
@@ -357,14 +359,14 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
     }
 }
 
-/// The bits of the bonds of a row or of a lane group that break, with the indices of their groups.
+/// For each group of a row or lane group with breaking bonds: its index, and the bits of these bonds.
 type BreakingBits = Vec<(usize, u8)>;
 
-/// Record the bonds of a group that break. Out of line to save registers.
+/// Note the breaking bonds of a group. Out of line to save registers.
 #[cold]
 #[inline(never)]
-fn note_group(breaking: &mut BreakingBits, group: usize, bits: u8) {
-    breaking.push((group, bits));
+fn note_group(noted: &mut BreakingBits, group: usize, bits: u8) {
+    noted.push((group, bits));
 }
 
 /// Return the sums over breaking bonds; components beyond the dimension are 0.
@@ -488,7 +490,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over all bonds of a lane group, without the bonds that break.
+/// Task that sums over the bonds of a lane group, except those that break.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.
@@ -496,8 +498,8 @@ struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     /// The bits of all bonds, including broken bonds; `None` if the kernel does not read these bits.
     whole: Option<&'t [u8]>,
     vector: &'t mut VectorBonds<'v>,
-    /// The task adds the bonds that break.
-    breaking: &'t mut BreakingBits,
+    /// Receives the breaking bonds.
+    noted: &'t mut BreakingBits,
 }
 
 impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
@@ -518,7 +520,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
             let before = bonds.intact;
             kernel.add(simd, &mut bonds, &mut sums);
             if K::BREAKS && before != bonds.intact {
-                note_group(self.breaking, o, before ^ bonds.intact);
+                note_group(self.noted, o, before ^ bonds.intact);
             }
             if K::BondHistory::COUNT > 0 && kernel.stores_history() {
                 store_history(vector.groups.history(o), &bonds.history, before);
@@ -538,7 +540,8 @@ struct BreakingInVectors<'a, const D: usize> {
 struct BrokenOfVector<'t, 'v, 'p, const D: usize> {
     breaking: &'t BreakingInVectors<'p, D>,
     vector: &'t mut VectorBonds<'v>,
-    bits: &'t [(usize, u8)],
+    /// The breaking bonds that the first loop noted.
+    noted: &'t BreakingBits,
 }
 
 impl<const D: usize> Task for BrokenOfVector<'_, '_, '_, D> {
@@ -551,7 +554,7 @@ impl<const D: usize> Task for BrokenOfVector<'_, '_, '_, D> {
         let mut sums = kernel.start();
         // SAFETY: the points of a task belong to the grid of its lane group.
         let own = unsafe { points.load_point_i(vector.slot) };
-        for (o, bits) in self.bits {
+        for (o, bits) in self.noted {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, *o) };
             bonds.intact = *bits;
@@ -572,7 +575,8 @@ struct BreakingInRows<'a, const D: usize> {
 struct BrokenOfRow<'t, 'r, 'p, const D: usize> {
     breaking: &'t BreakingInRows<'p, D>,
     row: &'t mut Row<'r>,
-    bits: &'t [(usize, u8)],
+    /// The breaking bonds that the first loop noted.
+    noted: &'t BreakingBits,
 }
 
 impl<const D: usize> Task for BrokenOfRow<'_, '_, '_, D> {
@@ -585,7 +589,7 @@ impl<const D: usize> Task for BrokenOfRow<'_, '_, '_, D> {
         let mut sums = kernel.start();
         // SAFETY: the points of a task belong to the list of its row.
         let own = unsafe { points.load_point_i(row.point) };
-        for (group, bits) in self.bits {
+        for (group, bits) in self.noted {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load(simd, &own, row, *group) };
             bonds.intact = *bits;
@@ -616,7 +620,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
         mut results: Results<'_, K, D>,
     ) -> Vec<BrokenSums> {
         let mut broken_sums = Vec::new();
-        let mut bits = BreakingBits::new();
+        let mut noted = BreakingBits::new();
         let (kernel, points) = (*self.kernel, self.points);
         for k in 0..rows.len() {
             let mut row: Row<'_> = rows.row(k);
@@ -629,7 +633,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let before = bonds.intact;
                 kernel.add(simd, &mut bonds, &mut sums);
                 if K::BREAKS && before != bonds.intact {
-                    note_group(&mut bits, group, before ^ bonds.intact);
+                    note_group(&mut noted, group, before ^ bonds.intact);
                 }
                 if K::BondHistory::COUNT > 0 && kernel.stores_history() {
                     store_history(row.groups.history(group), &bonds.history, before);
@@ -644,14 +648,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let column = K::Sums::column_mut(&mut results, quantity);
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
-            if K::BREAKS && !bits.is_empty() {
+            if K::BREAKS && !noted.is_empty() {
                 let broken = simd.aside(BrokenOfRow {
                     breaking: (self.breaking.as_ref()).expect("a kernel that breaks bonds"),
                     row: &mut row,
-                    bits: &bits,
+                    noted: &noted,
                 });
                 note_point(&mut broken_sums, row.point, &broken);
-                bits.clear();
+                noted.clear();
             }
         }
         broken_sums
@@ -686,7 +690,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         let mut gate = FastPathGate::new(&kernel, &points);
         let is_undeformed = kernel.is_undeformed();
         let mut known = Known(FxHashMap::default());
-        let mut bits = BreakingBits::new();
+        let mut noted = BreakingBits::new();
         for k in 0..vectors.len() {
             let mut vector: VectorBonds<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
@@ -703,7 +707,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                         points,
                         whole,
                         vector: &mut vector,
-                        breaking: &mut bits,
+                        noted: &mut noted,
                     };
                     let found = gate.sum(simd, task);
                     if is_undeformed {
@@ -722,14 +726,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     }
                 }
             }
-            if K::BREAKS && !bits.is_empty() {
+            if K::BREAKS && !noted.is_empty() {
                 let broken = simd.aside(BrokenOfVector {
                     breaking: (self.breaking.as_ref()).expect("a kernel that breaks bonds"),
                     vector: &mut vector,
-                    bits: &bits,
+                    noted: &noted,
                 });
                 note_vector(&mut broken_sums, vector.point, &broken);
-                bits.clear();
+                noted.clear();
             }
         }
         broken_sums
