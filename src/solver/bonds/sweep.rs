@@ -490,7 +490,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Task that sums over the bonds of a lane group, except those that break.
+/// Task that sums over the bonds of a lane group. Bonds that break are left out.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the lane group.

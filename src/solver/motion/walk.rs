@@ -196,7 +196,7 @@ fn halves<C, const D: usize>(
 }
 
 /// Call `work` with each part of the points and the entry of `each` for this part. Returns whether all calls
-/// returned true. `work` is a trait object, so that the loop is not compiled anew for each caller.
+/// returned true. `work` is a trait object, because a generic closure would generate a loop per caller.
 ///
 /// # Panics
 /// If `each` does not have one entry per part.
