@@ -1,7 +1,7 @@
 //! The kernel that sums over the bonds that break in a step.
 
 use crate::damage::Criterion;
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::{LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
 use crate::material::{AnyHistory, AnyLaw, AnyPoint, ForceState, Law, PairLaw};
 
@@ -34,15 +34,8 @@ impl BreakingBonds {
         if !self.criterion.reads_work() {
             return Lanes::splat(0.0);
         }
-        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, group.points());
-        let ([history_i, history_j], bond) = (&group.history, &group.bond);
-        let i = law_i.end_work(simd, bond, point_i, history_i, group.rotation_i);
-        let j = law_j.end_work(simd, bond, point_j, history_j, &group.rotation_j);
-        if self.influence {
-            group.weights.sum(i, j)
-        } else {
-            group.weights.uncorrected(simd).sum(i, j)
-        }
+        let weights = group.weights_of_work(simd, self.influence);
+        group.work_of_ends(simd, &self.laws, weights)
     }
 }
 
@@ -97,4 +90,41 @@ impl<const D: usize> Kernel<D> for BreakingBonds {
         );
         total.add(simd, &bond, group.force_volume, breaking, lost);
     }
+}
+
+/// Sums of a point over those of its bonds that break in a sweep.
+#[derive(Debug, Clone, Copy)]
+pub struct BrokenSums {
+    /// Local index of the point.
+    pub point: usize,
+    /// The sums of [`BreakingBonds`]; 0 for components beyond the dimension.
+    pub sums: [f64; MAX_BROKEN_SUMS],
+}
+
+/// Number of sums of [`BreakingBonds`] in three dimensions.
+pub const MAX_BROKEN_SUMS: usize = 6;
+
+/// The groups of eight bonds in which bonds break, of one row or lane group: index of the group, and bits of
+/// these bonds.
+pub type BreakingBits = Vec<(usize, u8)>;
+
+/// Note the breaking bonds of a group. Out of line to save registers.
+#[cold]
+#[inline(never)]
+pub fn note_group(noted: &mut BreakingBits, group: usize, bits: u8) {
+    noted.push((group, bits));
+}
+
+/// Return the sums of [`BreakingBonds`] in `D` dimensions, padded with zeros to the sums in three dimensions.
+#[inline(always)]
+pub fn padded<const D: usize>(
+    sums: &<BreakingBonds as Kernel<D>>::Sums,
+) -> [Lanes; MAX_BROKEN_SUMS] {
+    LaneTuple::each(|k| {
+        if k < <BreakingBonds as Kernel<D>>::Sums::COUNT {
+            sums.get(k)
+        } else {
+            Lanes::splat(0.0)
+        }
+    })
 }

@@ -12,10 +12,10 @@ use crate::comm::{self, Communicator};
 use crate::families::Which;
 use crate::solver::model::Model;
 
+use super::breaking::BrokenSums;
 use super::evaluate::{Acting, ForceTimes, HaloContent};
 use super::force::BondUpdate;
 use super::point_numbers::PlasticColumns;
-use super::sweep::BrokenSums;
 use super::{Forces, Pass};
 
 /// Ranges of points are merged if at most this number of points lies between them.

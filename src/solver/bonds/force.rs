@@ -84,11 +84,7 @@ impl<L> Force<L> {
         if !self.criterion.reads_work() {
             return Lanes::splat(0.0);
         }
-        let weights = if self.influence {
-            group.weights
-        } else {
-            group.weights.uncorrected(simd)
-        };
+        let weights = group.weights_of_work(simd, self.influence);
         if L::Force::CENTRAL {
             let total = if self.influence {
                 total
@@ -97,11 +93,7 @@ impl<L> Force<L> {
             };
             return total.work(simd, &group.bond, L::LINEAR, group.rotation_i);
         }
-        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, group.points());
-        let ([history_i, history_j], bond) = (&group.history, &group.bond);
-        let i = law_i.end_work(simd, bond, point_i, history_i, group.rotation_i);
-        let j = law_j.end_work(simd, bond, point_j, history_j, &group.rotation_j);
-        weights.sum(i, j)
+        group.work_of_ends(simd, &self.laws, weights)
     }
 
     /// Time increment of the bond history that the evaluation computes, s; `None` if the evaluation computes

@@ -5,8 +5,8 @@
 
 use crate::damage::{Criterion, Ends, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
-use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
+use crate::material::{Bond, ForceState, Law};
 
 /// Eight bonds ij with their history and the data of both points.
 pub struct Group<'a, K: Kernel<D>, const D: usize> {
@@ -55,6 +55,41 @@ where
 }
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
+    /// Weights of the force states in the work of a bond: the influence function, without volume correction.
+    /// `influence` says whether [`Self::weights`] contain no volume correction.
+    #[inline(always)]
+    pub fn weights_of_work<S: Simd>(&self, simd: S, influence: bool) -> Weights {
+        if influence {
+            self.weights
+        } else {
+            self.weights.uncorrected(simd)
+        }
+    }
+
+    /// Return the work of the force states of both ends, J/m⁶: the sum of [`Law::end_work`] over the ends,
+    /// multiplied by these weights.
+    #[inline(always)]
+    pub fn work_of_ends<S: Simd, L: Law<D>>(
+        &self,
+        simd: S,
+        laws: &[L; 2],
+        weights: Weights,
+    ) -> Lanes
+    where
+        K: Kernel<
+                D,
+                Point = L::Point,
+                Far = L::Point,
+                BondHistory = L::BondHistory,
+                Rotation = <L::Force as ForceState<D>>::Rotation,
+            >,
+    {
+        let ([law_i, law_j], [history_i, history_j]) = (laws, &self.history);
+        let i = law_i.end_work(simd, &self.bond, self.own, history_i, self.rotation_i);
+        let j = law_j.end_work(simd, &self.bond, &self.far, history_j, &self.rotation_j);
+        weights.sum(i, j)
+    }
+
     /// The data of both ends that the criterion reads.
     #[inline(always)]
     pub fn ends(&self) -> Ends<'_> {
@@ -91,6 +126,17 @@ pub enum Combine {
     Add,
     /// Minimum.
     Smallest,
+}
+
+impl Combine {
+    /// Combine a value with an earlier result.
+    #[inline(always)]
+    pub fn apply(self, result: &mut f64, value: f64) {
+        match self {
+            Self::Add => *result += value,
+            Self::Smallest => *result = result.min(value),
+        }
+    }
 }
 
 /// A sum over the bonds of points.
