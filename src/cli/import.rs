@@ -53,8 +53,8 @@ enum From {
 /// Translate a deck and write the new deck.
 ///
 /// # Errors
-/// If the deck cannot be translated, if the new deck exists and may not be replaced, if both decks have the
-/// same path, or if the new deck cannot be written.
+/// If the deck cannot be translated, if the new deck exists and may not be replaced, if its path is that of the
+/// source deck or of a file that the new deck reads, or if it cannot be written.
 pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let target = arguments.output.clone();
     let target = target.unwrap_or_else(|| default_target(&arguments.deck));
@@ -70,21 +70,26 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
         );
         Error::input(message)
     };
-    let is_source = match (arguments.deck.canonicalize(), target.canonicalize()) {
-        (Ok(deck), Ok(target)) => deck == target,
+    let is_target = |path: &Path| match (path.canonicalize(), target.canonicalize()) {
+        (Ok(path), Ok(target)) => path == target,
         _ => false,
     };
-    if is_source {
-        let message = format!(
-            "{} is the deck to import; choose another name with --output",
-            target.display()
-        );
-        return Err(Error::input(message));
+    let not_to_replace = |what: &str| {
+        let name = target.display();
+        Error::input(format!(
+            "{name} is {what}; choose another name with --output"
+        ))
+    };
+    if is_target(&arguments.deck) {
+        return Err(not_to_replace("the deck to import"));
     }
     if target.exists() && !arguments.overwrite {
         return Err(exists());
     }
     let imported = import::import(&arguments.deck, code, &target)?;
+    if imported.files.iter().any(|file| is_target(file)) {
+        return Err(not_to_replace("a file that the deck reads"));
+    }
     let mut options = OpenOptions::new();
     if arguments.overwrite {
         options.write(true).create(true).truncate(true)

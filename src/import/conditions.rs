@@ -213,8 +213,8 @@ impl Conditions {
         Ok(())
     }
 
-    /// Write the initial values, one table per set. Log the initial values that a table of another set may
-    /// replace by 0.
+    /// Write the initial values, one table per set. In points of several sets, the last table counts. Log the
+    /// initial values that a later table may replace by 0.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self
@@ -225,7 +225,11 @@ impl Conditions {
                 let mut all = self.initials.iter();
                 all.any(|o| o.key == initial.key && o.set == set && o.component == component)
             };
-            let mut missing = others.filter(|other| !gives(&other.set, initial.component));
+            // The tables are in the order in which their sets first occur.
+            let place = |set: &str| self.initials.iter().position(|other| other.set == set);
+            let mut missing = others.filter(|other| {
+                place(&other.set) > place(&initial.set) && !gives(&other.set, initial.component)
+            });
             if let Some(other) = missing.next() {
                 let note = format!("0 in points that are in the set `{}` too", other.set);
                 translation.log.approximated(&initial.node, note);

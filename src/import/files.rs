@@ -93,6 +93,21 @@ impl PointFile {
         Some(file)
     }
 
+    /// Create the message for a deck whose blocks have no points in this file.
+    pub fn no_block_message(&self) -> String {
+        let listed: Vec<String> = self.blocks.iter().take(8).map(u32::to_string).collect();
+        let more = if self.blocks.len() > 8 { ", …" } else { "" };
+        match listed.len() {
+            0 => "no row of the point file has a block number; the header must name the columns x, block_id and \
+                  volume"
+                .to_owned(),
+            _ => format!(
+                "no row of the point file belongs to one of the blocks; the file has the block numbers {}{more}",
+                listed.join(", ")
+            ),
+        }
+    }
+
     /// Return the number of coordinates in the header; `None` without a header.
     pub fn dimension(&self) -> Option<usize> {
         let names = self.names.as_ref()?;

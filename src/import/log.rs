@@ -69,10 +69,18 @@ pub(super) const LOADS_OF_SCRIPTS: [&str; 8] = [
 /// Log note for a damage model that no block uses.
 pub(super) const UNUSED_DAMAGE: &str = "no block uses this damage model";
 
+/// Log note for columns of a point file that PeriLab reads in place of constants of the deck.
+pub(super) const UNUSED_COLUMNS: &str =
+    "the new deck has the constants of the source deck, not those in columns of the file";
+
+/// Log note for an influence function without a counterpart.
+pub(super) const OTHER_INFLUENCE: &str =
+    "influence is one of constant, linear, gaussian and inverse; constant is used";
+
 /// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
-/// Lines of keys that are left out and change the results.
+/// Lines of keys that are left out, or of files that are read in part, which changes the results.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.
@@ -81,12 +89,20 @@ pub struct Losses {
     pub damages: Vec<usize>,
     /// Lines of unknown values of `Omit Bonds Between Blocks`.
     pub bonds: Vec<usize>,
+    /// Lines of influence functions.
+    pub influence: Vec<usize>,
+    /// Lines of point files with constants of materials in their columns.
+    pub columns: Vec<usize>,
 }
 
 impl Losses {
     /// Collect the losses of a deck.
     pub(super) fn of(entries: &[Entry]) -> Self {
         let mut losses = Self::default();
+        let pointwise = entries
+            .iter()
+            .filter(|entry| entry.note.contains(UNUSED_COLUMNS));
+        losses.columns.extend(pointwise.map(|entry| entry.line));
         let lost = entries
             .iter()
             .filter(|entry| entry.fate == Fate::LeftOut && entry.note != UNUSED_DAMAGE);
@@ -115,13 +131,16 @@ impl Losses {
             if below("Discretization") == Some(1) && is_key(last, OMITTED_BONDS) {
                 losses.bonds.push(entry.line);
             }
+            if entry.note == OTHER_INFLUENCE {
+                losses.influence.push(entry.line);
+            }
         }
         losses
     }
 
     /// Test whether no key is lost.
     pub fn is_empty(&self) -> bool {
-        self.conditions.is_empty() && self.damages.is_empty() && self.bonds.is_empty()
+        *self == Self::default()
     }
 }
 
@@ -161,6 +180,12 @@ impl fmt::Display for Losses {
                 "the value of `{OMITTED_BONDS}` is not known: line {line}"
             ));
         }
+        for line in &self.influence {
+            parts.push(format!("the influence function is left out: line {line}"));
+        }
+        for line in &self.columns {
+            parts.push(format!("{UNUSED_COLUMNS}: line {line}"));
+        }
         formatter.write_str(&parts.join("; "))
     }
 }
@@ -192,6 +217,11 @@ impl Log {
                 fates.insert(node.id, (fate, note.into()));
             }
         }
+    }
+
+    /// Test whether an outcome of a node has been logged.
+    pub(super) fn is_noted(&self, node: &Node) -> bool {
+        self.fates.borrow().contains_key(&node.id)
     }
 
     /// Log the outcome of a node and discard earlier notes.

@@ -27,10 +27,13 @@ mod xml;
 mod yaml;
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use crate::comm::threads;
 use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
+use crate::points::generate;
+use crate::problem::{Body, PointSource, Problem};
 use expression::Dialect;
 use log::{Entry, Fate, Losses};
 use translation::{Translation, line_error};
@@ -66,7 +69,9 @@ pub struct Import {
     pub text: String,
     /// Outcome of each key.
     pub entries: Vec<Entry>,
-    /// Error of the new deck; `None` if the new deck is valid.
+    /// Files that the new deck reads.
+    pub files: Vec<PathBuf>,
+    /// Error of the new deck or of its point and mesh files; `None` if the new deck is valid.
     pub fault: Option<Error>,
 }
 
@@ -162,11 +167,25 @@ fn finish(translation: Translation, root: &Node, code: Code, target: &Path) -> I
     ];
     let text = translation.draft.text(&heading, &entries);
     let new = Source::new(target, text.clone());
-    let fault = Deck::new(new).and_then(|deck| deck.problem()).err();
+    let problem = Deck::new(new).and_then(|deck| deck.problem());
+    let fault = problem.and_then(|problem| check_points(&problem)).err();
     Import {
         code,
         text,
         entries,
+        files: translation.files.into_inner(),
         fault,
     }
+}
+
+/// Read the points of a problem to find errors in its files and meshes, if no body is a shape.
+///
+/// # Errors
+/// If a file or a set is invalid.
+fn check_points(problem: &Problem) -> Result<()> {
+    let is_shape = |body: &Body| matches!(body.points, PointSource::Lattice { .. });
+    if !problem.bodies.iter().any(is_shape) {
+        generate(problem, &threads::alone())?;
+    }
+    Ok(())
 }

@@ -24,6 +24,9 @@ pub struct Sets<'n> {
     of_mesh: Vec<(String, String)>,
     /// Prefix of the names of sets of the mesh in the new deck; `None` if the points come from no mesh.
     mesh_prefix: Option<&'static str>,
+    /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set; `None` if one
+    /// node in the set is enough.
+    ids_by_name: Option<Vec<(String, Vec<u64>)>>,
 }
 
 impl<'n> Sets<'n> {
@@ -34,7 +37,15 @@ impl<'n> Sets<'n> {
             defined: Vec::new(),
             of_mesh: Vec::new(),
             mesh_prefix,
+            ids_by_name: None,
         }
+    }
+
+    /// Set the ids of the points of each node set of the mesh, by the name of the set. Call this for PeriLab,
+    /// which counts an element as part of a node set only if all its nodes are in the set. A set that is not
+    /// in the list is written as a set of the mesh and logged as approximated.
+    pub fn set_ids_by_name(&mut self, sets: Vec<(String, Vec<u64>)>) {
+        self.ids_by_name = Some(sets);
     }
 
     /// Add a node set of the source deck. `is_declared` is whether Peridigm or PeriLab treats the entry as a
@@ -88,7 +99,28 @@ impl<'n> Sets<'n> {
         };
         let written = translation.new_name("set", name);
         let mut section = Section::new(format!("set.{written}"));
-        section.set("mesh", Value::text(format!("{prefix}{name}")));
+        let known = self.ids_by_name.as_ref().map(|sets| {
+            let found = sets.iter().find(|(known, _)| known == name);
+            found.map(|(_, ids)| ids.clone())
+        });
+        if let Some(Some(ids)) = known {
+            if ids.is_empty() {
+                let message = format!(
+                    "no element has all its nodes in the node set {}",
+                    excerpt(name)
+                );
+                return Err(translation.error(user.line, message));
+            }
+            let note = format!("[set.{written}] ids of the elements with all nodes in the set");
+            translation.log.taken(user, note);
+            section.set("ids", Value::Ids(ids));
+        } else {
+            if known.is_some() {
+                let note = "elements with at least one node in the set; PeriLab takes those with all nodes";
+                translation.log.approximated(user, note);
+            }
+            section.set("mesh", Value::text(format!("{prefix}{name}")));
+        }
         translation.add(section);
         self.of_mesh.push((name.to_owned(), written.clone()));
         Ok(written)
@@ -97,6 +129,10 @@ impl<'n> Sets<'n> {
     /// Return the number of points of a set that lists point numbers, in the deck or in a file. Return
     /// `None` for other sets.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
+        let mut of_mesh = self.ids_by_name.iter().flatten();
+        if let Some((_, ids)) = of_mesh.find(|(known, _)| known == name) {
+            return Some(ids.len() as u64);
+        }
         let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
         let text = set_text(set.node)?;
         match numbers(&text) {
@@ -134,6 +170,17 @@ fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<Stri
     let written = translation.new_name("set", name);
     let mut section = Section::new(format!("set.{written}"));
     let header = format!("[set.{written}]");
+    let is_range = text.contains(':')
+        && text
+            .chars()
+            .all(|c| c.is_ascii_digit() || " :-".contains(c));
+    if is_range && numbers(&text).is_none() {
+        let message = format!(
+            "`{name}`: a range must rise and have at most {MOST_NUMBERS} numbers, is {}",
+            excerpt(&text)
+        );
+        return Err(translation.error(node.line, message));
+    }
     if let Some(ids) = numbers(&text) {
         if let Some(zero) = ids.iter().position(|id| *id == 0) {
             let message = format!(
@@ -177,13 +224,23 @@ fn set_text(node: &Node) -> Option<String> {
     }
 }
 
-/// Read the numbers of a list `1 2 3` or a range `1:27`.
+/// Largest count of a range; longer lists would make the new deck unreadable.
+const MOST_NUMBERS: u64 = 1_000_000;
+
+/// Read the numbers of a list `1 2 3`, a range `1:27` or a range with a step `1:2:27`.
 fn numbers(text: &str) -> Option<Vec<u64>> {
-    /// Largest count of a range; longer lists would make the new deck unreadable.
-    const MOST: u64 = 1_000_000;
-    if let Some((first, last)) = text.split_once(':') {
-        let (first, last) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
-        return (first <= last && last - first < MOST).then(|| (first..=last).collect());
+    if text.contains(':') {
+        let parts: Option<Vec<u64>> = text
+            .split(':')
+            .map(|part| part.trim().parse().ok())
+            .collect();
+        let (first, step, last) = match parts?[..] {
+            [first, last] => (first, 1, last),
+            [first, step, last] if step > 0 => (first, step, last),
+            _ => return None,
+        };
+        let is_short = first <= last && (last - first) / step < MOST_NUMBERS;
+        return is_short.then(|| (first..=last).step_by(step as usize).collect());
     }
     let words = text
         .split([' ', '\t', '\n', '\r', ','])

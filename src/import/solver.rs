@@ -1,6 +1,7 @@
 //! Solvers of Peridigm and PeriLab, which become stages.
 
 use super::draft::{Section, Value};
+use super::expression::Dialect;
 use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::{Result, excerpt};
@@ -117,7 +118,9 @@ pub fn stage(
         if let Some(last) = steps.last() {
             return Ok(*last);
         }
-        if let Some(additional) = node.get("Additional Time") {
+        if let Some(additional) = node.get("Additional Time")
+            && node.get("Final Time").is_none()
+        {
             log.taken(additional, "end of a stage");
             return Ok(start + translation.number(additional, "Additional Time")?);
         }
@@ -141,7 +144,6 @@ pub fn stage(
         breaks,
     };
     if is(&STATIC) {
-        tolerances(translation, solver);
         if let Some(times) = solver.get("Time Steps") {
             let text = translation.text(times, "Time Steps")?;
             let times_read: Option<Vec<f64>> =
@@ -159,23 +161,49 @@ pub fn stage(
             let after = list.iter().filter(|end| **end > start);
             let stages: Vec<Stage> = after.map(|end| new(*end, Method::Equilibria(1))).collect();
             later(*list.last().expect("two at least"), times.line)?;
+            tolerances(translation, solver);
             return Ok(stages);
         }
-        let steps = ["Number of Load Steps", "Number of Steps"];
-        let given = steps
+        let end = later(end(&[])?, node.line)?;
+        let is_perilab = translation.dialect == Dialect::PeriLab;
+        // PeriLab reads the number of steps from the table of the step, Peridigm from that of the solver.
+        let given = ["Number of Load Steps", "Number of Steps"]
             .iter()
-            .find_map(|key| Some((*key, solver.get(key).or(node.get(key))?)));
-        let load_steps = match given {
-            None => LOAD_STEPS,
-            Some((key, steps)) => {
-                log.taken(steps, "load_steps");
-                translation.count(steps, key)?.max(1)
+            .find_map(|key| {
+                let of_step = node.get(key);
+                let of_solver = solver.get(key);
+                Some((
+                    *key,
+                    if is_perilab {
+                        of_step.or(of_solver)
+                    } else {
+                        of_solver.or(of_step)
+                    }?,
+                ))
+            });
+        let mut load_steps = LOAD_STEPS;
+        let fixed = solver.get("Fixed dt");
+        // Only PeriLab's `Static` reads it; a value of 0 or less counts as missing.
+        let fixed = fixed.filter(|_| is_perilab && is(&["Static"]));
+        let step = fixed.map(|fixed| translation.number(fixed, "Fixed dt"));
+        let step = step.transpose()?.filter(|step| *step > 0.0);
+        if let (Some(fixed), Some(step)) = (fixed, step) {
+            let count = ((end - start) / step).round();
+            if count >= 1e15 {
+                let message = format!("`Fixed dt` is too short: {step}");
+                return Err(translation.error(fixed.line, message));
             }
-        };
-        return Ok(vec![new(
-            later(end(&[])?, node.line)?,
-            Method::Equilibria(load_steps),
-        )]);
+            log.taken(fixed, "load_steps: the duration divided by this step");
+            load_steps = (count as u64).max(1);
+            if let Some((_, steps)) = given {
+                log.left_out(steps, "PeriLab uses `Fixed dt` instead");
+            }
+        } else if let Some((key, steps)) = given {
+            log.taken(steps, "load_steps");
+            load_steps = translation.count(steps, key)?.max(1);
+        }
+        tolerances(translation, solver);
+        return Ok(vec![new(end, Method::Equilibria(load_steps))]);
     }
     let fixed = solver.get("Fixed dt");
     let mut step = None;
@@ -239,7 +267,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Log those keys of a static solver that have no counterpart in the new deck.
+/// Log those keys of a static solver that have not been read.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
@@ -251,7 +279,7 @@ fn tolerances(translation: &Translation, solver: &Node) {
         ]) {
             let note = "the tolerance is the default, unbalanced force over loads and reactions";
             translation.log.approximated(node, note);
-        } else if !is(&["Time Steps", "Number of Load Steps", "Number of Steps"]) {
+        } else if !translation.log.is_noted(node) {
             let note = "concerns the solver of that code";
             translation.log.left_out(node, note);
         }

@@ -1,5 +1,6 @@
 //! State of an import: the source deck, the log of its keys, and the new deck.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use super::draft::{Draft, Section, Value};
@@ -30,6 +31,8 @@ pub struct Translation<'a> {
     pub dimension: usize,
     /// Start of the run in the time of the source deck, s.
     pub start: f64,
+    /// Files that the new deck reads, relative to the working directory or absolute.
+    pub files: RefCell<Vec<PathBuf>>,
     /// Start of the current condition's step in the time of the run, s.
     pub step_start: f64,
     /// Names of tables: section, name in the source deck, and name in the new deck.
@@ -47,6 +50,7 @@ impl<'a> Translation<'a> {
             draft: Draft::default(),
             dimension: 3,
             start: 0.0,
+            files: RefCell::default(),
             step_start: 0.0,
             names: Vec::new(),
         }
@@ -204,9 +208,11 @@ impl<'a> Translation<'a> {
         folder.join(file)
     }
 
-    /// Return the path of a file of the source deck, relative to the new deck. An absolute path stays.
+    /// Return the path of a file of the source deck, relative to the new deck, and note that the new deck reads
+    /// this file. An absolute path stays.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
+        self.files.borrow_mut().push(path.clone());
         let path = if Path::new(file).is_absolute() {
             path
         } else {

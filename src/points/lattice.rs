@@ -284,7 +284,7 @@ pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
     let limit = MAX_PER_RANK * ranks as f64;
     if lattice.cells() as f64 > limit && lattice.points() > limit {
         let message = format!(
-            "[body.{}]: about {:.1e} points are too many for {ranks} rank(s), of 2³¹ each at most; \
+            "[body.{}]: about {:.1e} points are too many for {ranks} rank(s); a rank can hold fewer than 2.1e9 points; \
              use more ranks, or check that the spacing is in metres",
             problem.bodies[body].name,
             lattice.points()

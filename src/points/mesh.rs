@@ -252,9 +252,17 @@ fn bodies_of_elements(
                 format!("[body.{body}] points block: {block} has {NO_VOLUME}")
             } else {
                 let known = mesh.names(has_solids);
+                let suggestion = mesh::suggestion(block, &known);
+                let others = match mesh.find(block, |group| mesh.dimension(group) > 0) {
+                    Ok(Some(group)) => format!(
+                        "; the elements of {block} are {}-D{}",
+                        mesh.dimension(group),
+                        if known.is_empty() { "" } else { &suggestion }
+                    ),
+                    _ => suggestion,
+                };
                 format!(
-                    "[body.{body}] points block: the mesh has no group {block} of {dimension}-D elements{}",
-                    mesh::suggestion(block, &known)
+                    "[body.{body}] points block: the mesh has no group {block} of {dimension}-D elements{others}"
                 )
             };
             return Err(Error::input(message).at(user.block_span));

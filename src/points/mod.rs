@@ -33,7 +33,7 @@ use crate::mesh::{Runs, suggestion};
 use crate::problem::{Body, IdFile, Jitter, PointSource, Problem, Selector};
 use crate::scatter::{Scattered, uniform};
 
-/// Upper limit on the number of points per rank.
+/// Exclusive upper limit on the number of points per rank.
 pub const MAX_PER_RANK: f64 = 2_147_483_647.0;
 
 /// A point, in the form in which ranks exchange points.
@@ -160,7 +160,7 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
         Ok(())
     } else {
         Err(Error::run(
-            "too many points for one rank (2³¹ at most); use more ranks",
+            "too many points for one rank (2.1e9 at most); use more ranks",
         ))
     };
     agree(comm, fits)?;

@@ -10,6 +10,7 @@ use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::survey::dry_run;
 
+use super::meshes::exodus_of_first_cube;
 use crate::support::{command, displace, force};
 
 /// A temporary folder of decks and their files, removed when dropped.
@@ -33,6 +34,10 @@ impl Folder {
 
     fn write(&self, name: &str, text: &str) {
         self.0.write(name, text);
+    }
+
+    fn write_bytes(&self, name: &str, bytes: &[u8]) {
+        self.0.write(name, bytes);
     }
 
     /// Import a deck of this folder into the same folder.
@@ -894,6 +899,145 @@ fn blocks_of_perilab_are_element_sets_of_abaqus() {
     assert_eq!(fate(&imported, &key(1)).0, Fate::Approximated);
 }
 
+/// In PeriLab, an element is in a node set of an Exodus mesh if all its nodes are.
+#[test]
+fn node_sets_of_perilab_have_elements_with_all_nodes() {
+    for (name, used) in [("First", "First"), ("", "Set-1")] {
+        let folder = Folder::new("exodus");
+        folder.write_bytes("cubes.g", &exodus_of_first_cube(name));
+        let text = perilab_mesh("Exodus", "cubes.g", &[10, 20]);
+        let text = text.replace("Node Set: First", &format!("Node Set: {used}"));
+        let imported = folder.import("cubes.yaml", &text).unwrap();
+        let problem = folder.problem(&imported);
+        let set = &problem.sets[problem.sets.len() - 1];
+        let is_in = |id: &u64| set::contains(set, 1.0, *id, [0.0; 3], 0);
+        assert_eq!(
+            (0..2).filter(is_in).collect::<Vec<_>>(),
+            [0],
+            "{}",
+            imported.text
+        );
+        let key = "PeriLab > Boundary Conditions > Pull > Node Set";
+        assert_eq!(fate(&imported, key).0, Fate::Taken);
+        // An element that is in no block of the deck shifts the ids.
+        let text = text.replace("Block ID: 20", "Block ID: 30");
+        let imported = folder.import("cubes.yaml", &text).unwrap();
+        assert_eq!(fate(&imported, key).0, Fate::Approximated);
+    }
+}
+
+/// PeriLab sorts the steps by `Step ID`, and its variable `st` starts again in each step.
+#[test]
+fn steps_of_perilab_are_in_their_order_and_have_their_time() {
+    let folder = Folder::strip("ordered");
+    let from = STRIP.find("  Solver:").unwrap();
+    let to = STRIP.find("  Outputs:").unwrap();
+    let step = |name: &str, id: u32, time: &str| {
+        format!(
+            "    {name}:\n      Step ID: {id}\n      {time}\n      Verlet:\n        Fixed dt: 1.0e-2\n"
+        )
+    };
+    let steps = [
+        step("Pull", 2, "Additional Time: 0.2"),
+        step("Rest", 1, "Initial Time: 0.0\n      Final Time: 0.1"),
+        step("Last", 3, "Additional Time: 0.4"),
+    ];
+    let steps = format!("  Multistep Solver:\n{}", steps.concat());
+    let text = format!("{}{steps}{}", &STRIP[..from], &STRIP[to..]);
+    let hold = |ids: &str| text.replacen("Value: 0\n", &format!("Value: 0.1*st\n{ids}"), 1);
+    for (ids, starts) in [
+        ("", vec!["t", "(t - 0.1)", "(t - 0.3"]),
+        ("      Step ID: \"1,3\"\n", vec!["t", "(t - 0.3"]),
+        ("      Step ID: 2\n", vec!["(t - 0.1)"]),
+    ] {
+        let imported = folder.import("strip.yaml", &hold(ids)).unwrap();
+        let problem = folder.problem(&imported);
+        let ends: Vec<f64> = problem
+            .all_stages()
+            .iter()
+            .map(|stage| stage.time.end)
+            .collect();
+        assert!(
+            (ends[0] - 0.1).abs() < 1e-12 && (ends[1] - 0.3).abs() < 1e-12,
+            "{ends:?}"
+        );
+        let lines = imported
+            .text
+            .lines()
+            .filter(|line| line.starts_with("displacement"));
+        let lines: Vec<&str> = lines.collect();
+        assert_eq!(lines.len(), starts.len(), "{}", imported.text);
+        for (line, start) in lines.iter().zip(&starts) {
+            assert!(line.contains(&format!("0.1*{start}")), "{line} {start}");
+        }
+    }
+}
+
+#[test]
+fn a_fixed_step_of_a_static_solver_counts_load_steps() {
+    let folder = Folder::strip("fixed");
+    let verlet = "    Verlet:\n      Fixed dt: 1.0e-8\n      Numerical Damping: 0.002\n";
+    let fixed = "    Static:\n      Fixed dt: 5.0e-8\n      Number of Steps: 3\n";
+    let text = STRIP.replace(verlet, fixed);
+    assert_ne!(text, STRIP);
+    let imported = folder.import("strip.yaml", &text).unwrap();
+    assert!(
+        imported.text.contains("load_steps = 20"),
+        "{}",
+        imported.text
+    );
+    let key = "PeriLab > Solver > Static > Number of Steps";
+    assert_eq!(fate(&imported, key).0, Fate::LeftOut);
+}
+
+#[test]
+fn what_perilab_would_read_otherwise_is_named() {
+    let folder = Folder::strip("named");
+    let influence = STRIP.replace(
+        "    Node Sets:\n",
+        "    Influence Function: 1/xi^2\n    Node Sets:\n",
+    );
+    let losses = folder.import("strip.yaml", &influence).unwrap().losses();
+    assert_eq!(losses.influence, [6], "{losses}");
+    let constant = influence.replace("1/xi^2", "1");
+    let losses = folder.import("strip.yaml", &constant).unwrap().losses();
+    assert!(losses.influence.is_empty(), "{losses}");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume Bulk_Modulus\n0 0 1 0.5 2\n1 0 1 0.5 3\n",
+    );
+    let losses = folder.import("strip.yaml", STRIP).unwrap().losses();
+    assert_eq!(losses.columns, [5], "{losses}");
+    // Without a row of its block, a deck has no body.
+    folder.write("strip.txt", "header: x y block_id volume\n0 0 11 0.5\n");
+    let error = folder.import("strip.yaml", STRIP).unwrap_err();
+    assert!(
+        error.contains("the file has the block numbers 11"),
+        "{error}"
+    );
+    // A file that is missing makes the new deck invalid.
+    let folder = Folder::new("nothing");
+    let imported = folder.import("strip.yaml", STRIP).unwrap();
+    assert!(imported.fault.is_some());
+    assert_eq!(imported.files.len(), 2);
+}
+
+#[test]
+fn a_thickness_divides_the_critical_energy_of_perilab() {
+    let folder = Folder::strip("thickness");
+    let text = STRIP.replace(
+        "Critical Value: 12.5\n",
+        "Critical Value: 12.5\n        Thickness: 2\n",
+    );
+    let imported = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("fracture_energy = 6.25"),
+        "{}",
+        imported.text
+    );
+}
+
 /// Steps of PeriLab: conditions of two steps, and settings that only one step has.
 #[test]
 fn steps_of_perilab_share_damping_and_damage() {
@@ -1700,6 +1844,31 @@ fn mutants_are_decks_or_errors() {
         assert!(
             sound > 0 && sound < mutants,
             "{name}: {sound} of {mutants} are sound"
+        );
+    }
+}
+
+#[test]
+fn plasticity_of_peridigm_can_be_disabled() {
+    let folder = Folder::new("disabled");
+    for (value, law) in [("true", "ordinary"), ("false", "ordinary_plastic")] {
+        let text = TWO_POINTS
+            .replacen("\"Elastic\"", "\"Elastic Plastic\"", 1)
+            .replacen(
+                "Material Model: Elastic\n",
+                "Material Model: Elastic Plastic\n",
+                1,
+            );
+        let at = text.find("Density").unwrap();
+        let indent: String = text[..at].chars().rev().take_while(|c| *c == ' ').collect();
+        let more = format!("Yield Stress: 1.0\n{indent}Disable Plasticity: {value}\n{indent}");
+        let text = format!("{}{more}{}", &text[..at], &text[at..]);
+        let imported = folder.import("two.yaml", &text).unwrap();
+        let header = format!(".{law}]");
+        assert!(
+            imported.text.contains(&header),
+            "{value}: {}",
+            imported.text
         );
     }
 }

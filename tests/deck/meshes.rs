@@ -1512,6 +1512,31 @@ fn exodus() -> Exodus {
     }
 }
 
+/// Return an Exodus file of two cubes, with all nodes of the first cube in a node set of this name.
+pub(super) fn exodus_of_first_cube(set: &'static str) -> Vec<u8> {
+    let mut file = exodus();
+    let of_name = |file: &Exodus, name: &str| {
+        let mut integers = file.integers.iter();
+        integers
+            .find(|(known, ..)| *known == name)
+            .unwrap()
+            .2
+            .clone()
+    };
+    let nodes = of_name(&file, "connect1");
+    for (name, shape, values) in &mut file.integers {
+        if *name == "node_ns1" {
+            (*shape, *values) = (vec![nodes.len()], nodes.clone());
+        }
+    }
+    for (name, rows) in &mut file.texts {
+        if *name == "ns_names" {
+            *rows = vec![set];
+        }
+    }
+    file.classic(1)
+}
+
 impl Exodus {
     /// Return a classic netCDF file of version 1 or 2 (64-bit offsets).
     fn classic(&self, version: u8) -> Vec<u8> {

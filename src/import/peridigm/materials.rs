@@ -5,6 +5,7 @@ use crate::error::{Result, excerpt};
 use crate::import::bodies::{Criterion, DamageModel, Material};
 use crate::import::draft::{Section, Value};
 use crate::import::elastic::Constants;
+use crate::import::log::OTHER_INFLUENCE;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
@@ -105,8 +106,7 @@ pub(super) fn note_influence(
         return;
     }
     let Some(written) = influence.written else {
-        let note = "influence is one of constant, linear, gaussian and inverse; constant is used";
-        log.left_out(node, note);
+        log.left_out(node, OTHER_INFLUENCE);
         return;
     };
     log.taken(node, format!("influence = \"{written}\" of the materials"));
@@ -138,6 +138,22 @@ pub(super) fn read_materials(
             translation.log.left_out(table, note);
             continue;
         };
+        let (mut law, mut difference) = (law, difference);
+        // Peridigm's other models do not read this key.
+        if let Some(node) = table.get("Disable Plasticity")
+            && (is_key(model_name, "Elastic Plastic")
+                || is_key(model_name, "Elastic Plastic Hardening"))
+        {
+            translation.log.taken(node, "whether the material yields");
+            if translation.is_true(node) {
+                (law, difference) = (&"ordinary", &"");
+                for key in ["Yield Stress", "Hardening Modulus"] {
+                    if let Some(node) = table.get(key) {
+                        translation.log.taken(node, "the material does not yield");
+                    }
+                }
+            }
+        }
         let written = translation.name("material", name);
         let header = format!("[material.{written}.{law}]");
         if difference.is_empty() {
@@ -234,14 +250,10 @@ fn law_keys(
             let model = model.unwrap_or("");
             if model.contains("Plastic") && !model.contains("Visco") || model.contains("Hardening")
             {
-                let disabled = table.get("Disable Plasticity");
-                let disabled = disabled.is_some_and(|node| {
-                    log.taken(node, "whether the material yields");
-                    translation.is_true(node)
-                });
-                if !disabled {
-                    take(section, "Yield Stress", "yield_stress")?;
-                    take(section, "Hardening Modulus", "hardening_modulus")?;
+                take(section, "Yield Stress", "yield_stress")?;
+                take(section, "Hardening Modulus", "hardening_modulus")?;
+                if let Some(node) = table.get("Disable Plasticity") {
+                    log.left_out(node, "Peridigm's correspondence models do not read it");
                 }
             }
             let coefficient = table.get("Hourglass Coefficient");

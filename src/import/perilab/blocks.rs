@@ -214,7 +214,11 @@ pub(super) fn read_blocks(
         });
     }
     if bodies.is_empty() {
-        return Err(translation.error(node.line, "there is no block"));
+        let message = match points {
+            Points::File(_, Some(file)) => file.no_block_message(),
+            _ => "there is no block".to_owned(),
+        };
+        return Err(translation.error(node.line, message));
     }
     bodies::write(translation, &bodies);
     Ok(blocks)

@@ -77,11 +77,23 @@ pub(super) fn conditions(
                 translation.log.taken(node, "the stages in which it acts")
             }
         }
-        let before = stages
-            .iter()
-            .position(|stage| stage.step_id.is_some_and(|step| steps.contains(&step)));
-        let before = before.and_then(|index| stages.get(index.checked_sub(1)?));
-        translation.step_start = before.map_or(0.0, |stage| stage.end - translation.start);
+        let acting = acting_steps(stages, &steps, translation.start);
+        let value = table.get("Value").and_then(Node::text).unwrap_or("");
+        if acting.len() > 1 && !is_initial && reads_step_time(value) {
+            // The variable `st` starts again in each step, so each step needs a condition of its own.
+            for (step, start) in acting {
+                translation.step_start = start;
+                let given = Given {
+                    name: &format!("{name} in step {step}"),
+                    node: table,
+                    quantity: quantity.clone(),
+                    steps: vec![step],
+                };
+                conditions.add(translation, sets, &given)?;
+            }
+            continue;
+        }
+        translation.step_start = acting.first().map_or(0.0, |(_, start)| *start);
         let given = Given {
             name,
             node: table,
@@ -94,6 +106,29 @@ pub(super) fn conditions(
     let has_contact = root.get("Contact").is_some();
     solver::write(translation, stages, &conditions.written, has_contact);
     Ok(conditions.has_temperature)
+}
+
+/// Return the numbers of the steps in which a condition acts, and the start of each in the time of the run.
+/// `steps` are the numbers that the condition gives; empty for all steps.
+fn acting_steps(stages: &[solver::Stage], steps: &[u64], run_start: f64) -> Vec<(u64, f64)> {
+    let mut acting: Vec<(u64, f64)> = Vec::new();
+    let mut start = 0.0;
+    for stage in stages {
+        if let Some(step) = stage.step_id
+            && (steps.is_empty() || steps.contains(&step))
+            && acting.iter().all(|(known, _)| *known != step)
+        {
+            acting.push((step, start));
+        }
+        start = stage.end - run_start;
+    }
+    acting
+}
+
+/// Test whether an expression contains the variable `st`, the time since the start of a step.
+fn reads_step_time(expression: &str) -> bool {
+    let mut words = expression.split(|c: char| !c.is_alphanumeric() && c != '_');
+    words.any(|word| word == "st")
 }
 
 /// Read the step numbers, which are separated by commas.

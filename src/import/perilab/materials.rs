@@ -338,7 +338,20 @@ pub(super) fn damages(
         }
         let node = translation.required(table, "Critical Value", &what)?;
         let number = translation.number(node, "Critical Value")?;
-        let value = translation.number_value(node, "Critical Value")?;
+        let mut value = translation.number_value(node, "Critical Value")?;
+        if let Some(node) = table.get("Thickness")
+            && !is_stretch
+        {
+            let thickness = translation.number(node, "Thickness")?;
+            if translation.dimension == 2 && thickness > 0.0 {
+                let note = "fracture_energy is the critical value divided by the thickness";
+                translation.log.taken(node, note);
+                value = Value::number(number / thickness);
+            } else {
+                let note = "counts in plane problems only, and must be above 0";
+                translation.log.left_out(node, note);
+            }
+        }
         let tension = table.get("Only Tension");
         let tension_only = tension.is_none_or(|node| translation.is_true(node));
         if let Some(node) = tension {

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::import::bodies::note_unused_damages;
 use crate::import::bond_filters::bond_filters;
 use crate::import::draft::Value;
+use crate::import::log::OTHER_INFLUENCE;
 use crate::import::outputs::Outputs;
 use crate::import::sets::Sets;
 use crate::import::solver;
@@ -19,7 +20,7 @@ use blocks::read_blocks;
 use conditions::conditions;
 use contact::contact;
 use materials::{Laws, damages, expansions, read_materials};
-use points::{Points, points, setting};
+use points::{MeshBlocks, Points, points, sets_with_all_nodes, setting};
 
 /// Translate a deck.
 ///
@@ -43,10 +44,11 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     if let Some(filters) = discretization.get("Bond Filters") {
         bond_filters(translation, filters)?;
     }
+    note_influence(translation, discretization, materials)?;
     let read = read_materials(translation, materials)?;
     let breaks = stages.iter().any(|stage| stage.breaks);
     let damages = damages(translation, models, breaks)?;
-    let expands = solvers(root).iter().any(|solver| {
+    let expands = solvers(translation, root)?.iter().any(|solver| {
         let node = solver.get("Thermal Models");
         node.is_some_and(|node| {
             translation.log.taken(node, "whether materials expand");
@@ -72,10 +74,16 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
                 .any(|known| is_key(&known.name, model))
         })
     });
-    let mut sets = Sets::new(match &points {
-        Points::Mesh(_, blocks) => Some(blocks.prefix_of_sets()),
-        Points::File(..) => None,
-    });
+    let mut sets = match &points {
+        Points::Mesh(_, groups) => {
+            let mut sets = Sets::new(Some(groups.prefix_of_sets()));
+            if matches!(groups, MeshBlocks::Numbers) {
+                sets.set_ids_by_name(sets_with_all_nodes(translation, discretization, blocks)?);
+            }
+            sets
+        }
+        Points::File(..) => Sets::new(None),
+    };
     if let Some(node_sets) = discretization.get("Node Sets") {
         for (name, node) in node_sets.entries() {
             sets.define(name, node, true);
@@ -105,17 +113,52 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Return the solver, or the solver of each step.
-fn solvers(root: &Node) -> Vec<&Node> {
-    match root.get("Multistep Solver") {
-        Some(steps) => steps.tables().map(|(_, node)| node).collect(),
-        None => root.get("Solver").into_iter().collect(),
+/// Log the outcome of the influence function, which PeriLab gives as an expression.
+fn note_influence(
+    translation: &Translation,
+    discretization: &Node,
+    materials: &Node,
+) -> Result<()> {
+    let Some(node) = discretization.get("Influence Function") else {
+        return Ok(());
+    };
+    let text = translation.text(node, "Influence Function")?;
+    let of_bonds = |(_, material): (&str, &Node)| {
+        let model = material.get("Material Model").and_then(Node::text);
+        model.is_some_and(|model| model.to_lowercase().contains("bond-based"))
+    };
+    if text.parse() == Ok(1.0) {
+        let note = "influence = \"constant\", the default";
+        translation.log.taken(node, note);
+    } else if materials.tables().all(of_bonds) {
+        let note = "bond-based materials have no influence function";
+        translation.log.left_out(node, note);
+    } else {
+        translation.log.left_out(node, OTHER_INFLUENCE);
     }
+    Ok(())
+}
+
+/// Return the solver, or the solvers of all steps in the order of their `Step ID`, as PeriLab does.
+///
+/// # Errors
+/// If a step has no `Step ID`, or one that is not a whole number.
+fn solvers<'n>(translation: &Translation, root: &'n Node) -> Result<Vec<&'n Node>> {
+    let Some(steps) = root.get("Multistep Solver") else {
+        return Ok(root.get("Solver").into_iter().collect());
+    };
+    let mut solvers = Vec::new();
+    for (name, node) in steps.tables() {
+        let id = translation.required(node, "Step ID", &format!("the step `{name}`"))?;
+        solvers.push((translation.count(id, "Step ID")?, node));
+    }
+    solvers.sort_by_key(|(id, _)| *id);
+    Ok(solvers.into_iter().map(|(_, node)| node).collect())
 }
 
 /// Read the stages of all solvers.
 fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stage>> {
-    let solvers = solvers(root);
+    let solvers = solvers(translation, root)?;
     let Some(first) = solvers.first() else {
         return Err(translation.error(root.line, "the deck has no `Solver`"));
     };

@@ -3,9 +3,10 @@
 use crate::error::{Result, excerpt};
 use crate::import::draft::Value;
 use crate::import::files::PointFile;
+use crate::import::log::UNUSED_COLUMNS;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
-use crate::mesh::{self, Format, Members};
+use crate::mesh::{self, BLOCK, Format, Members};
 
 /// Source of the points of the blocks.
 pub(super) enum Points {
@@ -15,7 +16,7 @@ pub(super) enum Points {
 
 /// Meaning of the block numbers of a deck with a mesh.
 pub(super) enum MeshBlocks {
-    /// The numbers of groups of the mesh.
+    /// The numbers of blocks of an Exodus mesh.
     Numbers,
     /// The numbers of groups of the mesh. The import does not read the mesh, which may have no groups. If the
     /// deck has a single block, and its number is 1, this block therefore has all elements.
@@ -81,6 +82,82 @@ fn blocks_of_abaqus(
     Some(names)
 }
 
+/// Columns of a point file from which PeriLab takes the constants of each point, in place of those of the deck.
+const POINTWISE_CONSTANTS: [&str; 5] = [
+    "Bulk_Modulus",
+    "Young's_Modulus",
+    "Poisson's_Ratio",
+    "Shear_Modulus",
+    "Critical_Value",
+];
+
+/// Largest number of ids that the import writes for a node set; longer lists would make the new deck
+/// unreadable.
+const MOST_IDS: usize = 1_000_000;
+
+/// Return the node sets of an Exodus mesh with the ids of their points, by name. PeriLab gives the name
+/// `Set-N` to the N-th set if this set has no name.
+///
+/// In PeriLab, an element belongs to a node set if all nodes of the element do. (In Peridigm and Fissure, one
+/// node is enough.) The result is empty if the mesh cannot be read, or if some of its elements are in no
+/// block of the deck.
+pub(super) fn sets_with_all_nodes(
+    translation: &Translation,
+    discretization: &Node,
+    blocks: &Node,
+) -> Result<Vec<(String, Vec<u64>)>> {
+    let file = translation.required(discretization, "Input Mesh File", "the discretization")?;
+    let path = translation.path(translation.text(file, "Input Mesh File")?);
+    let bytes = mesh::load(&path).ok();
+    let mesh = bytes.and_then(|bytes| mesh::parse(Format::Exodus, &path, &bytes).ok());
+    let Some(mesh) = mesh else {
+        return Ok(Vec::new());
+    };
+    let numbers: Vec<i64> = blocks
+        .tables()
+        .filter_map(|(_, block)| {
+            let id = translation.count(block.get("Block ID")?, "Block ID");
+            id.ok().map(|id| id as i64)
+        })
+        .collect();
+    let has_number = |number: Option<i64>| number.is_some_and(|number| numbers.contains(&number));
+    let mut groups = mesh.groups.iter().filter(|group| group.kind == BLOCK);
+    let mut elements = 0..mesh.elements.len();
+    // The id of a point is the index of its element only if every element becomes a point.
+    if !groups.all(|group| has_number(group.number))
+        || !elements.all(|element| mesh.is_solid(element, translation.dimension))
+    {
+        return Ok(Vec::new());
+    }
+    let (mut sets, mut number) = (Vec::new(), 0);
+    for group in &mesh.groups {
+        let Members::Nodes(nodes) = &group.members else {
+            continue;
+        };
+        let mut is_in = vec![false; mesh.nodes.len()];
+        for node in nodes.iter() {
+            is_in[node as usize] = true;
+        }
+        let has_all = |element: &usize| {
+            let mut nodes = mesh.elements.nodes(*element).iter();
+            nodes.all(|node| is_in[*node as usize])
+        };
+        let elements = (0..mesh.elements.len()).filter(has_all);
+        let ids: Vec<u64> = elements.map(|element| element as u64).collect();
+        number += 1;
+        if ids.len() > MOST_IDS {
+            continue;
+        }
+        // The mesh reader gives this name to a set without a name.
+        let default = format!("nodelist_{}", group.number.unwrap_or(0));
+        if group.name.as_ref() == Some(&default) {
+            sets.push((format!("Set-{number}"), ids.clone()));
+        }
+        sets.push((group.name.clone().unwrap_or(default), ids));
+    }
+    Ok(sets)
+}
+
 /// Read the source of the points.
 pub(super) fn points(
     translation: &mut Translation,
@@ -106,6 +183,13 @@ pub(super) fn points(
             None => "points.file of the bodies; it cannot be read yet",
         };
         translation.log.taken(file, note);
+        let names = known.as_ref().and_then(|file| file.names.clone());
+        let mut constants = names.unwrap_or_default();
+        constants.retain(|name| POINTWISE_CONSTANTS.contains(&name.as_str()));
+        if !constants.is_empty() {
+            let note = format!("{UNUSED_COLUMNS}: {}", constants.join(", "));
+            translation.log.approximated(file, note);
+        }
         return Ok(Points::File(value, known));
     }
     if ["Exodus", "Abaqus", "Gmsh"]
