@@ -46,6 +46,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
         name: "damage",
         unit: "",
         components: 1,
+        needs_double: false,
     }];
     let contents = Contents {
         piece: Piece {

@@ -46,7 +46,7 @@ pub struct CompareArguments {
 
 /// Parse `VALUE` or `NAME=VALUE`.
 fn tolerance(text: &str) -> std::result::Result<(Option<String>, f64), String> {
-    let (name, value) = match text.split_once('=') {
+    let (name, value) = match text.rsplit_once('=') {
         Some((name, value)) => (Some(name.trim().to_owned()), value),
         None => (None, text),
     };
@@ -180,12 +180,16 @@ fn report(
     verbosity: Verbosity,
 ) -> String {
     let mut text = format!("A {}\nB {}\n", names[0], names[1]);
-    let points = comparison.points / comparison.outputs.max(1) as u64;
     let (outputs, rows) = (comparison.outputs, comparison.rows);
+    let number = outputs.max(1) as u64;
+    let points = if comparison.has_equal_counts {
+        format!("of {} points", count(comparison.points / number))
+    } else {
+        format!("with {} points in all", count(comparison.points))
+    };
     let _ = writeln!(
         text,
-        "{outputs} outputs of {} points, {rows} rows of the history",
-        count(points)
+        "{outputs} outputs {points}, {rows} rows of the history"
     );
     for (side, name) in ["A", "B"].into_iter().enumerate() {
         only(&mut text, name, "fields", &comparison.single_fields[side]);

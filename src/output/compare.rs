@@ -1,11 +1,13 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
-//! Outputs and history rows are matched by time, points by id. Values are read in blocks of points, so the
-//! memory does not depend on the numbers of points and outputs. Only the history is read as a whole.
+//! Outputs and history rows are matched by time, points by id. Values are read in blocks of points; the
+//! history is read as a whole. The ids of two outputs are also read as a whole if they differ and at least one
+//! sequence does not ascend, as on refined grids.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};
 use std::cmp::Ordering;
+use std::ops::Range;
 
 /// Number of points that are read at once.
 const BLOCK: usize = 1 << 16;
@@ -117,6 +119,8 @@ pub struct Comparison {
     pub single_outputs: [Vec<f64>; 2],
     /// Number of pairs of points in all outputs.
     pub points: u64,
+    /// Whether all pairs of outputs have the same number of pairs of points.
+    pub has_equal_counts: bool,
     /// Number of points of each result that the other result lacks, in all pairs of outputs.
     pub single_points: [u64; 2],
     /// The common fields.
@@ -148,31 +152,38 @@ impl Comparison {
 /// number of all pairs and the time (s).
 ///
 /// # Errors
-/// If a file is damaged or its points are not in the order of their ids.
+/// If a file is damaged, or if ids must be matched in any order and two points of an output have the same id.
 pub fn compare(
     first: &ResultReader,
     second: &ResultReader,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Comparison> {
-    let mut comparison = Comparison::default();
+    let mut comparison = Comparison {
+        has_equal_counts: true,
+        ..Comparison::default()
+    };
     let fields = common_fields(first, second, &mut comparison)?;
     let times = [first.times()?, second.times()?];
     let pairs = Matches::of(&times[0], &times[1]);
     comparison.outputs = pairs.pairs.len();
     comparison.single_outputs = pairs.single(&times);
     let unchanging = !first.is_changing() && !second.is_changing();
+    let mut matching = None;
     for (number, [a, b]) in pairs.pairs.iter().copied().enumerate() {
-        let outputs = Outputs {
+        let pair = OutputPair {
             readers: [first, second],
             indices: [a, b],
             time: times[0][a],
         };
+        let known = matching.take().filter(|_| unchanging);
+        let found = known.map_or_else(|| pair.matching(), Ok)?;
         // If the points never change, compare static fields only at the first pair of outputs.
         let compared: Vec<usize> = (0..fields.len())
             .filter(|k| number == 0 || fields[*k] || !unchanging)
             .collect();
-        outputs.compare(&compared, &mut comparison)?;
-        progress(number + 1, pairs.pairs.len(), outputs.time);
+        pair.compare((number, &found), &compared, &mut comparison)?;
+        matching = Some(found);
+        progress(number + 1, pairs.pairs.len(), pair.time);
     }
     compare_histories([&first.history()?, &second.history()?], &mut comparison);
     Ok(comparison)
@@ -210,87 +221,164 @@ fn common_fields(
 }
 
 /// A pair of outputs of the same time.
-struct Outputs<'a> {
+struct OutputPair<'a> {
     readers: [&'a ResultReader; 2],
     indices: [usize; 2],
     time: f64,
 }
 
-impl Outputs<'_> {
+/// How the points of two outputs are matched.
+enum Matching {
+    /// Block by block: the ids of both outputs ascend, or are the same sequence.
+    InOrder,
+    /// By these pairs of rows, one row of each output, by ascending row of the first output.
+    Rows(Vec<[usize; 2]>),
+}
+
+impl OutputPair<'_> {
+    /// Find out how the points are matched.
+    ///
+    /// # Errors
+    /// If an output cannot be read, or if two of its points have the same id.
+    fn matching(&self) -> Result<Matching> {
+        let counts = self.counts();
+        let (mut ascend, mut equal) = (true, counts[0] == counts[1]);
+        for start in (0..counts[0].max(counts[1])).step_by(BLOCK) {
+            // The first point of the next block is read too, to compare the ids at the border.
+            let part = |side: usize| {
+                let end = counts[side].min(start + BLOCK + 1);
+                self.ids(side, start.min(end)..end)
+            };
+            let ids = [part(0)?, part(1)?];
+            equal &= ids[0] == ids[1];
+            ascend &= ids.iter().all(|ids| ids.is_sorted_by(|a, b| a < b));
+            if !equal && !ascend {
+                let ids = [self.ids(0, 0..counts[0])?, self.ids(1, 0..counts[1])?];
+                return match_unordered(&ids)
+                    .map(Matching::Rows)
+                    .map_err(|repeated| self.repeated_id(repeated));
+            }
+        }
+        Ok(Matching::InOrder)
+    }
+
     /// Compare some of the fields, one block of points at a time. `fields` has the indices of these fields in
-    /// `comparison.fields`.
-    fn compare(&self, fields: &[usize], comparison: &mut Comparison) -> Result<()> {
-        let counts = [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]));
-        let mut next = [0; 2];
-        while next[0] < counts[0] || next[1] < counts[1] {
-            let mut ids = [Vec::new(), Vec::new()];
-            for side in 0..2 {
-                let end = counts[side].min(next[side] + BLOCK);
-                ids[side] = self.readers[side].ids_of(self.indices[side], next[side]..end)?;
-                if ids[side].windows(2).any(|pair| pair[0] >= pair[1]) {
-                    return Err(Error::input(
-                        "the points of a result are not in the order of their ids; \
-                         compare works on results that Fissure has written",
-                    ));
+    /// `comparison.fields`, and `done` is the number of pairs of outputs that have been compared.
+    fn compare(
+        &self,
+        (done, matching): (usize, &Matching),
+        fields: &[usize],
+        comparison: &mut Comparison,
+    ) -> Result<()> {
+        let counts = self.counts();
+        let mut matched = 0;
+        match matching {
+            Matching::InOrder => {
+                let mut next = [0; 2];
+                while next[0] < counts[0] || next[1] < counts[1] {
+                    let end = [0, 1].map(|side| counts[side].min(next[side] + BLOCK));
+                    let ids = [self.ids(0, next[0]..end[0])?, self.ids(1, next[1]..end[1])?];
+                    let is_last = [0, 1].map(|side| end[side] == counts[side]);
+                    let (mut pairs, used) = match_in_order(&ids, is_last);
+                    for pair in &mut pairs {
+                        *pair = [next[0] + pair[0], next[1] + pair[1]];
+                    }
+                    self.compare_rows(&pairs, fields, comparison)?;
+                    matched += pairs.len();
+                    next = [next[0] + used[0], next[1] + used[1]];
                 }
             }
-            let block = Block::of(&ids, [0, 1].map(|side| next[side] + BLOCK >= counts[side]));
-            comparison.points += block.pairs.len() as u64;
-            for side in 0..2 {
-                let single = block.used[side] - block.pairs.len();
-                comparison.single_points[side] += single as u64;
-            }
-            if !block.pairs.is_empty() {
-                for field in fields {
-                    self.compare_block(&ids[0], next, &block, &mut comparison.fields[*field])?;
+            Matching::Rows(pairs) => {
+                for pairs in pairs.chunks(BLOCK) {
+                    self.compare_rows(pairs, fields, comparison)?;
                 }
+                matched = pairs.len();
             }
-            for side in 0..2 {
-                next[side] += block.used[side];
-            }
+        }
+        comparison.has_equal_counts &= comparison.points == done as u64 * matched as u64;
+        comparison.points += matched as u64;
+        for side in 0..2 {
+            comparison.single_points[side] += (counts[side] - matched) as u64;
         }
         Ok(())
     }
 
-    /// Compare a field at the point pairs of a block. `ids` has the ids of the block's points in the first
-    /// result, and `start` the index of the block's first point in each output.
-    fn compare_block(
+    /// Number of points of each output.
+    fn counts(&self) -> [usize; 2] {
+        [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]))
+    }
+
+    /// Read the ids of some points of one output.
+    fn ids(&self, side: usize, rows: Range<usize>) -> Result<Vec<u64>> {
+        self.readers[side].ids_of(self.indices[side], rows)
+    }
+
+    /// Create the error for two points of an output with the same id.
+    fn repeated_id(&self, (side, id): (usize, u64)) -> Error {
+        Error::input(format!(
+            "{}: two points of the output at t = {} s have the id {id}; \
+             compare works on results that Fissure has written",
+            self.readers[side].path().display(),
+            self.time
+        ))
+    }
+
+    /// Compare some of the fields at pairs of rows, one row of each output.
+    fn compare_rows(
         &self,
-        ids: &[u64],
-        start: [usize; 2],
-        block: &Block,
+        pairs: &[[usize; 2]],
+        fields: &[usize],
+        comparison: &mut Comparison,
+    ) -> Result<()> {
+        if pairs.is_empty() {
+            return Ok(());
+        }
+        let ranges = [0, 1].map(|side| {
+            let rows = || pairs.iter().map(|pair| pair[side]);
+            rows().min().unwrap_or(0)..rows().max().map_or(0, |last| last + 1)
+        });
+        for field in fields {
+            self.compare_field(pairs, &ranges, &mut comparison.fields[*field])?;
+        }
+        Ok(())
+    }
+
+    /// Compare a field at pairs of rows. `ranges` has for each output the range that contains these rows.
+    fn compare_field(
+        &self,
+        pairs: &[[usize; 2]],
+        ranges: &[Range<usize>; 2],
         field: &mut Difference,
     ) -> Result<()> {
         let mut values = [Vec::new(), Vec::new()];
         for side in 0..2 {
-            let points = start[side]..start[side] + block.used[side];
             let (reader, index) = (self.readers[side], self.indices[side]);
+            let range = ranges[side].clone();
             values[side] = if field.name == POSITION {
-                reader.positions_of(index, points)?.into_flattened()
+                reader.positions_of(index, range)?.into_flattened()
             } else {
-                reader.field_of(&field.name, index, points)?
+                reader.field_of(&field.name, index, range)?
             };
         }
         let width = field.components.len().max(1);
         let mut largest = None;
-        for [a, b] in &block.pairs {
+        for [a, b] in pairs {
             for component in 0..width {
                 if field.add(
-                    values[0][a * width + component],
-                    values[1][b * width + component],
+                    values[0][(a - ranges[0].start) * width + component],
+                    values[1][(b - ranges[1].start) * width + component],
                 ) {
                     largest = Some((*a, component));
                 }
             }
         }
-        if let Some((point, component)) = largest {
-            let row = start[0] + point;
+        if let Some((row, component)) = largest {
             let position = self.readers[0].positions_of(self.indices[0], row..row + 1)?;
             field.place = Some(Place {
                 time: self.time,
                 component,
                 point: Some(PointPlace {
-                    id: ids[point],
+                    id: self.ids(0, row..row + 1)?[0],
                     position: position[0],
                 }),
             });
@@ -299,35 +387,49 @@ impl Outputs<'_> {
     }
 }
 
-/// A block of consecutive points of each of two results. `pairs` has the points with equal ids, as indices
-/// into the block of each result. `used` is the number of points of each block that need not be considered
-/// again.
-struct Block {
-    pairs: Vec<[usize; 2]>,
-    used: [usize; 2],
-}
-
-impl Block {
-    /// Match two ascending lists of ids, one list of each result. Stop at the end of a list, unless `last`
-    /// says that the result has no further ids.
-    fn of(ids: &[Vec<u64>; 2], last: [bool; 2]) -> Self {
-        let (mut pairs, mut used) = (Vec::new(), [0; 2]);
-        loop {
-            match (ids[0].get(used[0]), ids[1].get(used[1])) {
-                (Some(a), Some(b)) => match a.cmp(b) {
-                    Ordering::Less => used[0] += 1,
-                    Ordering::Greater => used[1] += 1,
-                    Ordering::Equal => {
-                        pairs.push(used);
-                        used = used.map(|count| count + 1);
-                    }
-                },
-                (Some(_), None) if last[1] => used[0] = ids[0].len(),
-                (None, Some(_)) if last[0] => used[1] = ids[1].len(),
-                _ => return Self { pairs, used },
-            }
+/// Match two lists of ids, one of each result, that ascend or are equal. `is_last` says for each result
+/// whether no further ids follow. If so, the remaining ids of the other list have no partner; they count as
+/// used. Return the pairs of indices of equal ids, and the number of used ids of each list.
+fn match_in_order(ids: &[Vec<u64>; 2], is_last: [bool; 2]) -> (Vec<[usize; 2]>, [usize; 2]) {
+    let (mut pairs, mut used) = (Vec::new(), [0; 2]);
+    loop {
+        match (ids[0].get(used[0]), ids[1].get(used[1])) {
+            (Some(a), Some(b)) => match a.cmp(b) {
+                Ordering::Less => used[0] += 1,
+                Ordering::Greater => used[1] += 1,
+                Ordering::Equal => {
+                    pairs.push(used);
+                    used = used.map(|count| count + 1);
+                }
+            },
+            (Some(_), None) if is_last[1] => used[0] = ids[0].len(),
+            (None, Some(_)) if is_last[0] => used[1] = ids[1].len(),
+            _ => return (pairs, used),
         }
     }
+}
+
+/// Match two lists of ids, which need not be sorted. Return the pairs of indices of equal ids, by ascending
+/// index in the first list. If a list contains an id twice, return the index of this list and the id as an
+/// error.
+fn match_unordered(ids: &[Vec<u64>; 2]) -> std::result::Result<Vec<[usize; 2]>, (usize, u64)> {
+    let mut orders = [Vec::new(), Vec::new()];
+    let mut sorted = [Vec::new(), Vec::new()];
+    for side in 0..2 {
+        let id = |row: &usize| ids[side][*row];
+        orders[side] = (0..ids[side].len()).collect();
+        orders[side].sort_unstable_by_key(id);
+        sorted[side] = orders[side].iter().map(id).collect();
+        if let Some(twice) = sorted[side].windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err((side, twice[0]));
+        }
+    }
+    let (mut pairs, _) = match_in_order(&sorted, [true; 2]);
+    for pair in &mut pairs {
+        *pair = [orders[0][pair[0]], orders[1][pair[1]]];
+    }
+    pairs.sort_unstable();
+    Ok(pairs)
 }
 
 /// Pairs of equal times, as indices into two ascending lists.
@@ -423,14 +525,26 @@ mod tests {
     #[test]
     fn ids_are_matched_across_blocks() {
         let ids = |first: &[u64], second: &[u64]| [first.to_vec(), second.to_vec()];
-        let block = Block::of(&ids(&[1, 3, 4, 9], &[1, 2, 4, 5]), [true, true]);
-        assert_eq!(block.pairs, [[0, 0], [2, 2]]);
-        assert_eq!(block.used, [4, 4]);
+        let (pairs, used) = match_in_order(&ids(&[1, 3, 4, 9], &[1, 2, 4, 5]), [true, true]);
+        assert_eq!(pairs, [[0, 0], [2, 2]]);
+        assert_eq!(used, [4, 4]);
         // The second result has further blocks, one of which may have the id 9.
-        let block = Block::of(&ids(&[1, 9], &[1, 2, 4]), [true, false]);
-        assert_eq!((block.pairs.len(), block.used), (1, [1, 3]));
-        let block = Block::of(&ids(&[], &[7, 8]), [true, true]);
-        assert_eq!((block.pairs.len(), block.used), (0, [0, 2]));
+        let (pairs, used) = match_in_order(&ids(&[1, 9], &[1, 2, 4]), [true, false]);
+        assert_eq!((pairs.len(), used), (1, [1, 3]));
+        let (pairs, used) = match_in_order(&ids(&[], &[7, 8]), [true, true]);
+        assert_eq!((pairs.len(), used), (0, [0, 2]));
+        // Equal lists need not ascend.
+        let (pairs, used) = match_in_order(&ids(&[0, 8, 1], &[0, 8, 1]), [false, false]);
+        assert_eq!((pairs, used), (vec![[0, 0], [1, 1], [2, 2]], [3, 3]));
+    }
+
+    #[test]
+    fn ids_in_any_order_are_matched() {
+        let ids = [vec![0, 8, 16, 1, 2], vec![0, 16, 24, 1, 9, 2]];
+        let pairs = match_unordered(&ids).unwrap();
+        assert_eq!(pairs, [[0, 0], [2, 1], [3, 3], [4, 5]]);
+        let twice = match_unordered(&[vec![0, 8, 1], vec![0, 8, 1, 8]]);
+        assert_eq!(twice, Err((1, 8)));
     }
 
     #[test]

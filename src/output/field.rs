@@ -25,6 +25,9 @@ pub struct FieldDescription {
     /// - 6: symmetric tensor (xx, yy, zz, xy, yz, xz);
     /// - 9: tensor, row-major.
     pub components: usize,
+    /// Whether single precision would change the meaning of the values, such as ids. The values are then
+    /// always stored in double precision.
+    pub needs_double: bool,
 }
 
 /// This rank's values of a field, row-major: [points of this rank, components].

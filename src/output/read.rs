@@ -150,6 +150,11 @@ impl ResultReader {
         })
     }
 
+    /// Return the path of the file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Return the number of points at one of the [times](Self::times).
     pub fn points(&self, time_index: usize) -> usize {
         self.counts[time_index.min(self.counts.len() - 1)]

@@ -16,6 +16,7 @@ fn describe(name: &'static str, unit: &'static str, components: usize) -> FieldD
         name,
         unit,
         components,
+        needs_double: false,
     }
 }
 

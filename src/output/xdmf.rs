@@ -61,15 +61,17 @@ impl SideCar {
             number,
             dynamic,
         };
-        let real = if contents.single {
-            Number::F32
-        } else {
-            Number::F64
+        let real = |field: &FieldDescription| {
+            if contents.single && !field.needs_double {
+                Number::F32
+            } else {
+                Number::F64
+            }
         };
         let fixed = contents.fixed.iter();
         let fixed = fixed.map(|(field, data)| stored(field, data.number(), contents.changing));
         let moving = contents.moving.iter();
-        let moving = moving.map(|field| stored(field, real, true));
+        let moving = moving.map(|field| stored(field, real(field), true));
         let mut fields: Vec<StoredField> = fixed.chain(moving).collect();
         fields.sort_by(|a, b| a.name.cmp(&b.name));
         let name = result.file_name().unwrap_or_default();

@@ -358,6 +358,11 @@ impl Field {
         }
     }
 
+    /// Whether the values are ids, which single precision would change.
+    pub fn needs_double(self) -> bool {
+        matches!(self, Self::Fragment)
+    }
+
     /// Return the number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for
     /// other tensors. Vectors and tensors are padded in 1-D and 2-D.
     pub fn components(self) -> usize {

@@ -46,6 +46,7 @@ impl<'a> ResultLayout<'a> {
             name: field.name(),
             unit: field.unit(),
             components: field.components(),
+            needs_double: field.needs_double(),
         };
         let ids = select(rows, order.collect(comm, &model.ids[..owned], 1), 1);
         let (first, total) = comm::scan(comm, ids.len() as u64);
@@ -71,6 +72,7 @@ impl<'a> ResultLayout<'a> {
             name,
             unit,
             components: 1,
+            needs_double: false,
         };
         let [id, block, volume, level] = FIXED;
         let mut fixed = vec![

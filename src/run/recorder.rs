@@ -402,6 +402,7 @@ fn reason_for_new_result<const D: usize>(
         let mut requested: Vec<&str> = requested.collect();
         requested.sort_unstable();
         let single = |field: &StoredField| field.number == Number::F32;
+        let has_single = output.single && !output.fields.iter().all(|field| field.needs_double());
         let changing = simulation.may_refine();
         if reader.is_changing() != changing {
             let text = "adaptive refinement was switched on or off";
@@ -410,7 +411,7 @@ fn reason_for_new_result<const D: usize>(
         let found_points = reader.ids(0)?.into_iter().map(mix);
         if !changing && found_points.fold(0, u64::wrapping_add) != points {
             return Ok(Some("the deck requests other points".to_owned()));
-        } else if fields.iter().any(single) != (output.single && !requested.is_empty()) {
+        } else if fields.iter().any(single) != has_single {
             return Ok(Some("the deck requests another precision".to_owned()));
         } else if found != requested {
             return Ok(Some("the deck requests other fields".to_owned()));

@@ -2,7 +2,7 @@
 
 use super::Size;
 use crate::material::Law;
-use crate::problem::{Block, Body, FamilyRule, Output, Problem};
+use crate::problem::{Block, Body, FamilyRule, Field, Output, Problem};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::motion::Clock;
@@ -234,9 +234,11 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     let rows = Schedule::every(problem.row_interval()).count(clock);
     let result = |(output, points): (&Output, &f64)| {
         let outputs = Schedule::of_outputs(output).count(clock);
-        let components = output.fields.iter().map(|field| field.components());
-        let components = components.sum::<usize>() as f64;
-        let number = if output.single { 4.0 } else { 8.0 };
+        let bytes_of = |field: &Field| {
+            let is_single = output.single && !field.needs_double();
+            field.components() as f64 * if is_single { 4.0 } else { 8.0 }
+        };
+        let of_output: f64 = output.fields.iter().map(bytes_of).sum();
         let history = if output.name.is_none() {
             8.0 * rows as f64 * counts.columns
         } else {
@@ -245,7 +247,7 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
         ResultCost {
             name: output.name.clone(),
             outputs,
-            bytes: OVERHEAD + points * (FIXED + number * outputs as f64 * components) + history,
+            bytes: OVERHEAD + points * (FIXED + outputs as f64 * of_output) + history,
         }
     };
     let results = problem.outputs().zip(&counts.output_points).map(result);

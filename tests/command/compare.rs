@@ -20,6 +20,11 @@ output = { every_steps = 50, fields = ['displacement', 'damage'] }
 history.every_steps = 20
 ";
 
+/// Open the result in an output folder.
+fn open(folder: &Path) -> ResultReader {
+    ResultReader::open(&folder.join("result.vtkhdf")).unwrap()
+}
+
 struct Runs {
     folder: Folder,
     deck: PathBuf,
@@ -76,26 +81,8 @@ fn a_difference_is_found_with_its_point_and_time() {
 
     let other = runs.run("other", &runs.deck, &["--set", "pull=1.001"]);
     let output = compare(&first, &other, &[]);
-    let readers =
-        [&first, &other].map(|out| ResultReader::open(&out.join("result.vtkhdf")).unwrap());
-    let times = readers[0].times().unwrap();
-    let ids = readers[0].ids(0).unwrap();
-    let (mut largest, mut found) = (0.0, String::new());
-    for (index, time) in times.iter().enumerate() {
-        let [a, b] = [0, 1].map(|side: usize| readers[side].field("displacement", index).unwrap());
-        for (entry, (a, b)) in a.iter().zip(&b).enumerate() {
-            if (a - b).abs() > largest {
-                largest = (a - b).abs();
-                let name = ["x", "y", "z"][entry % 3];
-                let point = ids[entry / 3];
-                found = format!(
-                    "{largest:.3e} m|{name}, point {point} at|t = {:.3} µs",
-                    1e6 * time
-                );
-            }
-        }
-    }
-    assert!(largest > 0.0);
+    let found = largest_difference(&first, &other);
+    assert!(!found.is_empty());
     let printed = text(&output);
     let line = printed
         .lines()
@@ -190,4 +177,153 @@ fn what_only_one_result_has_is_named() {
         ],
     );
     expect(&output, 1, &["only in B: 5 rows of the history"]);
+}
+
+/// On refined grids, ids do not ascend.
+#[test]
+fn refined_points_are_matched_by_id() {
+    let runs = Runs::new("compare_refined");
+    let refined = |name: &str, options: &[&str]| {
+        let text = DECK.replace("pull = 1", "pull = 1, edge = 4e-3");
+        let text = format!("{text}\nrefinement = {{ levels = 1, region.left.where = 'x < edge' }}");
+        let deck = runs.folder.write("refined.toml", &text);
+        runs.run(name, &deck, options)
+    };
+    let narrow = refined("narrow", &[]);
+    let same = refined("same", &[]);
+    let wide = refined("wide", &["--set", "edge=8e-3"]);
+    let [few, many] = [&narrow, &wide].map(|out| {
+        let reader = open(out);
+        assert!(!reader.ids(0).unwrap().is_sorted());
+        reader.points(0)
+    });
+    assert!(few < many, "{few} {many}");
+    let all = format!("5 outputs of {few} points");
+    let equal = [&all[..], "the results are equal\n"];
+    expect(&compare(&narrow, &same, &[]), 0, &equal);
+
+    // Without refinement, there are only the points of level 0.
+    let coarse = runs.run("coarse", &runs.deck, &[]);
+    for (first, second, shared, single) in [
+        (&narrow, &wide, few, ["B", "A"]),
+        (&wide, &narrow, few, ["A", "B"]),
+        (&coarse, &wide, 200, ["B", "A"]),
+        (&wide, &coarse, 200, ["A", "B"]),
+    ] {
+        let output = compare(first, second, &[]);
+        let more = open(first).points(0).max(open(second).points(0));
+        let more = 5 * (more - shared);
+        let more = match (more / 1000, more % 1000) {
+            (0, more) => more.to_string(),
+            (thousands, rest) => format!("{thousands} {rest:03}"),
+        };
+        let shared = format!("5 outputs of {shared} points");
+        let single_points = |name: &str| format!("only in {name}: {more} points, over all outputs");
+        let words = [&shared, &single_points(single[0]), "position      equal"];
+        expect(&output, 1, &words);
+        assert!(!text(&output).contains(&single_points(single[1])));
+        for words in largest_difference(first, second).split('|') {
+            expect(&output, 1, &[words]);
+        }
+    }
+}
+
+/// Return the parts of the line about displacements, for the points with equal ids.
+fn largest_difference(first: &Path, second: &Path) -> String {
+    let readers = [first, second].map(open);
+    let (mut largest, mut found) = (0.0, String::new());
+    for (index, time) in readers[0].times().unwrap().iter().enumerate() {
+        let [a, b] = [0, 1].map(|side: usize| {
+            let ids = readers[side].ids(index).unwrap();
+            let values = readers[side].field("displacement", index).unwrap();
+            (ids, values)
+        });
+        for (row, id) in a.0.iter().enumerate() {
+            let Some(other) = b.0.iter().position(|other| other == id) else {
+                continue;
+            };
+            for (k, name) in ["x", "y", "z"].iter().enumerate() {
+                let difference = (a.1[3 * row + k] - b.1[3 * other + k]).abs();
+                if difference > largest {
+                    largest = difference;
+                    found = format!(
+                        "{largest:.3e} m|{name}, point {id} at|t = {:.3} µs",
+                        1e6 * time
+                    );
+                }
+            }
+        }
+    }
+    found
+}
+
+/// A bar with more points than `compare` reads at once.
+#[test]
+fn many_refined_points_are_compared_in_blocks() {
+    let runs = Runs::new("compare_blocks");
+    let refined = |name: &str, refined: &str| {
+        let text = format!(
+            "
+dimension = '1d'
+constraint = 'uniaxial-stress'
+grid = {{ spacing = 1e-3, horizon = 2e-3 }}
+material.steel.pmb = {{ density = 7850, youngs_modulus = 200e9 }}
+body.bar = {{ material = 'steel', shape.box = {{ lower = [0], upper = [70] }} }}
+initial.push.velocity = ['sin(x)']
+time = {{ end = 1e-8, step = 1e-8 }}
+output = {{ every_steps = 1, fields = ['displacement'] }}
+refinement = {{ levels = 1, region.part.where = '{refined}' }}
+"
+        );
+        let deck = runs.folder.write("bar.toml", &text);
+        runs.run(name, &deck, &[])
+    };
+    let left = refined("left", "x < 1");
+    let right = refined("right", "x > 69");
+    let output = compare(&left, &right, &[]);
+    let words = [
+        "2 outputs of 70 000 points",
+        "only in A: 2 000 points, over all outputs",
+        "only in B: 2 000 points, over all outputs",
+        "position      equal",
+    ];
+    expect(&output, 1, &words);
+}
+
+/// Ids of refined points can exceed 2²⁴, so single precision would change them.
+#[test]
+fn fragments_are_exact_in_single_precision() {
+    let runs = Runs::new("compare_fragments");
+    let text = "
+dimension = 'plane-stress'
+grid = { spacing = 1, horizon = 2 }
+material.glass.pmb = { density = 2, youngs_modulus = 5 }
+damage.brittle.critical_stretch.critical_stretch = 0.01
+body.plate = { material = 'glass', damage = 'brittle', shape.box = { lower = [0, 0], upper = [72, 72] } }
+refinement = { levels = 6, region.corner.where = 'x > 70 and y > 70' }
+set.corner.where = 'x > 69 and y > 69'
+initial.pull.velocity = ['x', 'y']
+time = { end = 0.1, step = 0.1 }
+[output]
+fields = ['fragment', 'damage']
+set = 'corner'
+precision = 'single'
+double = { fields = ['fragment', 'damage'], set = 'corner' }
+";
+    let deck = runs.folder.write("fragments.toml", text);
+    let out = runs.run("fragments", &deck, &[]);
+    let double = out.join("result_double.vtkhdf");
+    let reader = ResultReader::open(&double).unwrap();
+    let largest = reader
+        .field("fragment", 1)
+        .unwrap()
+        .into_iter()
+        .fold(0.0, f64::max);
+    assert!(largest > 16_777_216.0, "{largest}");
+    let output = compare(&out.join("result.vtkhdf"), &double, &[]);
+    assert!(
+        crate::support::command::text(&output).contains("fragment  equal"),
+        "{}",
+        crate::support::command::text(&output)
+    );
 }

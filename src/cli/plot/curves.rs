@@ -191,7 +191,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
     let mut columns: Vec<StoredColumn> = header
         .split(',')
         .map(|cell| {
-            let (name, unit) = cell.split_once('[').unwrap_or((cell, ""));
+            let (name, unit) = cell.rsplit_once('[').unwrap_or((cell, ""));
             StoredColumn {
                 name: name.trim().to_owned(),
                 unit: unit.trim().trim_end_matches(']').to_owned(),

@@ -65,7 +65,7 @@ pub fn read(path: &Path) -> Result<Vec<Line>> {
 
 /// Remove the unit from a name: `x [m]` becomes `x`.
 fn bare_name(name: &str) -> &str {
-    name.split('[').next().unwrap_or_default().trim()
+    name.rsplit_once('[').map_or(name, |(bare, _)| bare).trim()
 }
 
 /// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of this

@@ -14,7 +14,7 @@
 //! With adaptive refinement, each step is a separate VTK part. The points and static fields of all steps are
 //! then concatenated.
 //!
-//! On any number of ranks, a step is one part with points in the order of their ids. The data of a step is
+//! On any number of ranks, a step is one part with points in the order of [`IdOrder`](crate::comm::IdOrder). The data of a step is
 //! flushed before the step's row in the tables, so the file of a killed run has all complete steps.
 
 mod resume;
@@ -205,7 +205,7 @@ impl<'a> ResultFile<'a> {
         for field in moving {
             let per_append = piece.total;
             let rows = Rows::Extensible { per_append };
-            let empty = if single {
+            let empty = if single && !field.needs_double {
                 FieldData::F32(&[])
             } else {
                 FieldData::F64(&[])
@@ -291,7 +291,7 @@ impl<'a> ResultFile<'a> {
             let checked = check(description, &FieldData::F64(&data), self.points);
             agree(self.file.communicator(), checked)?;
             let rounded: Vec<f32>;
-            let data = if self.single {
+            let data = if self.single && !description.needs_double {
                 rounded = data.iter().map(|value| *value as f32).collect();
                 FieldData::F32(&rounded)
             } else {

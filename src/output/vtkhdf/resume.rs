@@ -182,7 +182,7 @@ impl<'a> ResultFile<'a> {
             let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
             for step in 0..retained {
                 let (first, count) = (step * piece.total + piece.first, result.points);
-                if contents.single {
+                if contents.single && !field.needs_double {
                     let rows: Vec<f32> = old.read_rows(&stored, first, count)?;
                     result.file.write_rows(values, first, &rows)?;
                 } else {
@@ -219,8 +219,8 @@ impl<'a> ResultFile<'a> {
         let counts: Vec<i64> = old.read_rows(&counts, 0, retained as usize)?;
         self.rows = counts.iter().sum::<i64>() as u64;
         changing.copy(old, &mut self.file, self.rows, retained)?;
-        for (_, dataset) in &mut self.fields {
-            if self.single {
+        for (field, dataset) in &mut self.fields {
+            if self.single && !field.needs_double {
                 changing::copy::<f32>(old, &mut self.file, dataset, self.rows)?;
             } else {
                 changing::copy::<f64>(old, &mut self.file, dataset, self.rows)?;
