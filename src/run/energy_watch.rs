@@ -7,6 +7,7 @@ use crate::comm::Communicator;
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
 use crate::error::{Error, Result};
+use crate::problem::Problem;
 use crate::solver::Simulation;
 use crate::solver::motion::Clock;
 use crate::solver::observers::HistoryRow;
@@ -33,6 +34,30 @@ const MAX_FINAL_ERROR: f64 = 0.2;
 
 /// Strain below which strain energy may be round-off.
 const ROUNDOFF_STRAIN: f64 = 1e-9;
+
+/// Kinds of steps of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepKinds {
+    /// Time steps only.
+    Time,
+    /// Load steps only.
+    Load,
+    /// Time steps and load steps, in different stages.
+    Both,
+}
+
+impl StepKinds {
+    /// Return the kinds of steps of a problem.
+    pub fn of(problem: &Problem) -> Self {
+        let stages = problem.all_stages();
+        let static_stages = stages.iter().filter(|stage| stage.time.is_quasi_static());
+        match static_stages.count() {
+            0 => Self::Time,
+            count if count == stages.len() => Self::Load,
+            _ => Self::Both,
+        }
+    }
+}
 
 /// Comparison of the energy of a run with the energy input.
 pub struct EnergyWatch {
@@ -136,9 +161,8 @@ impl EnergyWatch {
     }
 
     /// Check the last row of a run. Return a warning if the energy balance does not close, unless the error
-    /// is a gain and [`Self::check`] has already reported a gain. `is_quasi_static`: whether the last stage
-    /// has load steps.
-    pub fn check_end(&self, row: &HistoryRow, is_quasi_static: bool) -> Option<String> {
+    /// is a gain and [`Self::check`] has already reported a gain.
+    pub fn check_end(&self, row: &HistoryRow, steps: StepKinds) -> Option<String> {
         let error = row.energies.error;
         let largest = row.largest_energy().max(self.floor);
         let is_reported = self.warned && error > 0.0;
@@ -147,26 +171,31 @@ impl EnergyWatch {
         }
         let (size, percent) = (error.abs(), 100.0 * error.abs() / largest);
         Some(if error > 0.0 {
-            let remedy = if is_quasi_static {
-                "twice as many load steps"
-            } else {
-                "half the time step"
+            let remedy = match steps {
+                StepKinds::Time => "half the time step",
+                StepKinds::Load => "twice as many load steps",
+                StepKinds::Both => "half the time step and twice as many load steps",
             };
             format!(
                 "the energy has grown by {size:.3e} J, {percent:.0} % of the largest energy, which no load or support has \
                  put in; repeat with {remedy} and compare"
             )
-        } else if is_quasi_static {
-            format!(
-                "load steps have lost {size:.3e} J, {percent:.0} % of the largest energy, in jumps between equilibria; \
-                 possible causes are loads that act in full in the first load step or end at once, bodies that are \
-                 stopped, unstable cracks, snap-through and pieces that turn"
-            )
         } else {
-            format!(
-                "the time steps have lost {size:.3e} J, {percent:.0} % of the largest energy; repeat with half the time step \
-                 and compare"
-            )
+            let lost = format!("{size:.3e} J, {percent:.0} % of the largest energy");
+            let causes = "possible causes are loads that act in full in the first load step or end at once, bodies that are \
+                          stopped, unstable cracks, snap-through and pieces that turn";
+            match steps {
+                StepKinds::Time => format!(
+                    "the time steps have lost {lost}; repeat with half the time step and compare"
+                ),
+                StepKinds::Load => {
+                    format!("load steps have lost {lost}, in jumps between equilibria; {causes}")
+                }
+                StepKinds::Both => format!(
+                    "the run has lost {lost}. Look at the column `energy_error` to find the stage. If the stage has load \
+                     steps, {causes}. If it is explicit, repeat with half the time step and compare"
+                ),
+            }
         })
     }
 }
@@ -220,24 +249,31 @@ mod tests {
             error,
             ..Energies::default()
         };
-        let of = |work: f64, error: f64, is_quasi_static: bool| {
-            watch.check_end(&row(energies(work, error)), is_quasi_static)
-        };
-        assert_eq!(of(2.0, 0.4, false), None);
-        assert_eq!(of(2.0, -0.4, true), None);
+        let of = |work: f64, error: f64, steps| watch.check_end(&row(energies(work, error)), steps);
+        assert_eq!(of(2.0, 0.4, StepKinds::Time), None);
+        assert_eq!(of(2.0, -0.4, StepKinds::Load), None);
         // Energies below the floor are round-off.
-        assert_eq!(of(1e-4, -1e-4, true), None);
-        for (error, is_quasi_static, words) in [
+        assert_eq!(of(1e-4, -1e-4, StepKinds::Load), None);
+        for (error, steps, words) in [
             (
                 0.8,
-                false,
+                StepKinds::Time,
                 "grown by 8.000e-1 J, 29 % of the largest energy",
             ),
-            (0.8, true, "twice as many load steps"),
-            (-0.8, false, "time steps have lost 8.000e-1 J, 40 %"),
-            (-0.8, true, "load steps have lost 8.000e-1 J, 40 %"),
+            (0.8, StepKinds::Load, "twice as many load steps"),
+            (
+                -0.8,
+                StepKinds::Time,
+                "time steps have lost 8.000e-1 J, 40 %",
+            ),
+            (
+                -0.8,
+                StepKinds::Load,
+                "load steps have lost 8.000e-1 J, 40 %",
+            ),
+            (-0.8, StepKinds::Both, "the run has lost 8.000e-1 J, 40 %"),
         ] {
-            let text = of(2.0, error, is_quasi_static).unwrap();
+            let text = of(2.0, error, steps).unwrap();
             assert!(text.contains(words), "{text}");
         }
         // Energies of contacts and rigid bodies count.
@@ -248,10 +284,17 @@ mod tests {
             } else {
                 &mut large.contact
             }) = 10.0;
-            assert_eq!(watch.check_end(&row(large), false), None);
+            assert_eq!(watch.check_end(&row(large), StepKinds::Time), None);
         }
         watch.warned = true;
-        assert_eq!(watch.check_end(&row(energies(2.0, 0.8)), false), None);
-        assert!(watch.check_end(&row(energies(2.0, -0.8)), false).is_some());
+        assert_eq!(
+            watch.check_end(&row(energies(2.0, 0.8)), StepKinds::Time),
+            None
+        );
+        assert!(
+            watch
+                .check_end(&row(energies(2.0, -0.8)), StepKinds::Time)
+                .is_some()
+        );
     }
 }

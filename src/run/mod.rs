@@ -60,7 +60,7 @@ use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
-use energy_watch::EnergyWatch;
+use energy_watch::{EnergyWatch, StepKinds};
 use output_file::Start;
 use recorder::{Continuation, Recorder, damage, reasons_for_new_results};
 use restart::{Restart, restart};
@@ -392,10 +392,8 @@ impl<'a> Job<'a> {
             }
         }
         self.warn_of_overshoot(recorder);
-        let last = self.problem.all_stages().pop();
-        let ends_quasi_static = last.is_some_and(|stage| stage.time.is_quasi_static());
         if let (Some(energy), Some(row)) = (&energy, &recorder.last_row)
-            && let Some(text) = energy.check_end(row, ends_quasi_static)
+            && let Some(text) = energy.check_end(row, StepKinds::of(self.problem))
         {
             self.observer.message(&Message::Warning(text));
         }

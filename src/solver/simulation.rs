@@ -28,6 +28,7 @@ use super::progress::Progress;
 use super::refinement;
 use super::size;
 use super::stages::Stages;
+use super::stages::begins;
 use super::steps::choose_steps;
 
 /// Extra reach, as a fraction of the longest bond, in the search for ghosts and for points near pre-cracks.
@@ -201,8 +202,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let clock = Clock::new(steps[0].0, stages[0].time.end);
         protect(problem, &model, comm, &mut forces);
 
-        let each = stages.iter().map(|stage| &stage.acting);
-        let each = each.map(|acting| Conditions::new(problem, comm, (&model, &refined), acting));
+        let each = (0..stages.len()).map(|stage| begins(&stages, stage));
+        let each = each.map(|begins| Conditions::new(problem, comm, (&model, &refined), &begins));
         let mut waiting = each
             .map(|conditions| conditions.map(Some))
             .collect::<Result<Vec<_>>>()?;
@@ -394,6 +395,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let is_quasi_static = self.is_quasi_static();
+        let longest = self.longest_next_step();
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -420,7 +422,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 BondUpdate::Step(step) => Some(StepEnd {
                     time: self.clock.time(),
                     step,
-                    next: self.clock.step(),
+                    longest,
                 }),
                 BondUpdate::None | BondUpdate::Trial(_) => None,
             };

@@ -20,6 +20,18 @@ pub struct Stages<const D: usize> {
     pub(super) waiting: Vec<Option<Conditions<D>>>,
 }
 
+/// Return for each condition the time (s) from which it acts without interruption up to this stage; `None` if
+/// it does not act in this stage.
+pub(super) fn begins(stages: &[Stage], stage: usize) -> Vec<Option<f64>> {
+    let begin = |condition: usize| {
+        let acting = stages[..=stage].iter().rev();
+        let count = acting.take_while(|stage| stage.acting[condition]).count();
+        let before = (stage + 1 - count).checked_sub(1);
+        (count > 0).then(|| before.map_or(0.0, |before| stages[before].time.end))
+    };
+    (0..stages[stage].acting.len()).map(begin).collect()
+}
+
 impl<const D: usize> Simulation<'_, D> {
     /// Whether the present stage has reached its end.
     pub fn is_stage_over(&self) -> bool {
@@ -77,17 +89,42 @@ impl<const D: usize> Simulation<'_, D> {
         components.for_each(|component| component.fill(0.0));
         let clock = self.clock;
         self.apply_loads(clock.time(), true);
-        let mut finite = self.apply_velocities();
         let factor = self.time_rule().density_scale / scale;
+        let keeps_momentum = factor != 1.0 && !was_static && !self.is_quasi_static();
+        let mut finite = self.begin_supports(if keeps_momentum { factor } else { 1.0 });
         if let Some(contact) = &mut self.contact {
             contact.scale_density(factor);
         }
-        if factor != 1.0 && !was_static && !self.is_quasi_static() {
+        if keeps_momentum {
             finite &= self.keep_momentum(factor);
         }
         if !finite {
             self.note_bad(&clock);
         }
+    }
+
+    /// Set the velocities of supported points at the start of a stage. If a support changes the velocity of a
+    /// point, it exerts an impulse. The work of this impulse equals the change of kinetic energy and is added
+    /// to the external work. `density_ratio` is the ratio of the present density to the density at the
+    /// impulse. Returns whether the velocities and reactions of supported points are finite.
+    fn begin_supports(&mut self, density_ratio: f64) -> bool {
+        let squares = |velocity: &[Vec<f64>; D], point: usize| -> f64 {
+            velocity.iter().map(|column| column[point].powi(2)).sum()
+        };
+        if self.is_quasi_static() {
+            return self.apply_velocities();
+        }
+        let before = self.fields.velocity.clone();
+        let finite = self.apply_velocities();
+        let (model, fields) = (&self.model, &mut self.fields);
+        if let Some(work) = &mut fields.external_work {
+            for (point, work) in work.iter_mut().enumerate() {
+                let mass = model.density_of(point) / density_ratio * model.volume[point];
+                let change = squares(&fields.velocity, point) - squares(&before, point);
+                *work += 0.5 * mass * change;
+            }
+        }
+        finite
     }
 
     /// Conserve the momentum of the points after their densities were multiplied by a factor. Components with

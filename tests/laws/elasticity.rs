@@ -569,3 +569,28 @@ fn gauss_points_integrate_a_cell() {
         assert!((integral(|[x, y, _]| x * x * y * y) / 2.53125 - 1.0).abs() < 1e-12);
     });
 }
+
+/// Bonds that a pre-crack cuts reduce the dilatation no more than bonds that a free side lacks.
+#[test]
+fn the_dilatation_beside_a_pre_crack_is_the_trace_of_the_strain() {
+    for law in [
+        "pmb = { density = 2, youngs_modulus = 5, surface_correction = 'tensor' }",
+        "pmb = { density = 2, youngs_modulus = 5 }",
+        "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.25 }",
+        "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.25, surface_correction = 'pals' }",
+        "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.25 }",
+    ] {
+        let deck = deck("plane-strain", 3.0, 6, "none", law);
+        let crack = "[crack.main.segment]\nfrom = [-7, 0.5]\nto = [7, 0.5]\n";
+        simulate::<2, _>(&format!("{deck}\n{crack}"), |mut simulation| {
+            displace(&mut simulation, |x| x.map(|x| 1.001 * x));
+            let snapshot = Snapshot::new(&mut simulation);
+            for dilatation in snapshot.field(&mut simulation, Field::Dilatation) {
+                assert!(
+                    (dilatation / 0.002 - 1.0).abs() < 1e-9,
+                    "{law}: {dilatation}"
+                );
+            }
+        });
+    }
+}

@@ -48,6 +48,15 @@ fn free_expansion_has_no_force_and_no_energy() {
             strain_energy(&mut simulation).abs() < 1e-15 * energy,
             "{law:?}"
         );
+        // The dilatation contains thermal strain.
+        let count = if dimension.is_confined() { D } else { 3 };
+        for dilatation in Snapshot::new(&mut simulation).field(&mut simulation, Field::Dilatation) {
+            let wanted = count as f64 * stretch;
+            assert!(
+                (dilatation / wanted - 1.0).abs() < 1e-9,
+                "{law:?}: {dilatation} {wanted}"
+            );
+        }
     }
     for case in cases() {
         if case.has_line() {

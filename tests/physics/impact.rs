@@ -529,3 +529,73 @@ fn fragments_are_counted_and_weighed() {
         }
     }
 }
+
+/// Return the deck of a block that falls on a floor, or on two walls in turn.
+fn falling(dimension: &str, floor: &str, time: &str) -> String {
+    let (lower, upper, velocity) = match dimension {
+        "1d" => ("[0]", "[4]", "[-0.05]"),
+        _ => ("[0, 0]", "[20, 10]", "[0, -0.05]"),
+    };
+    format!(
+        "dimension = '{dimension}'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = {lower}, upper = {upper} }} }}
+        initial.fall.velocity = {velocity}
+        {floor}
+        time = {time}
+        "
+    )
+}
+
+/// Return the largest error of the energy balance in all steps, divided by the energy at the start.
+fn largest_error<const D: usize>(deck: &str) -> f64 {
+    let rows = history::<D>(deck, 1, &["kinetic_energy", "energy_error"]);
+    let errors = rows.iter().map(|row| row[1].abs() / rows[0][0]);
+    errors.fold(0.0, f64::max)
+}
+
+#[test]
+fn adaptive_steps_stay_short_during_stiff_contact() {
+    for stiffness in [5, 100, 500] {
+        let floor = format!(
+            "rigid.floor = {{ half_space = {{ through = [0, -1], normal = [0, 1] }}, stiffness = {stiffness} }}"
+        );
+        for time in ["{ end = 80 }", "{ end = 80, adaptive = {} }"] {
+            let error = largest_error::<2>(&falling("plane-strain", &floor, time));
+            assert!(error < 0.1, "{stiffness} {time}: {error}");
+        }
+    }
+}
+
+#[test]
+fn steps_do_not_grow_into_the_next_contact() {
+    for gap in [0.5, 0.7, 0.93, 1.1, 1.1325, 1.3, 1.7] {
+        let walls = format!(
+            "rigid.left = {{ half_space = {{ through = [-{gap}], normal = [1] }}, stiffness = 2500 }}
+            rigid.right = {{ half_space = {{ through = [4 + {gap}], normal = [-1] }}, stiffness = 2500 }}"
+        );
+        let walls = walls
+            .replace("4 + ", "'4 + ")
+            .replace("], normal = [-1]", "'], normal = [-1]");
+        let error = largest_error::<1>(&falling("1d", &walls, "{ end = 200 }"));
+        assert!(error < 0.6, "{gap}: {error}");
+    }
+}
+
+/// Without `[contact]`, points touch only the rigid body.
+#[test]
+fn bonds_break_under_a_rigid_body_in_adaptive_steps() {
+    let deck = "
+        dimension = 'plane-strain'
+        grid = { spacing = 1, horizon = 3 }
+        material.glass.pmb = { density = 2, youngs_modulus = 5 }
+        damage.brittle.critical_stretch.critical_stretch = 0.03
+        body.block = { material = 'glass', damage = 'brittle', shape.box = { lower = [0, 0], upper = [30, 10] } }
+        rigid.punch = { shape.disc = { centre = [15, 12.001], radius = 2 }, motion = [0, '-0.1*t'] }
+        time = { end = 20, adaptive = {} }
+        ";
+    let rows = history::<2>(deck, 1, &["broken_bonds", "undone_steps"]);
+    let last = rows.last().unwrap();
+    assert!(last[0] > 0.0 && last[1] > 0.0, "{last:?}");
+}

@@ -272,6 +272,75 @@ fn a_change_of_density_keeps_momentum_and_books_energy() {
     }
 }
 
+/// A support that begins with a stage gives or takes kinetic energy by an impulse.
+#[test]
+fn the_work_of_a_support_includes_the_impulse_at_its_start() {
+    for (before, condition, speed) in [
+        ("off = ['drive']", "velocity = [0.5]", 0.3),
+        (
+            "off = ['drive']\nmethod = 'relaxation'",
+            "velocity = [0.5]",
+            0.3,
+        ),
+        ("off = ['drive']", "velocity = [0]", 0.3),
+        (
+            "off = ['drive']\ndensity_scale = 4",
+            "velocity = [0.5]",
+            0.3,
+        ),
+        ("off = ['drive']", "velocity = ['if(t < 2, 0, 0.5)']", 0.0),
+        (
+            "off = ['drive']",
+            "displacement = ['max(0, t - 2)*0.5']",
+            0.0,
+        ),
+    ] {
+        let deck = format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [30] }} }}
+            set.right.where = 'x > 27'
+            set.left.where = 'x < 2'
+            condition.hold = {{ set = 'left', displacement = [0] }}
+            condition.drive = {{ set = 'right', {condition} }}
+            initial.flight = {{ set = 'right', velocity = [{speed}] }}
+            time = {{ end = 10, safety = 0.2 }}
+            [[stage]]
+            end = 2
+            {before}
+            [[stage]]
+            "
+        );
+        simulate(&deck, |mut simulation: Simulation<1>| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let rows = rows_to_the_end(&mut observer, &mut simulation);
+            let of = |name: &str| -> Vec<f64> {
+                let column = column(&observer, name);
+                rows.iter().map(|row| row[column]).collect()
+            };
+            let times = of("time");
+            let second = times.iter().rposition(|time| *time <= 2.0 + 1e-9).unwrap();
+            // The initial kinetic energy is lost when a relaxation begins.
+            let first = if before.contains("relaxation") {
+                second
+            } else {
+                0
+            };
+            let kinetic = of("kinetic_energy")
+                .into_iter()
+                .skip(first)
+                .fold(0.0, f64::max);
+            let error = of("energy_error");
+            let change = error[error.len() - 1] - error[first];
+            assert!(
+                change.abs() < 0.01 * kinetic,
+                "{before} {condition}: {change} of {kinetic}"
+            );
+        });
+    }
+}
+
 /// Return the warnings of a deck, each from the key up to the first semicolon, without the location.
 fn problem_warnings(deck: &str) -> Vec<String> {
     let short = |warning: &Warning| {

@@ -286,33 +286,36 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Weighted volume m (m⁵) and dilatation θ of each owned point, at the displacements of the last
-    /// [evaluation](Self::evaluate).
-    pub fn dilatation(&mut self, model: &Model<D>) -> [Vec<f64>; 2] {
-        let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
+    /// [evaluation](Self::evaluate). `thermal_stretch` are the thermal stretches of the local points; `None`
+    /// in runs without temperatures.
+    pub fn dilatation(
+        &mut self,
+        model: &Model<D>,
+        thermal_stretch: Option<&[f64]>,
+    ) -> [Vec<f64>; 2] {
+        let columns = self.measure(model.owned(), 3, |interaction, sums, source| {
             let [law, _] = interaction.laws.laws();
             let is_linear = law.is_linear::<D>();
             let kernel = measures::Dilatation { is_linear };
             sweep_all(&mut interaction.bonds, sums, &kernel, source);
         });
-        let [mut weighted_volume, mut growth] = columns.try_into().expect("two columns");
-        for (point, volume) in weighted_volume.iter_mut().enumerate() {
-            let law = &self.blocks[usize::from(model.block[point])].law;
-            if let Some(of_law) = Law::<D>::weighted_volume(law, &self.numbers.of(point)) {
-                *volume = of_law;
-            }
-        }
-        for (growth, volume) in growth.iter_mut().zip(&weighted_volume) {
-            *growth = if *volume > 0.0 {
-                D as f64 * *growth / volume
-            } else {
-                0.0
-            };
-        }
+        let [mut weighted_volume, intact, mut growth] = columns.try_into().expect("three columns");
         for (point, growth) in growth.iter_mut().enumerate() {
             let law = &self.blocks[usize::from(model.block[point])].law;
-            if let Some(of_law) = Law::<D>::dilatation(law, &self.numbers.of(point)) {
-                *growth = of_law;
+            let numbers = self.numbers.of(point);
+            let of_law = Law::<D>::weighted_volume(law, &numbers);
+            if let Some(volume) = of_law {
+                weighted_volume[point] = volume;
             }
+            // If the law stores its weighted volume, θ is divided by this volume, which includes broken bonds.
+            // Otherwise it is divided by the sum over the intact bonds.
+            let volume = of_law.unwrap_or(intact[point]);
+            let thermal = D as f64 * thermal_stretch.map_or(0.0, |stretch| stretch[point]);
+            *growth = match Law::<D>::dilatation(law, &numbers) {
+                Some(elastic) => elastic + thermal,
+                None if volume > 0.0 => D as f64 * *growth / volume,
+                None => thermal,
+            };
         }
         [weighted_volume, growth]
     }

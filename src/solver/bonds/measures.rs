@@ -320,8 +320,11 @@ impl<const D: usize> Kernel<D> for EnergyRate {
 }
 
 /// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|eṼ in d dimensions. e is the extension of the
-/// bond, or ξ·η/|ξ| for linear laws. The first sum is the weighted volume m = Σ ω|ξ|²Ṽ of the whole family
-/// (m⁵). The second sum is Σ ω|ξ|eṼ over the intact bonds (m⁵).
+/// bond, or ξ·η/|ξ| for linear laws. The sums, in m⁵, are:
+///
+/// 0. the weighted volume m = Σ ω|ξ|²Ṽ of the whole family;
+/// 1. the same over the intact bonds;
+/// 2. Σ ω|ξ|eṼ over the intact bonds.
 #[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether e is linear in η.
@@ -329,7 +332,7 @@ pub struct Dilatation {
 }
 
 impl<const D: usize> Kernel<D> for Dilatation {
-    type Sums = [Lanes; 2];
+    type Sums = [Lanes; 3];
     type Point = [Lanes; 0];
     type Far = [Lanes; 0];
     type BondHistory = [Lanes; 0];
@@ -347,11 +350,12 @@ impl<const D: usize> Kernel<D> for Dilatation {
     }
 
     #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 2]) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 3]) {
         let length = group.bond.length;
         let weight = length * length * group.volume * group.weights.own();
         let growth = weight * group.bond.stretch;
         sums[0] += simd.keep(weight, group.whole);
-        sums[1] += simd.keep(growth, group.intact);
+        sums[1] += simd.keep(weight, group.intact);
+        sums[2] += simd.keep(growth, group.intact);
     }
 }

@@ -203,7 +203,8 @@ pub fn not_empty(
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Find the points of the conditions for which `acting` is true. If two supports prescribe the same
+    /// Find the points of the conditions that act in a stage. `begins` has for each condition the time at which
+    /// it begins to act (s); `None` if it does not act in this stage. If two supports prescribe the same
     /// component of a point, the later support applies. Collective.
     ///
     /// # Errors
@@ -216,7 +217,7 @@ impl<const D: usize> Conditions<D> {
         problem: &Problem,
         comm: &dyn Communicator,
         (model, grids): (&Model<D>, &Grids<'_>),
-        acting: &[bool],
+        begins: &[Option<f64>],
     ) -> Result<Self> {
         let mut conditions = Self {
             on_parts: (0..parts(model.owned()))
@@ -226,8 +227,8 @@ impl<const D: usize> Conditions<D> {
         };
         // The points of the supports, collected until all supports are known.
         let mut supported: Vec<Vec<u32>> = Vec::new();
-        let of_deck = problem.conditions.iter().enumerate().zip(acting);
-        for ((index, condition), _) in of_deck.filter(|(_, acting)| **acting) {
+        for (index, condition) in problem.conditions.iter().enumerate() {
+            let Some(begin) = begins[index] else { continue };
             let points = members(problem, model, condition.set);
             let key = format!("[condition.{}] set", condition.name);
             let place = (&key[..], condition.span.clone());
@@ -239,7 +240,7 @@ impl<const D: usize> Conditions<D> {
                     for (_, others) in earlier.filter(|(other, _)| other.component == component) {
                         others.retain(|point| points.binary_search(point).is_err());
                     }
-                    let support = Support::new(component, motion, value);
+                    let support = Support::new(component, motion, value, begin);
                     conditions.supports.push(support);
                     supported.push(points.clone());
                 }

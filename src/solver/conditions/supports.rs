@@ -20,6 +20,8 @@ pub struct Support {
     /// Index of the component.
     pub component: usize,
     motion: Motion,
+    /// Time at which the support begins to act, s.
+    begin: f64,
     values: Values,
     place: Place,
     guidance: Guidance,
@@ -55,13 +57,14 @@ pub struct Supported {
 }
 
 impl Support {
-    /// Create a support that prescribes a component of motion.
-    pub fn new(component: usize, motion: Motion, value: &Expression) -> Self {
+    /// Create a support that prescribes a component of motion from the time `begin` (s) on.
+    pub fn new(component: usize, motion: Motion, value: &Expression, begin: f64) -> Self {
         let values = Values::new(value);
         let start = || values.at(0.0);
         Self {
             component,
             motion,
+            begin,
             place: Place {
                 step: 0.0,
                 values: [start(), start()],
@@ -97,15 +100,16 @@ impl Support {
     /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. The point is at a position
     /// (m), and the step (s) begins at a time (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
-        // Before the start, a displacement continues linearly, and a velocity is constant. If the expression
+        // Before the support begins, a displacement continues linearly, and a velocity is constant. If the expression
         // has no finite value in the next step, such as √(1 − t), the change of the last step is repeated.
+        let has_past = time - self.begin >= 0.5 * step;
         let change = |step: f64| self.values.expression.increment(position, time, step);
         let to_come = match change(step) {
-            to_come if to_come.is_finite() || time < step => to_come,
+            to_come if to_come.is_finite() || !has_past => to_come,
             _ => -change(-step),
         };
         let before = match self.motion {
-            _ if time >= step => -change(-step),
+            _ if has_past => -change(-step),
             Motion::Displacement => to_come,
             Motion::Velocity => 0.0,
         };

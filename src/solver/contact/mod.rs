@@ -51,8 +51,8 @@ pub use state::ContactState;
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Look-ahead: number of steps. The stable step takes account of pairs that will touch within these steps, so
-/// the step is shortened before they touch.
+/// The look-ahead, in units of [`StepEnd::longest`]. Pairs that will touch within this time already limit the
+/// step. The step is therefore short when they touch.
 const LOOK_AHEAD: f64 = 2.0;
 
 /// Contact on one rank.
@@ -111,8 +111,8 @@ pub struct StepEnd {
     /// Length of this step, s; 0 at the start, and at further equilibria of a load step in which bonds have
     /// broken.
     pub step: f64,
-    /// Length of the next step, s.
-    pub next: f64,
+    /// Length that the next step could have without contact, s.
+    pub longest: f64,
 }
 
 /// The contact forces on a point.
@@ -259,7 +259,7 @@ impl<const D: usize> Contact<D> {
             self.ghosts.update(comm, fields);
         }
         let look_ahead = match end {
-            Some(end) if !is_quasi_static => LOOK_AHEAD * end.next,
+            Some(end) if !is_quasi_static => LOOK_AHEAD * end.longest,
             _ => 0.0,
         };
         let mut active = std::mem::take(&mut self.active);
@@ -364,7 +364,7 @@ impl<const D: usize> Contact<D> {
                 if let Some(touch) = rigid.touch(block, &point) {
                     rigid.add_opposite(&mut wrench, point.place(), &touch);
                 }
-                if let Some(demand) = rigid.demand(block, &point, LOOK_AHEAD * end.next) {
+                if let Some(demand) = rigid.demand(block, &point, LOOK_AHEAD * end.longest) {
                     *reach = reach.max(rigid.arm(point.place()));
                     demands[0].add(demand.stiffness);
                     demands[1].add(demand.damping);

@@ -75,6 +75,11 @@ impl Rows {
         self.is_bonded[row].contains(&false)
     }
 
+    /// Whether there are no rows, as in runs in which points only touch rigid bodies.
+    pub fn is_unused(&self) -> bool {
+        self.starts.is_empty()
+    }
+
     /// Whether the row of an owned point is empty.
     pub fn is_empty(&self, point: usize) -> bool {
         self.starts[point] == self.starts[point + 1]

@@ -149,6 +149,9 @@ impl<const D: usize> Contact<D> {
     /// Update the bonded flags of the points with entries in [`Forces::broken`]. Bonds of these points have
     /// broken in the last evaluation, or a rollback has restored these bonds.
     pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
+        if self.rows.is_unused() {
+            return;
+        }
         for broken in forces.broken() {
             let point = broken.point;
             find_bonds(&mut self.rows, model, forces, point);

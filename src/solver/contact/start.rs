@@ -32,10 +32,13 @@ pub(super) fn check_outside<const D: usize>(
         {
             let body = &problem.block(block as usize).body.name;
             let problem::Rigid { name, span, .. } = rigid.problem();
-            let message = format!(
-                "[rigid.{name}]: point {id} of [body.{body}] begins {:.3e} m within it; move it away",
-                -depth
-            );
+            let place = if depth < 0.0 {
+                format!("{:.3e} m within it", -depth)
+            } else {
+                "on its surface".to_owned()
+            };
+            let message =
+                format!("[rigid.{name}]: point {id} of [body.{body}] begins {place}; move it away");
             return Err(Error::input(message).at(span));
         }
     }

@@ -15,7 +15,7 @@ const CALM: u64 = 100;
 /// within the look-ahead (`LOOK_AHEAD` steps). k is the stiffness of a contact (N/m), and c is the damping
 /// coefficient of a contact (N s/m). 1/m is the inverse mass of a point, or the
 /// [mobility](super::rigid::RigidBody::mobility) of a rigid body (1/kg).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
     /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
@@ -23,8 +23,18 @@ pub(super) struct StepDemand {
     pub stiffness: f64,
     /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
-    /// Number of consecutive steps that could have been longer.
+    /// Number of consecutive steps that could have been longer; at the start, as if contact had limited no step.
     calm: u64,
+}
+
+impl Default for StepDemand {
+    fn default() -> Self {
+        Self {
+            stiffness: 0.0,
+            damping: 0.0,
+            calm: u64::MAX / 2,
+        }
+    }
 }
 
 /// The contact state that is not part of the fields of the points; the same on all ranks, except `at_rigid`.
@@ -90,6 +100,11 @@ impl<const D: usize> Contact<D> {
     /// step.
     pub fn is_felt(&self) -> bool {
         self.demand.stiffness > 0.0
+    }
+
+    /// Number of consecutive steps that could have been longer.
+    pub fn calm(&self) -> u64 {
+        self.demand.calm
     }
 
     /// Whether enough consecutive steps could have been longer, so that the step may be lengthened.

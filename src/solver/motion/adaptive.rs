@@ -55,6 +55,11 @@ impl StepControl {
         self.calm = 0;
     }
 
+    /// The step that the rule requests, s.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
     /// Encode the state for a checkpoint.
     pub fn words(&self) -> [u64; 6] {
         let [smallest, largest] = self.limits.map(f64::to_bits);
@@ -107,10 +112,7 @@ impl<const D: usize> Simulation<'_, D> {
         loop {
             // The last step ends at the end of the stage.
             let left = self.clock.end() - self.clock.time();
-            let felt = self.contact.as_ref().filter(|contact| contact.is_felt());
-            let limit = felt.and_then(|_| self.contact_limit());
-            let limit = limit.unwrap_or(f64::INFINITY);
-            let wanted = self.progress.step_control.step.min(limit);
+            let wanted = (self.progress.step_control.step).min(self.adaptive_limit());
             let is_last = left > 0.0 && left < (1.0 + UP_TO_ROUNDING) * wanted;
             let size = if is_last { left } else { wanted };
             if size != self.clock.step() {
@@ -131,6 +133,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.undo(&kept);
         }
         self.kept = kept;
+        self.count_unlimited_steps();
     }
 }
 

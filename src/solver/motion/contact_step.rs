@@ -8,6 +8,13 @@ use crate::solver::contact::Contact;
 /// Factor on the step that contact allows, because the contact stiffness usually increases further.
 const CONTACT_RESERVE: f64 = 0.95;
 
+/// Largest ratio of successive steps when the step grows again. If the step grew at once, a vibrating surface
+/// could reverse its motion and touch again within the first long step.
+const GROWTH: f64 = 2.0;
+
+/// Number of consecutive adaptive steps without a limit by contact after which the step may grow by any factor.
+const LONG_CALM: u64 = 400;
+
 /// A step could have been longer if it is below this fraction of the step that the stage and contact allow.
 const CALM_SHARE: f64 = 0.8;
 
@@ -21,10 +28,17 @@ impl<const D: usize> Simulation<'_, D> {
             return None;
         }
         let (contact, limit) = (self.contact.as_ref()?, self.contact_limit()?);
-        let most = self.stages.steps[self.progress.stage]
+        let step = self.clock.step();
+        if self.time_rule().adaptive.is_some() {
+            return (contact.is_felt() && step > limit).then_some(limit);
+        }
+        let mut most = self.stages.steps[self.progress.stage]
             .0
             .min(CONTACT_RESERVE * limit);
-        let step = self.clock.step();
+        // A step between `CALM_SHARE` and 1 times the longest one would not grow any more.
+        if CALM_SHARE * most > GROWTH * step {
+            most = GROWTH * step;
+        }
         let is_too_long = contact.is_felt() && step > limit;
         let is_too_short = contact.is_calm() && step < most;
         if self.is_stage_over() || !(is_too_long || is_too_short) {
@@ -32,6 +46,18 @@ impl<const D: usize> Simulation<'_, D> {
         }
         let left = self.clock.end() - self.clock.time();
         Some(left / (left / most).ceil())
+    }
+
+    /// Length that the next step may have if contact does not limit it, s. This is the step of the present or
+    /// the next stage, or the step that the adaptive rule requests, but at least the present step.
+    pub(in crate::solver) fn longest_next_step(&self) -> f64 {
+        let stages = self.stages.steps.iter().skip(self.progress.stage).take(2);
+        let of_stages = stages.map(|(step, _)| *step).fold(0.0, f64::max);
+        let step = match self.time_rule().adaptive {
+            Some(_) => self.progress.step_control.step(),
+            None => of_stages,
+        };
+        step.max(self.clock.step())
     }
 
     /// The largest step that contact allows (s): the stable step with contact, times `safety` for automatic
@@ -45,6 +71,16 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
+    /// Change the step. After a longer step, the count of steps that could have been longer starts again.
+    pub(in crate::solver) fn set_step_for_contact(&mut self, step: f64) {
+        if let Some(contact) = &mut self.contact
+            && step > self.clock.step()
+        {
+            contact.count_calm(false);
+        }
+        self.clock.set_step(step);
+    }
+
     /// Count the consecutive steps that could have been longer in spite of contact.
     pub(in crate::solver) fn count_calm_steps(&mut self) {
         let Some(limit) = self.contact_limit() else {
@@ -54,6 +90,34 @@ impl<const D: usize> Simulation<'_, D> {
             self.clock.step() < CALM_SHARE * limit.min(self.stages.steps[self.progress.stage].0);
         if let Some(contact) = &mut self.contact {
             contact.count_calm(could_be_longer);
+        }
+    }
+
+    /// Upper bound of the next adaptive step, s. After a step that contact has limited, the step does not grow
+    /// for 100 steps that contact does not limit. Then it at most doubles with each step, and after 400 such
+    /// steps there is no bound.
+    pub(in crate::solver) fn adaptive_limit(&self) -> f64 {
+        let Some(contact) = &self.contact else {
+            return f64::INFINITY;
+        };
+        let felt = self.contact_limit().filter(|_| contact.is_felt());
+        let felt = felt.map_or(f64::INFINITY, |limit| CONTACT_RESERVE * limit);
+        let growth = match contact.calm() {
+            LONG_CALM.. => f64::INFINITY,
+            _ if contact.is_calm() => GROWTH,
+            _ => 1.0,
+        };
+        felt.min(growth * self.clock.step())
+    }
+
+    /// Count the consecutive adaptive steps that are clearly shorter than contact allows.
+    pub(in crate::solver) fn count_unlimited_steps(&mut self) {
+        let Some(limit) = self.contact_limit() else {
+            return;
+        };
+        let step = self.clock.step();
+        if let Some(contact) = &mut self.contact {
+            contact.count_calm(!contact.is_felt() || step < CALM_SHARE * limit);
         }
     }
 

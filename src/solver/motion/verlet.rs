@@ -16,7 +16,7 @@ pub struct Verlet;
 impl<const D: usize> Integrator<D> for Verlet {
     fn advance(&mut self, simulation: &mut Simulation<'_, D>, half_kick_pending: bool) -> bool {
         if let Some(step) = simulation.step_for_contact() {
-            simulation.clock.set_step(step);
+            simulation.set_step_for_contact(step);
         }
         simulation.make_step(half_kick_pending);
         simulation.count_calm_steps();

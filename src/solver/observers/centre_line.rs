@@ -157,7 +157,11 @@ struct Part {
 
 /// Divide the points into parts. Each part comes after its parent.
 fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part> {
-    let section = |point: usize| (ways.length[point] / reach.section_length) as usize;
+    // All points where paths begin are in section 0, including those at exactly one section length.
+    let section = |point: usize| match ways.before[point] {
+        None => 0,
+        Some(_) => (ways.length[point] / reach.section_length) as usize,
+    };
     let mut part_of: Vec<Option<usize>> = vec![None; points.len()];
     let mut parts: Vec<Part> = Vec::new();
     for first in &ways.order {
@@ -313,6 +317,21 @@ mod tests {
         (0..=count)
             .flat_map(|k| [point(k, -1.0), point(k, 1.0)])
             .collect()
+    }
+
+    #[test]
+    fn paths_begin_also_at_exactly_a_section_length() {
+        let points: Vec<Damaged> = (0..=30)
+            .map(|k| Damaged {
+                place: [f64::from(k), 0.0, 0.0],
+                weight: 1.0,
+            })
+            .collect();
+        for from in [15.0, 15.0 + 1e-12, 15.0 - 1e-12, 15.3] {
+            let found = branches([from, 0.0, 0.0], &points, REACH);
+            assert_eq!(found.len(), 2, "{from}");
+            assert!((length(&found) - 30.0).abs() < 0.5, "{}", length(&found));
+        }
     }
 
     #[test]

@@ -26,7 +26,7 @@ impl Front {
         let course = Course::new(simulation, rule.line, (rule.length, rule.radius), owned);
         if course.is_empty(simulation.comm) {
             let message = format!(
-                "[history.front.{}]: no point lies within {} m of the line",
+                "[history.front.{}]: no point lies within {} m of the line, between its ends",
                 rule.name, rule.radius
             );
             return Err(Error::input(message).at(&rule.span));

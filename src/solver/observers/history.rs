@@ -13,6 +13,7 @@ use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::conditions::{members, not_empty};
 use crate::solver::contact::contact_now;
+use crate::solver::motion::load_step::LoadStep;
 
 use super::centre_line::{self, Branch};
 use super::columns::{Columns, GlobalState};
@@ -399,7 +400,12 @@ impl HistoryObserver {
             cracked_points,
             cracked_extent: [lower, upper],
             singular_points,
-            load_step: simulation.progress.load_step,
+            // An explicit step has no equilibrium.
+            load_step: if simulation.is_quasi_static() {
+                simulation.progress.load_step
+            } else {
+                LoadStep::default()
+            },
             force_evaluations: simulation.progress.newton.evaluations,
             undone_steps: simulation.progress.step_control.undone,
             most_broken,

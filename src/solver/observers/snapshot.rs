@@ -101,14 +101,15 @@ impl Snapshot {
             Field::StrainEnergyDensity => self.stored.energy.clone(),
             Field::Neighbours => self.stored.neighbours.clone(),
             Field::Dilatation => {
-                let [_, mut dilatation] = simulation.forces.dilatation(model);
+                let thermal = simulation.fields.thermal_stretch.as_deref();
+                let [_, mut dilatation] = simulation.forces.dilatation(model, thermal);
                 for (point, value) in dilatation.iter_mut().enumerate() {
                     *value = trace(simulation, point, *value);
                 }
                 dilatation
             }
             Field::WeightedVolume => {
-                let [volume, _] = simulation.forces.dilatation(model);
+                let [volume, _] = simulation.forces.dilatation(model, None);
                 volume
             }
             Field::Stress => {
