@@ -338,7 +338,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Return the dilatation θ of a point from the numbers of this point. `None` for the default
+    /// Return the dilatation θ of a point, without thermal strain, from its numbers. `None` for the default
     /// θ = (d/m) Σ ω|ξ| e Ṽ, with the number of dimensions d and the extension e = |Y| − |ξ|.
     fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None

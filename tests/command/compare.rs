@@ -299,9 +299,9 @@ dimension = 'plane-stress'
 grid = { spacing = 1, horizon = 2 }
 material.glass.pmb = { density = 2, youngs_modulus = 5 }
 damage.brittle.critical_stretch.critical_stretch = 0.01
-body.plate = { material = 'glass', damage = 'brittle', shape.box = { lower = [0, 0], upper = [72, 72] } }
-refinement = { levels = 6, region.corner.where = 'x > 70 and y > 70' }
-set.corner.where = 'x > 69 and y > 69'
+body.plate = { material = 'glass', damage = 'brittle', shape.box = { lower = [0, 0], upper = [260, 260] } }
+refinement = { levels = 4, region.corner.where = 'x > 257 and y > 257' }
+set.corner.where = 'x > 256 and y > 256'
 initial.pull.velocity = ['x', 'y']
 time = { end = 0.1, step = 0.1 }
 [output]

@@ -997,6 +997,7 @@ fn what_perilab_would_read_otherwise_is_named() {
         "    Node Sets:\n",
         "    Influence Function: 1/xi^2\n    Node Sets:\n",
     );
+    let influence = influence.replace("Bond-based Elastic", "PD Solid Elastic");
     let losses = folder.import("strip.yaml", &influence).unwrap().losses();
     assert_eq!(losses.influence, [6], "{losses}");
     let constant = influence.replace("1/xi^2", "1");

@@ -45,6 +45,7 @@ use state::StepDemand;
 
 pub use by_pair::{ContactNow, contact_now};
 pub use rigid::RigidState;
+use search::MOST_GAP;
 pub use start::Coincident;
 pub use state::ContactState;
 
@@ -485,7 +486,7 @@ impl<const D: usize> Contact<D> {
             touches: false,
         };
         self.for_each_candidate(model, fields, point, |here, there, _, rule| {
-            sum.add_demand(rule.demand(here, there, look_ahead));
+            sum.add_demand(rule.demand(here, there, (look_ahead, MOST_GAP * self.largest)));
             if let Some(touch) = rule.touch(here, there) {
                 // The sum of the other point contains the other half of the energy.
                 sum.add(&touch, 0.5);

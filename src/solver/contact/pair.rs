@@ -181,17 +181,17 @@ impl PairRule {
     }
 
     /// Contribution of a pair to the step limits; `None` if the pair does not touch and will not touch within
-    /// a time (s) at its present approach speed.
+    /// a time (s) at its present approach speed, or if its gap exceeds `most_gap` (m).
     pub fn demand<const D: usize>(
         &self,
         first: &ContactPoint<D>,
         second: &ContactPoint<D>,
-        time: f64,
+        (time, most_gap): (f64, f64),
     ) -> Option<Demand> {
         let (overlap, apart, place) = self.overlap(first, second);
         let velocity: [f64; D] = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);
         let approach = dot(velocity, place) / apart;
-        let touches = overlap + time * approach.max(0.0) >= 0.0;
+        let touches = overlap >= -most_gap && overlap + time * approach.max(0.0) >= 0.0;
         touches.then(|| {
             let mass = first.mass * second.mass / (first.mass + second.mass);
             self.response.demand(self.stiffness(first, second), mass)

@@ -12,14 +12,20 @@ use super::ghosts::{Ghost, Ghosts};
 use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
-/// Skin as a fraction of the largest contact distance. The skin is the distance by which two points may
-/// approach between searches. With this skin and penalty contact, the rows of a lattice at rest contain only
-/// nearest neighbours.
+/// Skin as a fraction of the largest contact distance. A search finds the pairs whose gap is at most the skin.
+/// With this skin and penalty contact, the rows of a lattice at rest contain only nearest neighbours.
 const SKIN: f64 = 0.4;
 
+/// Largest gap of a pair that the look-ahead considers, as a fraction of the largest contact distance. The last
+/// search has found all such pairs, so the limits of the step do not depend on when the last search was made.
+pub(super) const MOST_GAP: f64 = 0.1;
+
+/// Distance that a point may move between searches, as a fraction of the largest contact distance.
+const MOVED: f64 = 0.5 * (SKIN - MOST_GAP);
+
 impl<const D: usize> Contact<D> {
-    /// Repeat the search if the lists are stale or if a point has moved by more than half the skin since the
-    /// last search. Returns whether all positions on all ranks are finite; otherwise the search is not
+    /// Repeat the search if the lists are stale or if a point has moved by more than [`MOVED`] since the last
+    /// search. Returns whether all positions on all ranks are finite; otherwise the search is not
     /// repeated. Collective.
     pub(super) fn search_where_due(
         &mut self,
@@ -49,11 +55,10 @@ impl<const D: usize> Contact<D> {
             });
         let mut moved = [moved.reduce(|| 0.0, f64::max)];
         comm.max(&mut moved);
-        let skin = SKIN * self.largest;
         if moved[0].is_infinite() {
             return false;
         }
-        if is_stale || 4.0 * moved[0] > skin * skin {
+        if is_stale || moved[0] > (MOVED * self.largest).powi(2) {
             self.search(comm, model, forces, fields);
         }
         true
