@@ -24,8 +24,8 @@ pub struct Sets<'n> {
     of_mesh: Vec<(String, String)>,
     /// Prefix of the names of sets of the mesh in the new deck; `None` if the points come from no mesh.
     mesh_prefix: Option<&'static str>,
-    /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set; `None` if one
-    /// node in the set is enough.
+    /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set; `None` if
+    /// one node in the set is enough.
     ids_by_name: Option<Vec<(String, Vec<u64>)>>,
 }
 

@@ -208,8 +208,8 @@ impl<'a> Translation<'a> {
         folder.join(file)
     }
 
-    /// Return the path of a file of the source deck, relative to the new deck, and note that the new deck reads
-    /// this file. An absolute path stays.
+    /// Return the path of a file of the source deck, relative to the new deck, and note that the new deck
+    /// reads this file. An absolute path stays.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
         self.files.borrow_mut().push(path.clone());

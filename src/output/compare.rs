@@ -1,8 +1,8 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
 //! Outputs and history rows are matched by time, points by id. Values are read in blocks of points; the
-//! history is read as a whole. The ids of two outputs are also read as a whole if they differ and at least one
-//! sequence does not ascend, as on refined grids.
+//! history is read as a whole. The ids of two outputs are also read as a whole if they differ and at least
+//! one sequence does not ascend, as on refined grids.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};
@@ -295,6 +295,7 @@ impl OutputPair<'_> {
                 matched = pairs.len();
             }
         }
+        // The earlier outputs, if equal, all have this count if their sum is `done` times this count.
         comparison.has_equal_counts &= comparison.points == done as u64 * matched as u64;
         comparison.points += matched as u64;
         for side in 0..2 {

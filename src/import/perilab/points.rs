@@ -82,7 +82,8 @@ fn blocks_of_abaqus(
     Some(names)
 }
 
-/// Columns of a point file from which PeriLab takes the constants of each point, in place of those of the deck.
+/// Columns of a point file from which PeriLab takes the constants of each point, in place of those of the
+/// deck.
 const POINTWISE_CONSTANTS: [&str; 5] = [
     "Bulk_Modulus",
     "Young's_Modulus",

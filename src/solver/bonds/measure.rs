@@ -307,8 +307,8 @@ impl<const D: usize> Forces<D> {
             if let Some(volume) = of_law {
                 weighted_volume[point] = volume;
             }
-            // If the law stores its weighted volume, θ is divided by this volume, which includes broken bonds.
-            // Otherwise it is divided by the sum over the intact bonds.
+            // If the law stores its weighted volume, θ is divided by this volume, which includes broken
+            // bonds. Otherwise it is divided by the sum over the intact bonds.
             let volume = of_law.unwrap_or(intact[point]);
             let thermal = D as f64 * thermal_stretch.map_or(0.0, |stretch| stretch[point]);
             *growth = match Law::<D>::dilatation(law, &numbers) {

@@ -203,9 +203,9 @@ pub fn not_empty(
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Find the points of the conditions that act in a stage. `begins` has for each condition the time at which
-    /// it begins to act (s); `None` if it does not act in this stage. If two supports prescribe the same
-    /// component of a point, the later support applies. Collective.
+    /// Find the points of the conditions that act in a stage. `begins` has for each condition the time at
+    /// which it begins to act (s); `None` if it does not act in this stage. If two supports prescribe the
+    /// same component of a point, the later support applies. Collective.
     ///
     /// # Errors
     /// - If a set is empty.

@@ -12,12 +12,13 @@ use super::ghosts::{Ghost, Ghosts};
 use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
-/// Skin as a fraction of the largest contact distance. A search finds the pairs whose gap is at most the skin.
-/// With this skin and penalty contact, the rows of a lattice at rest contain only nearest neighbours.
+/// Skin as a fraction of the largest contact distance. A search finds the pairs whose gap is at most the
+/// skin. With this skin and penalty contact, the rows of a lattice at rest contain only nearest neighbours.
 const SKIN: f64 = 0.4;
 
-/// Largest gap of a pair that the look-ahead considers, as a fraction of the largest contact distance. The last
-/// search has found all such pairs, so the limits of the step do not depend on when the last search was made.
+/// Largest gap of a pair that the look-ahead considers, as a fraction of the largest contact distance. The
+/// last search has found all such pairs, so the limits of the step do not depend on when the last search was
+/// made.
 pub(super) const MOST_GAP: f64 = 0.1;
 
 /// Distance that a point may move between searches, as a fraction of the largest contact distance.

@@ -23,7 +23,8 @@ pub(super) struct StepDemand {
     pub stiffness: f64,
     /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
-    /// Number of consecutive steps that could have been longer; at the start, as if contact had limited no step.
+    /// Number of consecutive steps that could have been longer. With an adaptive step: number of consecutive
+    /// steps that contact did not limit. Large at the start, when contact has limited no step.
     calm: u64,
 }
 

@@ -12,7 +12,8 @@ const CONTACT_RESERVE: f64 = 0.95;
 /// could reverse its motion and touch again within the first long step.
 const GROWTH: f64 = 2.0;
 
-/// Number of consecutive adaptive steps without a limit by contact after which the step may grow by any factor.
+/// Number of consecutive adaptive steps without a limit by contact after which the step may grow by any
+/// factor.
 const LONG_CALM: u64 = 400;
 
 /// A step could have been longer if it is below this fraction of the step that the stage and contact allow.
@@ -93,9 +94,9 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Upper bound of the next adaptive step, s. After a step that contact has limited, the step does not grow
-    /// for 100 steps that contact does not limit. Then it at most doubles with each step, and after 400 such
-    /// steps there is no bound.
+    /// Upper bound of the next adaptive step, s. After a step that contact has limited, the step does not
+    /// grow for 100 steps that contact does not limit. Then it at most doubles with each step, and after 400
+    /// such steps there is no bound.
     pub(in crate::solver) fn adaptive_limit(&self) -> f64 {
         let Some(contact) = &self.contact else {
             return f64::INFINITY;
