@@ -133,7 +133,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.undo(&kept);
         }
         self.kept = kept;
-        self.count_unlimited_steps();
+        self.count_calm_steps();
     }
 }
 

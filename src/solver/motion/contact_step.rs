@@ -12,16 +12,16 @@ const CONTACT_RESERVE: f64 = 0.95;
 /// could reverse its motion and touch again within the first long step.
 const GROWTH: f64 = 2.0;
 
-/// Number of consecutive adaptive steps without a limit by contact after which the step may grow by any
+/// Number of consecutive adaptive steps that contact does not limit, after which the step may grow by any
 /// factor.
 const LONG_CALM: u64 = 400;
 
-/// A step could have been longer if it is below this fraction of the step that the stage and contact allow.
+/// Contact does not limit a step that is below this fraction of the step that contact allows.
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a new step (s) if contact is too stiff for the present step, or if enough consecutive steps
-    /// could have been longer. The new step divides the rest of the stage evenly. Otherwise return `None`,
+    /// Return a new step (s) if contact is too stiff for the present step, or if the step is shorter than that
+    /// of the stage and contact has not limited enough consecutive steps. The new step divides the rest of the stage evenly. Otherwise return `None`,
     /// which means that the step does not change. The result is always `None` at the end of a stage, in a
     /// quasi-static stage, and in runs without contact.
     pub fn step_for_contact(&self) -> Option<f64> {
@@ -33,13 +33,8 @@ impl<const D: usize> Simulation<'_, D> {
         if self.time_rule().adaptive.is_some() {
             return (contact.is_felt() && step > limit).then_some(limit);
         }
-        let mut most = self.stages.steps[self.progress.stage]
-            .0
-            .min(CONTACT_RESERVE * limit);
-        // A step between `CALM_SHARE` and 1 times the longest one would not grow any more.
-        if CALM_SHARE * most > GROWTH * step {
-            most = GROWTH * step;
-        }
+        let of_stage = self.stages.steps[self.progress.stage].0;
+        let most = of_stage.min(CONTACT_RESERVE * limit).min(GROWTH * step);
         let is_too_long = contact.is_felt() && step > limit;
         let is_too_short = contact.is_calm() && step < most;
         if self.is_stage_over() || !(is_too_long || is_too_short) {
@@ -72,7 +67,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
-    /// Change the step. After a longer step, the count of steps that could have been longer starts again.
+    /// Change the step. If the new step is longer, the count of steps that contact does not limit starts again.
     pub(in crate::solver) fn set_step_for_contact(&mut self, step: f64) {
         if let Some(contact) = &mut self.contact
             && step > self.clock.step()
@@ -82,15 +77,15 @@ impl<const D: usize> Simulation<'_, D> {
         self.clock.set_step(step);
     }
 
-    /// Count the consecutive steps that could have been longer in spite of contact.
+    /// Count the consecutive steps that contact does not limit: steps without contact, and steps clearly
+    /// shorter than contact allows.
     pub(in crate::solver) fn count_calm_steps(&mut self) {
         let Some(limit) = self.contact_limit() else {
             return;
         };
-        let could_be_longer =
-            self.clock.step() < CALM_SHARE * limit.min(self.stages.steps[self.progress.stage].0);
+        let step = self.clock.step();
         if let Some(contact) = &mut self.contact {
-            contact.count_calm(could_be_longer);
+            contact.count_calm(!contact.is_felt() || step < CALM_SHARE * limit);
         }
     }
 
@@ -109,17 +104,6 @@ impl<const D: usize> Simulation<'_, D> {
             _ => 1.0,
         };
         felt.min(growth * self.clock.step())
-    }
-
-    /// Count the consecutive adaptive steps that are clearly shorter than contact allows.
-    pub(in crate::solver) fn count_unlimited_steps(&mut self) {
-        let Some(limit) = self.contact_limit() else {
-            return;
-        };
-        let step = self.clock.step();
-        if let Some(contact) = &mut self.contact {
-            contact.count_calm(!contact.is_felt() || step < CALM_SHARE * limit);
-        }
     }
 
     /// Return an error if the motion of a rigid body is not finite; the error is the same on all ranks.
