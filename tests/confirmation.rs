@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use fissure::comm::Communicator;
-use fissure::output::{Contents, Creation, FieldDescription, Piece, ResultFile};
+use fissure::output::{Contents, Creation, FieldDescription, Number, Piece, ResultFile};
 
 use command::{Folder, is_rank};
 
@@ -46,7 +46,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
         name: "damage",
         unit: "",
         components: 1,
-        needs_double: false,
+        number: Number::F64,
     }];
     let contents = Contents {
         piece: Piece {
@@ -58,7 +58,6 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
         fixed: &[],
         moving: &moving,
         metadata: &[],
-        single: false,
         // The number of steps that fills one chunk.
         steps: 512,
     };

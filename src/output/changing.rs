@@ -5,7 +5,7 @@ use hdf5_metno::H5Type;
 
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
-use super::field::{FieldData, FieldDescription, create_field, write_field};
+use super::field::{FieldData, FieldDescription, Number, create_field, write_field};
 use super::vtkhdf::{MIN_CHUNK_ROWS, Piece, VTK_VERTEX};
 use crate::error::Result;
 
@@ -25,7 +25,6 @@ pub struct ChangingPoints {
 /// A static field, which changes only when the points change.
 struct Fixed {
     field: FieldDescription,
-    kind: FieldData<'static>,
     dataset: Dataset,
 }
 
@@ -44,13 +43,10 @@ impl ChangingPoints {
             .iter()
             .map(|name| file.create_dataset::<i64>(&format!("/VTKHDF/{name}"), parts, None));
         let counts = counts.collect::<Result<_>>()?;
-        let make = |(field, data): &(FieldDescription, FieldData)| {
-            let kind = data.empty();
-            let dataset = create_field(file, field, &kind, rows)?;
+        let make = |(field, _): &(FieldDescription, FieldData)| {
             Ok(Fixed {
                 field: *field,
-                kind,
-                dataset,
+                dataset: create_field(file, field, rows)?,
             })
         };
         let fixed = fixed.iter().map(make).collect::<Result<_>>()?;
@@ -120,16 +116,27 @@ impl ChangingPoints {
         copy::<u8>(old, file, &mut self.types, rows)?;
         copy::<i64>(old, file, &mut self.connectivity, rows)?;
         copy::<i64>(old, file, &mut self.offsets, rows + steps)?;
-        for Fixed { kind, dataset, .. } in &mut self.fixed {
-            match kind {
-                FieldData::F64(_) => copy::<f64>(old, file, dataset, rows)?,
-                FieldData::F32(_) => copy::<f32>(old, file, dataset, rows)?,
-                FieldData::U64(_) => copy::<u64>(old, file, dataset, rows)?,
-                FieldData::U32(_) => copy::<u32>(old, file, dataset, rows)?,
-                FieldData::U8(_) => copy::<u8>(old, file, dataset, rows)?,
-            }
+        for Fixed { field, dataset } in &mut self.fixed {
+            copy_field(old, file, field.number, dataset, rows)?;
         }
         Ok(())
+    }
+}
+
+/// Copy the first `rows` rows of a field; see [`copy`].
+pub fn copy_field(
+    old: &mut CollectiveFile<'_>,
+    file: &mut CollectiveFile<'_>,
+    number: Number,
+    dataset: &mut Dataset,
+    rows: u64,
+) -> Result<()> {
+    match number {
+        Number::F64 => copy::<f64>(old, file, dataset, rows),
+        Number::F32 => copy::<f32>(old, file, dataset, rows),
+        Number::U64 => copy::<u64>(old, file, dataset, rows),
+        Number::U32 => copy::<u32>(old, file, dataset, rows),
+        Number::U8 => copy::<u8>(old, file, dataset, rows),
     }
 }
 

@@ -3,14 +3,28 @@
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
-use super::read::Number;
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
 /// Path of the group of the fields.
 pub(super) const POINT_DATA: &str = "/VTKHDF/PointData";
 
-/// Name, unit and shape of a field.
+/// The number type of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Number {
+    /// 8-byte float.
+    F64,
+    /// 4-byte float.
+    F32,
+    /// 8-byte unsigned integer.
+    U64,
+    /// 4-byte unsigned integer.
+    U32,
+    /// 1-byte unsigned integer.
+    U8,
+}
+
+/// Name, unit, shape and number type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FieldDescription {
     /// Name of the field.
@@ -25,9 +39,8 @@ pub struct FieldDescription {
     /// - 6: symmetric tensor (xx, yy, zz, xy, yz, xz);
     /// - 9: tensor, row-major.
     pub components: usize,
-    /// Whether single precision would change the meaning of the values, such as ids. The values are then
-    /// always stored in double precision.
-    pub needs_double: bool,
+    /// Number type of the stored values.
+    pub number: Number,
 }
 
 /// This rank's values of a field, row-major: [points of this rank, components].
@@ -47,24 +60,13 @@ pub enum FieldData<'a> {
 
 impl FieldData<'_> {
     /// Return the number type.
-    pub(super) fn number(&self) -> Number {
+    pub fn number(&self) -> Number {
         match self {
             FieldData::F64(_) => Number::F64,
             FieldData::F32(_) => Number::F32,
             FieldData::U64(_) => Number::U64,
             FieldData::U32(_) => Number::U32,
             FieldData::U8(_) => Number::U8,
-        }
-    }
-
-    /// Return empty data of the same number type.
-    pub(super) fn empty(&self) -> FieldData<'static> {
-        match self {
-            FieldData::F64(_) => FieldData::F64(&[]),
-            FieldData::F32(_) => FieldData::F32(&[]),
-            FieldData::U64(_) => FieldData::U64(&[]),
-            FieldData::U32(_) => FieldData::U32(&[]),
-            FieldData::U8(_) => FieldData::U8(&[]),
         }
     }
 
@@ -79,7 +81,7 @@ impl FieldData<'_> {
     }
 }
 
-/// Check the number of components of a field, and the number of its values.
+/// Check the number of components of a field, and the number and the number type of its values.
 pub(super) fn check(field: &FieldDescription, data: &FieldData, points: usize) -> Result<()> {
     let (name, components, length) = (field.name, field.components, data.len());
     if !matches!(components, 1 | 2 | 3 | 6 | 9) {
@@ -92,13 +94,17 @@ pub(super) fn check(field: &FieldDescription, data: &FieldData, points: usize) -
         );
         return Err(Error::run(text));
     }
+    if data.number() != field.number {
+        let (number, expected) = (data.number(), field.number);
+        let text = format!("the field {name} has values of type {number:?}, not {expected:?}");
+        return Err(Error::run(text));
+    }
     Ok(())
 }
 
 pub(super) fn create_field(
     file: &mut CollectiveFile,
     field: &FieldDescription,
-    data: &FieldData,
     rows: Rows,
 ) -> Result<Dataset> {
     let path = format!("{POINT_DATA}/{}", field.name);
@@ -107,12 +113,12 @@ pub(super) fn create_field(
         2 => Some(3),
         more => Some(more),
     };
-    let dataset = match data {
-        FieldData::F64(_) => file.create_dataset::<f64>(&path, rows, columns),
-        FieldData::F32(_) => file.create_dataset::<f32>(&path, rows, columns),
-        FieldData::U64(_) => file.create_dataset::<u64>(&path, rows, columns),
-        FieldData::U32(_) => file.create_dataset::<u32>(&path, rows, columns),
-        FieldData::U8(_) => file.create_dataset::<u8>(&path, rows, columns),
+    let dataset = match field.number {
+        Number::F64 => file.create_dataset::<f64>(&path, rows, columns),
+        Number::F32 => file.create_dataset::<f32>(&path, rows, columns),
+        Number::U64 => file.create_dataset::<u64>(&path, rows, columns),
+        Number::U32 => file.create_dataset::<u32>(&path, rows, columns),
+        Number::U8 => file.create_dataset::<u8>(&path, rows, columns),
     }?;
     file.set_dataset_attribute(&dataset, "unit", Attribute::Text(field.unit))?;
     Ok(dataset)

@@ -23,9 +23,9 @@ mod vtkhdf;
 pub mod xdmf;
 
 pub use access::Creation;
-pub use field::{FieldData, FieldDescription};
+pub use field::{FieldData, FieldDescription, Number};
 pub use history::HistoryContents;
-pub use read::{Number, ResultReader, StoredColumn, StoredField};
+pub use read::{ResultReader, StoredColumn, StoredField};
 pub use seal::mix;
 pub use transfer::initialise;
 pub use vtkhdf::{Contents, Piece, ResultFile};

@@ -1,7 +1,7 @@
 //! Serial reader of result files.
 
 use super::failure::{innermost, system_error};
-use super::field::POINT_DATA;
+use super::field::{Number, POINT_DATA};
 use super::history::{COLUMNS, HISTORY, SEPARATOR, UNITS};
 use super::vtkhdf::STEPS;
 use crate::component;
@@ -11,21 +11,6 @@ use hdf5_metno::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 use std::io::ErrorKind::{NotFound, WouldBlock};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-/// The number type of a field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Number {
-    /// 8-byte float.
-    F64,
-    /// 4-byte float.
-    F32,
-    /// 8-byte unsigned integer.
-    U64,
-    /// 4-byte unsigned integer.
-    U32,
-    /// 1-byte unsigned integer.
-    U8,
-}
 
 /// A field of a result file, as stored.
 #[derive(Debug, Clone, PartialEq, Eq)]

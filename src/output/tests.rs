@@ -3,7 +3,7 @@
 use super::access::Creation;
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
-use super::field::{FieldData, FieldDescription};
+use super::field::{FieldData, FieldDescription, Number};
 use super::history::HistoryContents;
 use super::read::ResultReader;
 use super::vtkhdf::{Contents, Piece, ResultFile, STEPS};
@@ -16,7 +16,7 @@ fn describe(name: &'static str, unit: &'static str, components: usize) -> FieldD
         name,
         unit,
         components,
-        needs_double: false,
+        number: Number::F64,
     }
 }
 
@@ -26,7 +26,12 @@ fn what_is_written_reads_back() -> Result<()> {
     let positions = [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]];
     let comm = threads::alone();
     let piece = Piece { first: 0, total: 2 };
-    let fixed = [(describe("id", "", 1), FieldData::U64(&[7, 3]))];
+    let number = Number::U64;
+    let id = FieldDescription {
+        number,
+        ..describe("id", "", 1)
+    };
+    let fixed = [(id, FieldData::U64(&[7, 3]))];
     let moving = [describe("velocity", "m/s", 2), describe("damage", "", 1)];
     let metadata = [("deck", "ω = 1".to_owned())];
     let contents = Contents {
@@ -36,7 +41,6 @@ fn what_is_written_reads_back() -> Result<()> {
         fixed: &fixed,
         moving: &moving,
         metadata: &metadata,
-        single: false,
         steps: 2,
     };
     let create = || ResultFile::create(&path, &comm, Creation::Exclusive, &contents);
@@ -140,7 +144,6 @@ fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
         fixed: &[],
         moving: &moving,
         metadata,
-        single: false,
         steps: 2,
     };
     let (columns, csv) = ([("time".into(), "s")], path.with_extension("csv"));

@@ -1,8 +1,8 @@
 //! The XDMF 3 side-car, with which ParaView before 5.12 opens a result file. A step is an output here, as in
 //! VTKHDF.
 
-use super::field::FieldDescription;
-use super::read::{Number, StoredField};
+use super::field::{FieldDescription, Number};
+use super::read::StoredField;
 use super::vtkhdf::Contents;
 use crate::error::{Error, Result};
 use std::fmt::{self, Write as _};
@@ -51,27 +51,20 @@ impl SideCar {
     /// Create the side-car `name.xdmf` of a result `name.vtkhdf`. `past` holds time (s) and number of points
     /// of each existing step.
     pub fn new(result: &Path, contents: &Contents, past: &[(f64, usize)]) -> Self {
-        let stored = |field: &FieldDescription, number, dynamic| StoredField {
+        let stored = |field: &FieldDescription, dynamic| StoredField {
             name: field.name.to_owned(),
             unit: field.unit.to_owned(),
             components: match field.components {
                 2 => 3,
                 others => others,
             },
-            number,
+            number: field.number,
             dynamic,
         };
-        let real = |field: &FieldDescription| {
-            if contents.single && !field.needs_double {
-                Number::F32
-            } else {
-                Number::F64
-            }
-        };
         let fixed = contents.fixed.iter();
-        let fixed = fixed.map(|(field, data)| stored(field, data.number(), contents.changing));
+        let fixed = fixed.map(|(field, _)| stored(field, contents.changing));
         let moving = contents.moving.iter();
-        let moving = moving.map(|field| stored(field, real(field), true));
+        let moving = moving.map(|field| stored(field, true));
         let mut fields: Vec<StoredField> = fixed.chain(moving).collect();
         fields.sort_by(|a, b| a.name.cmp(&b.name));
         let name = result.file_name().unwrap_or_default();

@@ -67,6 +67,12 @@ impl Output {
         }
     }
 
+    /// Test whether the values of a field are rounded to 4-byte floats. Ids are never rounded, because
+    /// rounding would change them.
+    pub fn is_single(&self, field: Field) -> bool {
+        self.single && field != Field::Fragment
+    }
+
     /// Test whether the result contains the number of bonds that have broken since its last output.
     pub fn counts_newly_broken(&self) -> bool {
         self.fields.contains(&Field::NewlyBrokenBonds)
@@ -356,11 +362,6 @@ impl Field {
             Self::StrainEnergyDensity => "J/m^3",
             Self::Temperature => "K",
         }
-    }
-
-    /// Whether the values are ids, which single precision would change.
-    pub fn needs_double(self) -> bool {
-        matches!(self, Self::Fragment)
     }
 
     /// Return the number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for

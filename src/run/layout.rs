@@ -1,7 +1,7 @@
 //! Static data and description of the fields of a result.
 
 use crate::comm::{self, IdOrder};
-use crate::output::{Contents, FieldData, FieldDescription, Piece};
+use crate::output::{Contents, FieldData, FieldDescription, Number, Piece};
 use crate::problem::{Field, Output};
 use crate::solver::Simulation;
 
@@ -18,7 +18,6 @@ pub struct ResultLayout<'a> {
     changing: bool,
     moving: Vec<FieldDescription>,
     metadata: &'a [(&'a str, String)],
-    single: bool,
     piece: Piece,
     steps: u64,
 }
@@ -46,7 +45,11 @@ impl<'a> ResultLayout<'a> {
             name: field.name(),
             unit: field.unit(),
             components: field.components(),
-            needs_double: field.needs_double(),
+            number: if output.is_single(*field) {
+                Number::F32
+            } else {
+                Number::F64
+            },
         };
         let ids = select(rows, order.collect(comm, &model.ids[..owned], 1), 1);
         let (first, total) = comm::scan(comm, ids.len() as u64);
@@ -60,7 +63,6 @@ impl<'a> ResultLayout<'a> {
             changing: simulation.may_refine(),
             moving: output.fields.iter().map(describe).collect(),
             metadata,
-            single: output.single,
             piece: Piece { first, total },
             steps,
         }
@@ -68,20 +70,14 @@ impl<'a> ResultLayout<'a> {
 
     /// Return the static fields, see [`FIXED`]; `level` only for a deck with `[refinement]`.
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
-        let scalar = |name, unit| FieldDescription {
-            name,
-            unit,
-            components: 1,
-            needs_double: false,
-        };
         let [id, block, volume, level] = FIXED;
         let mut fixed = vec![
-            (scalar(id, "1"), FieldData::U64(&self.ids)),
-            (scalar(block, "1"), FieldData::U32(&self.blocks)),
-            (scalar(volume, "m^3"), FieldData::F64(&self.volumes)),
+            scalar(id, "1", FieldData::U64(&self.ids)),
+            scalar(block, "1", FieldData::U32(&self.blocks)),
+            scalar(volume, "m^3", FieldData::F64(&self.volumes)),
         ];
         if let Some(levels) = &self.levels {
-            fixed.push((scalar(level, "1"), FieldData::U32(levels)));
+            fixed.push(scalar(level, "1", FieldData::U32(levels)));
         }
         fixed
     }
@@ -95,10 +91,24 @@ impl<'a> ResultLayout<'a> {
             fixed,
             moving: &self.moving,
             metadata: self.metadata,
-            single: self.single,
             steps: self.steps,
         }
     }
+}
+
+/// Return a scalar field of static data with its description.
+fn scalar<'a>(
+    name: &'static str,
+    unit: &'static str,
+    data: FieldData<'a>,
+) -> (FieldDescription, FieldData<'a>) {
+    let description = FieldDescription {
+        name,
+        unit,
+        components: 1,
+        number: data.number(),
+    };
+    (description, data)
 }
 
 /// Select rows of `values`, which has `width` numbers per row; `None` selects all rows.

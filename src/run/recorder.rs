@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::comm::{self, Communicator, IdOrder, agree};
 use crate::error::{Error, ErrorKind, Result};
 use crate::output::checkpoint::{FurtherResult, Header, is_taken};
-use crate::output::{HistoryContents, Number, ResultFile, ResultReader, StoredField, mix};
+use crate::output::{HistoryContents, Number, ResultFile, ResultReader, mix};
 use crate::problem::Output;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
@@ -397,12 +397,15 @@ fn reason_for_new_result<const D: usize>(
         let moving = fields
             .iter()
             .filter(|field| field.dynamic && !FIXED.contains(&&field.name[..]));
-        let found: Vec<&str> = moving.map(|field| &field.name[..]).collect();
-        let requested = output.fields.iter().map(|field| field.name());
-        let mut requested: Vec<&str> = requested.collect();
+        let found = moving.map(|field| (&field.name[..], field.number == Number::F32));
+        let (found, found_single): (Vec<&str>, Vec<bool>) = found.unzip();
+        let requested = output
+            .fields
+            .iter()
+            .map(|field| (field.name(), output.is_single(*field)));
+        let mut requested: Vec<(&str, bool)> = requested.collect();
         requested.sort_unstable();
-        let single = |field: &StoredField| field.number == Number::F32;
-        let has_single = output.single && !output.fields.iter().all(|field| field.needs_double());
+        let (requested, requested_single): (Vec<&str>, Vec<bool>) = requested.into_iter().unzip();
         let changing = simulation.may_refine();
         if reader.is_changing() != changing {
             let text = "adaptive refinement was switched on or off";
@@ -411,10 +414,10 @@ fn reason_for_new_result<const D: usize>(
         let found_points = reader.ids(0)?.into_iter().map(mix);
         if !changing && found_points.fold(0, u64::wrapping_add) != points {
             return Ok(Some("the deck requests other points".to_owned()));
-        } else if fields.iter().any(single) != has_single {
-            return Ok(Some("the deck requests another precision".to_owned()));
         } else if found != requested {
             return Ok(Some("the deck requests other fields".to_owned()));
+        } else if found_single != requested_single {
+            return Ok(Some("the deck requests another precision".to_owned()));
         }
         let Some((observer, _, changed)) = history else {
             return Ok(None);

@@ -235,8 +235,7 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     let result = |(output, points): (&Output, &f64)| {
         let outputs = Schedule::of_outputs(output).count(clock);
         let bytes_of = |field: &Field| {
-            let is_single = output.single && !field.needs_double();
-            field.components() as f64 * if is_single { 4.0 } else { 8.0 }
+            field.components() as f64 * if output.is_single(*field) { 4.0 } else { 8.0 }
         };
         let of_output: f64 = output.fields.iter().map(bytes_of).sum();
         let history = if output.name.is_none() {

@@ -25,7 +25,9 @@ use super::attribute::Attribute;
 use super::changing::ChangingPoints;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
-use super::field::{FieldData, FieldDescription, POINT_DATA, check, create_field, write_field};
+use super::field::{
+    FieldData, FieldDescription, Number, POINT_DATA, check, create_field, write_field,
+};
 use super::history::{History, HistoryContents};
 use crate::comm::{Communicator, agree, threads};
 use crate::error::{Error, Result};
@@ -73,7 +75,6 @@ pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
     points: usize,
-    single: bool,
     steps: u64,
     /// Time (s) and number of points of the steps of a resumed file.
     past: Vec<(f64, usize)>,
@@ -116,12 +117,10 @@ pub struct Contents<'a> {
     pub positions: &'a [[f64; 3]],
     /// Static fields with their values.
     pub fixed: &'a [(FieldDescription, FieldData<'a>)],
-    /// Fields with values per step.
+    /// Fields with values per step; their values are floats.
     pub moving: &'a [FieldDescription],
     /// Attributes of the file: name and text.
     pub metadata: &'a [(&'a str, String)],
-    /// Store moving fields as 4-byte floats.
-    pub single: bool,
     /// Expected number of steps; more steps are allowed.
     pub steps: u64,
 }
@@ -145,7 +144,6 @@ impl<'a> ResultFile<'a> {
             fixed,
             moving,
             metadata,
-            single,
             steps,
         } = *contents;
         let points = positions.len();
@@ -188,7 +186,6 @@ impl<'a> ResultFile<'a> {
             file,
             piece,
             points,
-            single,
             past: Vec::new(),
             steps: 0,
             rows: 0,
@@ -200,18 +197,13 @@ impl<'a> ResultFile<'a> {
         };
         for (field, data) in fixed.iter().filter(|_| !changing) {
             let rows = Rows::Fixed(piece.total);
-            let dataset = create_field(&mut result.file, field, data, rows)?;
+            let dataset = create_field(&mut result.file, field, rows)?;
             write_field(&mut result.file, &dataset, piece.first, field, data)?;
         }
         for field in moving {
             let per_append = piece.total;
             let rows = Rows::Extensible { per_append };
-            let empty = if single && !field.needs_double {
-                FieldData::F32(&[])
-            } else {
-                FieldData::F64(&[])
-            };
-            let dataset = create_field(&mut result.file, field, &empty, rows)?;
+            let dataset = create_field(&mut result.file, field, rows)?;
             result.fields.push((*field, dataset));
         }
         for (path, columns, rule) in tables_of(contents) {
@@ -289,15 +281,15 @@ impl<'a> ResultFile<'a> {
         let first = self.rows + self.piece.first;
         for (k, (description, dataset)) in self.fields.iter().enumerate() {
             let data = values(k);
-            let checked = check(description, &FieldData::F64(&data), self.points);
-            agree(self.file.communicator(), checked)?;
             let rounded: Vec<f32>;
-            let data = if self.single && !description.needs_double {
+            let data = if description.number == Number::F32 {
                 rounded = data.iter().map(|value| *value as f32).collect();
                 FieldData::F32(&rounded)
             } else {
                 FieldData::F64(&data)
             };
+            let checked = check(description, &data, self.points);
+            agree(self.file.communicator(), checked)?;
             write_field(&mut self.file, dataset, first, description, &data)?;
         }
         // Flush the data before the tables that refer to these data.

@@ -6,7 +6,7 @@ use super::super::access::Creation;
 use super::super::attribute::Attribute;
 use super::super::changing;
 use super::super::collective::CollectiveFile;
-use super::super::field::POINT_DATA;
+use super::super::field::{Number, POINT_DATA};
 use super::super::history::{HISTORY, History, HistoryContents};
 use super::{Contents, ResultFile, STEPS, Table, append_one, tables_of, truncate};
 use crate::comm::{Communicator, agree, threads, total};
@@ -96,7 +96,6 @@ impl<'a> ResultFile<'a> {
         let result = Self {
             piece: contents.piece,
             points: contents.positions.len(),
-            single: contents.single,
             steps: retained.steps,
             past: past.iter().map(|time| (*time, total as usize)).collect(),
             rows: retained.steps * total,
@@ -182,7 +181,7 @@ impl<'a> ResultFile<'a> {
             let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
             for step in 0..retained {
                 let (first, count) = (step * piece.total + piece.first, result.points);
-                if contents.single && !field.needs_double {
+                if field.number == Number::F32 {
                     let rows: Vec<f32> = old.read_rows(&stored, first, count)?;
                     result.file.write_rows(values, first, &rows)?;
                 } else {
@@ -220,11 +219,7 @@ impl<'a> ResultFile<'a> {
         self.rows = counts.iter().sum::<i64>() as u64;
         changing.copy(old, &mut self.file, self.rows, retained)?;
         for (field, dataset) in &mut self.fields {
-            if self.single && !field.needs_double {
-                changing::copy::<f32>(old, &mut self.file, dataset, self.rows)?;
-            } else {
-                changing::copy::<f64>(old, &mut self.file, dataset, self.rows)?;
-            }
+            changing::copy_field(old, &mut self.file, field.number, dataset, self.rows)?;
         }
         for table in &mut self.tables {
             changing::copy::<i64>(old, &mut self.file, &mut table.dataset, retained)?;
