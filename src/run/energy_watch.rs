@@ -1,7 +1,7 @@
-//! Detection of unstable steps and of lost energy by the energy balance.
+//! Detection of unstable time steps and of lost energy by the energy balance.
 //!
-//! The energy gain is [`Energies::error`](crate::solver::observers::Energies::error), without negative
-//! fracture energy. The energy input is `EnergyWatch::input`.
+//! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
+//! last load step or the start, without negative fracture energy. The energy input is `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -66,6 +66,8 @@ pub struct EnergyWatch {
     /// Maximum energy input so far, J: initial energy, work of loads and supports, and
     /// [`HistoryRow::step_energy`].
     input: f64,
+    /// Error of the energy balance after the last load step, J.
+    error_of_load_steps: f64,
     /// Whether a warning about an energy gain has been printed.
     warned: bool,
     /// Largest fracture energy of a row so far, J.
@@ -89,6 +91,7 @@ impl EnergyWatch {
         Self {
             floor: ROUNDOFF_STRAIN * ROUNDOFF_STRAIN * reduce(comm, &mut stiffness)[0],
             input: 0.0,
+            error_of_load_steps: 0.0,
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
@@ -96,26 +99,59 @@ impl EnergyWatch {
         }
     }
 
-    /// Check the ratio of energy gain to energy input in a row of the history. Return a warning at the first
+    /// Look at a row of the history; `simulation` is at the time of this row. Return warnings; they are the same
+    /// on all ranks. `is_last`: whether this is the last row of the run.
+    ///
+    /// # Errors
+    /// If a time step is clearly unstable, see [`Self::check`].
+    pub fn look<const D: usize>(
+        &mut self,
+        row: &HistoryRow,
+        simulation: &Simulation<'_, D>,
+        is_last: bool,
+    ) -> Result<Vec<String>> {
+        if simulation.is_quasi_static() {
+            self.note_load_step(row);
+            return Ok(Vec::new());
+        }
+        let (clock, stable) = (&simulation.clock, simulation.scaled_stable_step());
+        let growth = self.check(row, clock, stable, is_last)?;
+        let of_breaking = self.check_breaking(row, clock);
+        Ok(growth.into_iter().chain(of_breaking).collect())
+    }
+
+    /// Take note of the row of a load step. Its errors do not come from the time step, so they do not count as
+    /// an energy gain of later time steps.
+    fn note_load_step(&mut self, row: &HistoryRow) {
+        self.add_input(row);
+        self.error_of_load_steps = row.energies.error;
+        self.max_freed = row.energies.fracture;
+    }
+
+    fn add_input(&mut self, row: &HistoryRow) {
+        let input = row.first_energy.abs() + row.energies.work.abs() + row.step_energy;
+        self.input = self.input.max(input);
+    }
+
+    /// Check the ratio of energy gain to energy input in the row of a time step. Return a warning at the first
     /// row with a ratio above [`WARNING_GAIN`]. `stable` is the stable step of the present stage, s.
     /// `is_last`: whether this is the last row of the run. The result is the same on all ranks.
     ///
     /// # Errors
     /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, or above
     /// [`CERTAIN_GAIN`] in one row.
-    pub fn check(
+    fn check(
         &mut self,
         row: &HistoryRow,
         clock: &Clock,
         stable: f64,
         is_last: bool,
     ) -> Result<Option<String>> {
-        let (start, work) = (row.first_energy, row.energies.work);
         // Negative fracture energy means that breaking bonds have added energy, which would hide part of the
         // gain.
-        let gain = row.energies.error - row.energies.fracture.min(0.0);
-        let input = start.abs() + work.abs() + row.step_energy;
-        self.input = self.input.max(input);
+        let error = row.energies.error - self.error_of_load_steps;
+        let gain = error - row.energies.fracture.min(0.0);
+        self.add_input(row);
         let relative_gain = gain / self.input.max(self.floor);
         let text = || {
             format!(
@@ -140,10 +176,10 @@ impl EnergyWatch {
         Ok(Some(format!("{} ({})", text(), steps())))
     }
 
-    /// Check the fracture energy of a row of the history. Return a warning at the first row in which breaking
+    /// Check the fracture energy in the row of a time step. Return a warning at the first row in which breaking
     /// bonds have added more than [`MAX_ADDED_FRACTION`] of the energy input. Breaking bonds can add energy
     /// because a correspondence law can store more energy with fewer bonds.
-    pub fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
+    fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
         self.max_freed = self.max_freed.max(freed);
         let added = self.max_freed - freed;
@@ -238,6 +274,7 @@ mod tests {
         let mut watch = EnergyWatch {
             floor: 1e-3,
             input: 0.0,
+            error_of_load_steps: 0.0,
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,

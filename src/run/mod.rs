@@ -284,7 +284,6 @@ impl<'a> Job<'a> {
         // temperatures is not checked.
         let is_closed = !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
-        let is_quasi_static = self.problem.is_quasi_static();
         while !stepper.is_over() {
             if stepper.is_refinement_due()
                 && let Some(regridded) = stepper.at_full_step().refine()?
@@ -356,20 +355,16 @@ impl<'a> Job<'a> {
                     recorder.write_failure(stepper.at_full_step())?;
                     return Ok(LoopEnd::Failed(error));
                 }
-                if let (Some(energy), Some(row), false) =
-                    (&mut energy, recorder.row_of(&clock), is_quasi_static)
-                {
-                    let stable = stepper.at_full_step().scaled_stable_step();
-                    let growth = energy.check(row, &clock, stable, complete);
-                    let of_breaking = energy.check_breaking(row, &clock);
-                    match growth {
-                        Ok(text) => {
-                            for text in text.into_iter().chain(of_breaking) {
+                if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
+                    let simulation = stepper.at_full_step();
+                    match energy.look(row, simulation, complete) {
+                        Ok(texts) => {
+                            for text in texts {
                                 self.observer.message(&Message::Warning(text));
                             }
                         }
                         Err(error) => {
-                            recorder.write_failure(stepper.at_full_step())?;
+                            recorder.write_failure(simulation)?;
                             return Ok(LoopEnd::Failed(error));
                         }
                     }

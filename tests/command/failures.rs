@@ -527,6 +527,31 @@ fn a_load_that_sets_in_hides_no_blow_up() {
 }
 
 #[test]
+fn an_explicit_stage_after_load_steps_can_blow_up() {
+    let folder = Folder::new("blow-up-after-load-steps");
+    let pull = "traction = ['1e5', 0]";
+    let stable = crate::support::simulate::<2, _>(&pulled(pull, "time.end = 1"), |it| {
+        it.undeformed.stable_step
+    });
+    let run = |share: f64| {
+        let step = share * stable;
+        let (first, end) = (100.0 * step, 160.0 * step);
+        let stages = format!(
+            "time = {{ end = {end}, step = {step} }}
+            stage = [{{ end = {first}, method = 'static' }}, {{ off = ['pull'] }}]
+            history.every_steps = 1"
+        );
+        let deck = folder.write("deck.toml", &pulled(pull, &stages));
+        let mut command = fissure(1);
+        command.arg("run").arg(&deck).arg("--overwrite");
+        command.arg("--output").arg(folder.join("out"));
+        command
+    };
+    succeed(&mut run(0.9));
+    failing(&mut run(3.0), "reduce the time step", 1);
+}
+
+#[test]
 fn families_that_do_not_fit_in_memory() {
     let folder = Folder::new("memory");
     // A law with a bond history and some thousands of bonds per point; the history takes about 1 GB.
