@@ -1,7 +1,9 @@
 //! Thermal strain in every law: free expansion, forces as the derivative of the energy, equal bits, and
 //! closed-form stresses and curvatures.
 
-use super::invariants::{Case, cases, check_momentum, check_slope, deck, same_bits, strain_energy};
+use super::invariants::{
+    Case, cases, check_momentum, check_slope, damage, deck, same_bits, strain_energy,
+};
 use crate::support::{displace, largest_force, problem, simulate, simulate_on};
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -68,6 +70,43 @@ fn free_expansion_has_no_force_and_no_energy() {
             simulate(&heated(&case, "plane-strain", "120"), check::<2>);
         }
         simulate(&heated(&case, "3d", "120"), check::<3>);
+    }
+}
+
+/// Broken bonds do not reduce the thermal strain in the dilatation.
+#[test]
+fn the_dilatation_of_a_broken_body_contains_the_thermal_strain() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        displace(&mut simulation, |x| {
+            if x[1] > 3.0 { x.map(|x| 2.0 * x) } else { x }
+        });
+        let stretch = simulation.fields.thermal_stretch.as_ref().unwrap()[0];
+        displace(&mut simulation, |x| x.map(|x| (1.0 + stretch) * x));
+        let law = &simulation.problem.bodies[0].material.law;
+        let snapshot = Snapshot::new(&mut simulation);
+        let damage = snapshot.field(&mut simulation, Field::Damage);
+        assert!(damage.iter().any(|damage| *damage > 0.2), "{law:?}");
+        for dilatation in snapshot.field(&mut simulation, Field::Dilatation) {
+            let wanted = 3.0 * stretch;
+            assert!(
+                (dilatation / wanted - 1.0).abs() < 1e-9,
+                "{law:?}: {dilatation} {wanted}"
+            );
+        }
+    }
+    for case in cases() {
+        if case.law.critical_stretch.is_some() && case.is_conservative() {
+            let deck = heated(&case, "3d", "120");
+            let breaks = deck.replace("shape.box", "damage = 'brittle', shape.box");
+            simulate(
+                &format!(
+                    "{breaks}
+{}",
+                    damage(0.0)
+                ),
+                check::<3>,
+            );
+        }
     }
 }
 

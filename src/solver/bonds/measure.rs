@@ -308,12 +308,15 @@ impl<const D: usize> Forces<D> {
                 weighted_volume[point] = volume;
             }
             // If the law stores its weighted volume, θ is divided by this volume, which includes broken
-            // bonds. Otherwise it is divided by the sum over the intact bonds.
+            // bonds. Otherwise it is divided by the sum over the intact bonds. θ is the elastic dilatation plus
+            // the thermal strain, and `growth` contains the thermal strain of the intact bonds only.
             let volume = of_law.unwrap_or(intact[point]);
             let thermal = D as f64 * thermal_stretch.map_or(0.0, |stretch| stretch[point]);
             *growth = match Law::<D>::dilatation(law, &numbers) {
                 Some(elastic) => elastic + thermal,
-                None if volume > 0.0 => D as f64 * *growth / volume,
+                None if volume > 0.0 => {
+                    D as f64 * *growth / volume + thermal * (1.0 - intact[point] / volume)
+                }
                 None => thermal,
             };
         }
