@@ -34,6 +34,10 @@ const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 /// Estimated bytes per point for contact, from a measurement with a block of 512 000 points without contacts.
 const CONTACT: f64 = 280.0;
 
+/// Estimated bytes per point for a repeated contact search, from a measurement with two blocks of 209 000
+/// points.
+const CONTACT_SEARCH: f64 = 350.0;
+
 /// Number of work vectors of Newton's method, which are allocated in the first iteration.
 const NEWTON_VECTORS: usize = 8;
 
@@ -270,11 +274,16 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     } else {
         0.0
     };
+    let search = if problem.has_contact() {
+        CONTACT_SEARCH * counts.points
+    } else {
+        0.0
+    };
+    let largest = output.max(restart).max(search);
     Cost {
         set_up: counts.memory.peak,
-        time_loop: checkpoint.map(|checkpoint| {
-            counts.memory.resident + vectors + output.max(checkpoint).max(restart)
-        }),
+        time_loop: checkpoint
+            .map(|checkpoint| counts.memory.resident + vectors + largest.max(checkpoint)),
         results,
         checkpoint: OVERHEAD + counts.points * saved + bonds,
         rows,

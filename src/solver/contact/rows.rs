@@ -45,10 +45,14 @@ impl Rows {
                 (lengths, all)
             })
             .collect();
+        let pairs = chunks.iter().map(|(_, all)| all.len()).sum();
         let mut rows = Self {
-            starts: vec![0],
-            ..Self::default()
+            starts: Vec::with_capacity(points + 1),
+            others: Vec::with_capacity(pairs),
+            ids: Vec::with_capacity(pairs),
+            is_bonded: vec![false; pairs],
         };
+        rows.starts.push(0);
         for (lengths, all) in chunks {
             for length in lengths {
                 rows.starts
@@ -57,7 +61,6 @@ impl Rows {
             rows.others.extend(all.iter().map(|found| found.other));
             rows.ids.extend(all.iter().map(|found| found.id));
         }
-        rows.is_bonded = vec![false; rows.ids.len()];
         rows
     }
 

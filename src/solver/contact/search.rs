@@ -75,7 +75,7 @@ impl<const D: usize> Contact<D> {
     ) {
         let skin = SKIN * self.largest;
         let reach = self.largest + skin;
-        let own: Vec<Ghost> = (0..model.owned())
+        let mut all: Vec<Ghost> = (0..model.owned())
             .map(|point| {
                 let reference = model.position(point);
                 let mut place = reference;
@@ -92,8 +92,8 @@ impl<const D: usize> Contact<D> {
                 }
             })
             .collect();
-        self.ghosts = Ghosts::within(comm, self.dimension, &own, reach);
-        let all: Vec<Ghost> = own.iter().chain(&self.ghosts.points).copied().collect();
+        self.ghosts = Ghosts::within(comm, self.dimension, &all, reach);
+        all.extend_from_slice(&self.ghosts.points);
         let places: Vec<[f64; 3]> = all.iter().map(|point| point.place).collect();
         let cells = Cells::new(&places, reach, D);
         let edge = |index: usize| match index.checked_sub(model.owned()) {
