@@ -72,7 +72,9 @@ pub fn tree(script: &Script) -> Node {
 /// If data that a run needs is missing or wrong.
 pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     let commands = &script.commands;
-    let first = commands.iter().position(|command| command.name() == "run");
+    let first = commands
+        .iter()
+        .position(|command| command.name() == "run" && !makes_no_step(command));
     let (before, after) = commands.split_at(first.unwrap_or(commands.len()));
     let without = without_effect(before);
     let mut model = Model::default();
@@ -111,7 +113,7 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     run.write(translation, &model)
 }
 
-/// Return the node ids of fixes that are defined before the first run but inactive during this run, with the
+/// Return the node ids of commands before the first run that have no effect in this run, with the
 /// reason.
 fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
     let mut acting: HashMap<&str, usize> = HashMap::new();
@@ -121,6 +123,9 @@ fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
             continue;
         };
         match command.name() {
+            "run" => {
+                without.insert(command.node.id, NO_STEP);
+            }
             "fix" => {
                 if let Some(earlier) = acting.insert(id, command.node.id) {
                     without.insert(earlier, "a later `fix` of the same id replaces it");
@@ -135,6 +140,15 @@ fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
         }
     }
     without
+}
+
+/// Reason why `run 0` is left out.
+const NO_STEP: &str = "it makes no step";
+
+/// Test whether a command is `run 0`. Scripts of `peri/lps` and similar styles need this command before the
+/// first step.
+fn makes_no_step(command: &Command) -> bool {
+    command.name() == "run" && command.arguments() == ["0"]
 }
 
 /// Create an error for a command.

@@ -2,7 +2,7 @@
 
 use super::fixes::fix;
 use super::setup::{Group, ignored};
-use super::{Model, Velocity, wrong};
+use super::{Model, NO_STEP, Velocity, makes_no_step, wrong};
 use crate::error::Result;
 use crate::import::draft::{Section, Value};
 use crate::import::script::{Command, Variables};
@@ -162,6 +162,7 @@ pub(super) fn follow(
 ) -> Result<()> {
     let node = &command.node;
     match command.name() {
+        "run" if makes_no_step(command) => translation.log.left_out(node, NO_STEP),
         "run" => {
             let fail = |message: &str| wrong(translation, command, message);
             let step = variables.step.filter(|step| *step > 0.0);
