@@ -1,4 +1,4 @@
-//! Components and invariants of the values of a point: vectors and tensors as the result stores them.
+//! Components and invariants of vectors and tensors, in the order in which a result stores their values.
 
 use nalgebra::Matrix3;
 

@@ -25,9 +25,8 @@ pub struct Isotropic {
 }
 
 impl Isotropic {
-    /// Compute the solid from two different constants in any order. `None` if both constants are the same
-    /// one, if the values do not determine a stable solid (E > 0 and −1 < ν < 1/2), or if λ + 2G of the solid
-    /// is not finite.
+    /// Compute the solid from two constants in any order. `None` if both are the same constant, if the values
+    /// do not determine a stable solid (E > 0 and −1 < ν < 1/2), or if λ + 2G is not finite.
     pub fn from_two(a: (Constant, f64), b: (Constant, f64)) -> Option<Self> {
         use Constant::{Bulk, Lame, Poisson, Shear, Young};
         let order = |constant| match constant {

@@ -11,10 +11,11 @@ use std::ops::Range;
 pub enum ErrorKind {
     /// The deck, a file that it names, or the command line is wrong: exit code 2.
     Input,
-    /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
+    /// The run itself failed, for example because of the disk, the memory or a value that is not finite: exit
+    /// code 1.
     Run,
-    /// A signal has stopped the command `fissure sweep`, or a run before its first step: exit code 75, which
-    /// `sysexits.h` defines as "try again".
+    /// A signal or a time limit has stopped `fissure sweep`, or a signal has stopped a run before its first
+    /// step. The exit code is 75, which `sysexits.h` defines as "try again".
     Stopped,
 }
 
@@ -45,8 +46,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
-/// Format a user's text for a message: in backticks, with escaped control characters. Of a longer text, the
-/// message contains only the first `EXCERPT` characters, followed by `…`.
+/// Format a user's text for a message: in backticks, with escaped control characters. A text of more than
+/// `EXCERPT` characters is cut after these characters, and `…` is appended.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {
@@ -81,8 +82,7 @@ impl Error {
         Self::new(ErrorKind::Run, message)
     }
 
-    /// Create an error for a run that a signal has stopped before its first step, or for a stopped
-    /// `fissure sweep`.
+    /// Create the error of a stop: see [`ErrorKind::Stopped`].
     pub fn stopped(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Stopped, message)
     }
@@ -95,13 +95,12 @@ impl Error {
         }
     }
 
-    /// Test whether a signal has stopped the run or `fissure sweep`. Such a stop is not a failure.
+    /// Test whether a run or `fissure sweep` was stopped. Such a stop is not a failure.
     pub fn is_stop(&self) -> bool {
         self.kind == ErrorKind::Stopped
     }
 
-    /// Return the process's exit code: 1 for a failed run, 2 for wrong input, 75 for a run or `fissure sweep`
-    /// that a signal has stopped.
+    /// Return the process's exit code: 1 for a failed run, 2 for wrong input, 75 for a stop.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Run => 1,

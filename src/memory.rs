@@ -31,9 +31,9 @@ pub fn check_room(needed: u64) -> Result<(), Shortage> {
     Ok(())
 }
 
-/// Return the memory that this process can still allocate, bytes: the smallest of the amounts that the limit
-/// of the address space (`ulimit -v`), the control group and the machine leave. `u64::MAX` on systems that
-/// report none of the three.
+/// Return the memory that this process can still allocate, bytes. The limit of the address space
+/// (`ulimit -v`), the control group and the machine each leave some memory; the smallest of these amounts is
+/// returned. `u64::MAX` on systems that report none of the three.
 fn available() -> u64 {
     let limits = [address_space(), control_group(), machine()];
     limits.into_iter().flatten().min().unwrap_or(u64::MAX)
@@ -53,9 +53,9 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory and swap that the control groups of this process leave, bytes: the smallest amount that
-/// is left in the group of the process or in a group above it. `None` if none of these groups has a limit, or
-/// on systems without control groups of version 2.
+/// Return the memory and swap that the control groups of this process leave, bytes: the smallest of the
+/// amounts that are left in the group of the process and in the groups above it. `None` if none of these
+/// groups has a limit, or on systems without control groups of version 2.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;

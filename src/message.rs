@@ -27,8 +27,9 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Return the suggestion for an error on an unknown name: `; did you mean …? (known: …)`. Without a similar
-/// name, the result is only the part in parentheses. If `known` is empty, this part is `(none is defined)`.
+/// Return the suggestion for an error about an unknown name: `; did you mean …? (known: …)`. Without a
+/// similar name, the result is only the part in parentheses. If `known` is empty, this part is
+/// `(none is defined)`.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let mean = nearest(name, known.iter().copied())

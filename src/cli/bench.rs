@@ -105,7 +105,7 @@ pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
     share.ok_or_else(|| format!("must be a number, 0 to {MOST_TOUCHING}"))
 }
 
-/// Return the number of cracks. The cracks are normal to x, and the points on their faces are about the
+/// Return the number of cracks normal to x, such that the points on the faces of the cracks are about the
 /// requested fraction of all points.
 fn cracks(arguments: &BenchArguments) -> u64 {
     let share = arguments.contact.unwrap_or(0.0);
@@ -136,8 +136,8 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// Return the deck of the benchmark. A small initial displacement avoids zeros, with which processors could
-/// compute faster.
+/// Return the deck of the benchmark. A small initial displacement avoids zeros, because some processors
+/// compute faster with zeros.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
     let breaking = arguments.law.damage();

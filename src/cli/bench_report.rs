@@ -97,7 +97,8 @@ impl Figures {
     }
 
     /// Return the fraction of the communication time that the computation of interior bonds hides; NaN
-    /// without messages. Waiting for other ranks can make the fraction negative; 0 is then returned.
+    /// without messages. If ranks wait for each other, the computed fraction can be negative; 0 is then
+    /// returned.
     fn hidden(&self) -> f64 {
         if self.messages > 0.0 {
             (1.0 - self.messages_time / self.messages_time_alone).max(0.0)
@@ -121,7 +122,7 @@ impl Figures {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Print a table, or one line of JSON if `json`.
+    /// Print the figures as a table, or as one line of JSON if `json`.
     pub fn print(&self, json: bool) {
         if json {
             outln!("{}", self.json())

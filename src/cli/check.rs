@@ -16,12 +16,12 @@ use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
-/// Largest number of lattice cells for which `check` makes a dry run. With this number, [`MAX_POINTS`] and
-/// [`MAX_BONDS`], a dry run takes some seconds and 1 GB.
+/// Largest number of lattice cells for which `check` makes a dry run (the set-up of a run on one rank).
+/// Within this limit, [`MAX_POINTS`] and [`MAX_BONDS`], a dry run takes some seconds and 1 GB.
 const MAX_CELLS: f64 = 1e7;
 /// Largest number of points for which `check` makes a dry run.
 const MAX_POINTS: f64 = 2e6;
-/// Largest number of directed bonds for which `check` makes a dry run.
+/// Largest number of directed bonds (neighbours, summed over all points) for which `check` makes a dry run.
 const MAX_BONDS: f64 = 1.5e8;
 
 /// Validate the decks and print a report on each deck.
@@ -100,8 +100,8 @@ fn report(request: &Request) -> Result<String> {
     }
 }
 
-/// Compute the properties of the interior of each body; `None` for a body for which they cannot be computed,
-/// such as a body that is not on a lattice.
+/// Compute the properties of the interior of each body, where families are complete. `None` for a body
+/// without a lattice, and if the computation fails.
 fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
     (0..problem.bodies.len())
         .map(|body| interior(problem, body))

@@ -140,8 +140,8 @@ fn place(position: &[f64]) -> String {
     format!("[{}] m", entries.join(", "))
 }
 
-/// Append the computed properties of the interior of a body, beside the values of the classical solid. Append
-/// nothing if these properties have not been computed.
+/// Append the computed properties of the interior of a body, and the moduli of the classical solid for
+/// comparison. Append nothing if `interior` is `None`.
 pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interior>) {
     let Some(interior) = interior else {
         return;
@@ -413,7 +413,7 @@ pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
 }
 
 /// Append the first time step and the number of time steps of each explicit stage, and the number of load
-/// steps of each other stage.
+/// steps of each quasi-static stage.
 pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     let stages = problem.all_stages();
     if let ([stage], [(step, steps)]) = (&stages[..], steps) {
@@ -460,8 +460,8 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Append the estimated run times on `ranks` ranks. For explicit stages: the times of all steps, history rows
-/// and outputs. For stages with load steps: the time of one force evaluation.
+/// Append the estimated run times on `ranks` ranks. For explicit stages, append the times of all steps,
+/// history rows and outputs. For stages with load steps, append the time of one force evaluation.
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

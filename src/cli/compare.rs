@@ -16,8 +16,8 @@ use super::{Verbosity, outln, print, result_file};
 /// Compare two results, for example of two versions or machines.
 ///
 /// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
-/// largest difference, its ratio to the largest absolute value in A, and where it occurs. Attributes, which
-/// describe the run, are not compared.
+/// largest difference with its point and time, and the ratio of this difference to the largest absolute value
+/// in A. Does not compare attributes, which describe the run.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -214,11 +214,11 @@ fn report(
     text
 }
 
-/// Largest number of names in a list. Of further names, only the number is given.
+/// Largest number of names in a printed list. The list ends with the number of further names.
 const LONGEST_LIST: usize = 8;
 
-/// Append a line with the entries of `list`, such as names of fields, which only the result `name` (A or B)
-/// has. Append nothing if the list is empty.
+/// Append a line with the entries of `list`, which only the result `name` (A or B) has. `what` is the kind of
+/// the entries, such as `fields`. Append nothing if the list is empty.
 fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     if !list.is_empty() {
         let shown = list[..list.len().min(LONGEST_LIST)].join(", ");
@@ -230,8 +230,8 @@ fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     }
 }
 
-/// Append a table of differences. With `lists_equal`, the table includes equal quantities. Otherwise, the
-/// number of equal quantities is appended.
+/// Append a table of differences. With `lists_equal`, the table includes equal quantities. Otherwise, a line
+/// with the number of equal quantities follows.
 fn table(
     text: &mut String,
     heading: &str,

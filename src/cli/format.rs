@@ -20,7 +20,8 @@ pub fn si(value: f64, unit: &str) -> String {
     if !value.is_finite() || size >= TOO_LARGE {
         return format!("{value:.3e} {unit}");
     }
-    // Include rounding of the last digit, so 999.96 is not printed as 1000.0.
+    // The factor 0.99995 allows for the rounding of the last digit: 999.96 is printed as 1.000 k, not as
+    // 1000.0.
     let prefix = PREFIXES.iter().find(|(factor, _)| size >= 0.99995 * factor);
     match prefix {
         Some((factor, prefix)) => format!("{:.4} {prefix}{unit}", Digits(value / factor)),

@@ -9,7 +9,7 @@ use fissure::error::Result;
 
 use super::{CommandLine, Verbosity, file_error, outln, print};
 
-/// Print the JSON Schema of decks, with which editors complete keys and mark errors.
+/// Print the JSON Schema of decks; editors use the schema to complete keys and mark errors.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -61,7 +61,7 @@ pub struct SlurmArguments {
 enum Script {
     /// One run on several nodes, with several ranks per node and several cores per rank.
     Hybrid,
-    /// A run longer than the time limit: the job requeues itself and continues.
+    /// A run longer than the time limit: the job requeues itself and continues the run.
     Chain,
     /// Several runs of one deck: each task of a job array takes one row of a table of parameters.
     Array,

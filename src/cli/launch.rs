@@ -12,7 +12,7 @@ use fissure::run::start_mpi;
 
 use super::{errln, finish};
 
-/// Number of threads that is accepted on any host, whatever its number of cores.
+/// Number of threads that is accepted on any host, even on a host with few cores.
 const ALWAYS_ALLOWED_THREADS: usize = 64;
 
 /// Start MPI, run `body` on all ranks and finalise MPI. If `body` returns an error on one rank, `body` must
@@ -45,8 +45,8 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
 /// Delay before the processes other than rank 0 exit, so that rank 0 can print an error.
 const EXIT_DELAY: Duration = Duration::from_secs(1);
 
-/// Environment variables with the number of launched processes, innermost launcher first. `MPI_LOCALNRANKS`
-/// counts only the processes on this host.
+/// Environment variables with the number of launched processes. If launchers are nested, the variable of the
+/// innermost launcher comes first. `MPI_LOCALNRANKS` counts only the processes on this host.
 const SIZES: [&str; 5] = [
     "OMPI_COMM_WORLD_SIZE",
     "MV2_COMM_WORLD_SIZE",
@@ -115,8 +115,9 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Return the number of threads: as requested, else Slurm's cores per task, else the cores of this process.
-/// If the launcher has not bound the process to cores, ranks on one host share the cores evenly.
+/// Return the number of threads: the requested number, else Slurm's number of cores per task, else the number
+/// of cores of this process. In the last case, if the launcher has not bound the process to cores, the ranks
+/// on one host share the cores evenly.
 pub fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
@@ -152,8 +153,8 @@ pub fn cores_in(list: &str) -> usize {
     ranges.map(range).sum()
 }
 
-/// Print a warning if there are more threads than cores: on this rank or, if the ranks are not bound to
-/// cores, on this host.
+/// Print a warning if this rank has more threads than cores, or if the ranks of this host are not bound to
+/// cores and have more threads together than this host has cores.
 pub fn warn(threads: usize) {
     if let Some(warning) = warning(threads) {
         errln!("warning: {warning}");

@@ -72,8 +72,8 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
     24.0 * length as f64 * rayon::current_num_threads() as f64 / seconds
 }
 
-/// Return the size of the last-level cache, divided by the number of threads that share the cache, bytes. If
-/// the system does not tell the size, assume 64 MiB.
+/// Return the size of the last-level cache, divided by the number of threads that share the cache, bytes.
+/// `threads` is the number of threads of this rank. If the size of the cache is unknown, assume 64 MiB.
 fn share_of_cache(threads: usize) -> usize {
     let read = |name: &str| {
         let path = format!("/sys/devices/system/cpu/cpu0/cache/index3/{name}");
@@ -142,7 +142,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        /// Define the function for one instruction set.
+        /// Return the function for one instruction set.
         macro_rules! version {
             ($feature:literal, $splat:ident, $multiply_add:ident) => {{
                 #[target_feature(enable = $feature)]

@@ -32,7 +32,7 @@ macro_rules! outln {
 }
 pub(crate) use outln;
 
-/// Print a line to standard error, otherwise like [`outln`].
+/// Print a line to standard error. Ignore write errors, as [`outln`] does.
 macro_rules! errln {
     ($($words:tt)*) => {{
         use std::io::Write as _;
@@ -53,7 +53,7 @@ use fissure::error::{Error, Result};
 
 /// Peridynamics for batch jobs: cracks that start, run and branch by themselves.
 ///
-/// A deck, which is a TOML file, describes a run. Results are bit-identical on any number of MPI ranks and
+/// A deck is a TOML file that describes a run. Results are bit-identical on any number of MPI ranks and
 /// threads.
 #[derive(Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
@@ -154,12 +154,12 @@ struct RunArguments {
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
-    /// Override keys of the deck with those of another deck; may be repeated.
+    /// Override keys of the deck with those of another deck. May be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter or any key of the deck; give a key with its section, such as time.safety=0.4;
-    /// may be repeated.
+    /// Override a parameter or any key of the deck. Give a key with its section, such as time.safety=0.4. May
+    /// be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
@@ -192,11 +192,12 @@ struct CheckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Override keys of the decks with those of another deck; may be repeated.
+    /// Override keys of the decks with those of another deck. May be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter or any key of the decks; give a key with its section; may be repeated.
+    /// Override a parameter or any key of the decks. Give a key with its section, such as time.safety=0.4.
+    /// May be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 
@@ -220,11 +221,12 @@ struct DeckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Override keys of the decks with those of another deck; may be repeated.
+    /// Override keys of the decks with those of another deck. May be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter or any key of the decks; give a key with its section; may be repeated.
+    /// Override a parameter or any key of the decks. Give a key with its section, such as time.safety=0.4.
+    /// May be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
@@ -259,12 +261,13 @@ struct BenchArguments {
     #[arg(long)]
     no_failure: bool,
 
-    /// Add contact. SHARE, from 0 to 0.25, is the fraction of the points that touch other points; these
+    /// Add contact. SHARE, from 0 to 0.25, is the fraction of the points that touch other points. These
     /// points lie on the faces of closed cracks. Without SHARE, no points touch.
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Number of points, rounded to a cube number, or numbers of points X,Y,Z along the edges of a block.
+    /// Number of points of a cube, rounded to the nearest cube number, or numbers of points X,Y,Z along the
+    /// edges of a block.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 
@@ -308,7 +311,7 @@ pub fn main() -> ExitCode {
         }
         Err(error) => {
             // A launcher kills all ranks when one rank exits with an error, perhaps before rank 0 has printed
-            // the message. With MPI running, all ranks exit together.
+            // the message. Start MPI, because MPI makes the ranks wait for each other at the exit.
             let _together = (error.exit_code() != 0 && rank.is_some()).then(World::start);
             if speaks {
                 // Ignore write errors, such as a closed pipe.
@@ -343,7 +346,8 @@ pub fn main() -> ExitCode {
     finish(outcome, true)
 }
 
-/// Run `work` on all decks, even after an error. Print all errors except the last error, which is returned.
+/// Run `work` on all decks, even after an error. Print all errors except the last one, and return the last
+/// one.
 ///
 /// # Errors
 /// The last error of `work`.

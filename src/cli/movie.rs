@@ -15,7 +15,7 @@ use super::plot::picture::{PictureArguments, beside, nothing_to_draw};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 
-/// Draw a field over time as an animated PNG, which browsers and slides play.
+/// Draw a field over time as an animated PNG, for browsers and presentations.
 ///
 /// All frames have the same axes, size and range of colours.
 #[derive(Args)]
@@ -75,7 +75,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     if let Some(folder) = &arguments.frames {
         create_folder(folder)?;
     }
-    // Each output is read twice: first for the range of colours of all frames, then to draw a frame.
+    // Each output is read twice: first to find the common settings of all frames, then to draw a frame.
     let count = chosen.len() as u64;
     let mut progress = Progress::new(verbosity > Verbosity::Quiet, "frame", 0, 2 * count);
     let frames = (1..).zip(&chosen).map(|(number, index)| {

@@ -41,8 +41,8 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// Create a display for the work after step `first` up to step `last`; no display unless `shown`. `noun`
-    /// is the word for a step in the display.
+    /// Create a display for the work after step `first` up to step `last`. If `shown` is false, there is no
+    /// display. `noun` is the word for a step in the display.
     pub fn new(shown: bool, noun: &'static str, first: u64, last: u64) -> Self {
         if !shown {
             return Self::Silent;

@@ -56,7 +56,7 @@ fn run_deck(
     let stem = arguments.deck.file_stem().unwrap_or_default();
     let folder = arguments.output.clone();
     let hosts = world.hosts();
-    // The words of the command line may have any bytes, but attributes of the result must be UTF-8.
+    // The command line may contain any bytes, but attributes of the result must be UTF-8.
     let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let command_line: Vec<String> = words.collect();
     let options = Options {

@@ -29,7 +29,7 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    // After a refinement, the number of bonds of earlier steps is not known, so the rate is omitted.
+    // After a refinement, the number of bonds in earlier steps is unknown, so the rate is omitted.
     if !summary.is_refined {
         line("bond updates", si(bond_updates(summary), "/s"));
     }

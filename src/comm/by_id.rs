@@ -18,7 +18,8 @@ pub struct IdOrder {
     /// For each rank q: the local indices of the points that this rank owns and whose ids are in the range of
     /// q.
     owned: Vec<Vec<u32>>,
-    /// For each rank q: the rows of this rank's range of ids whose points q owns.
+    /// For each rank q: the positions, within this rank's range of ids, of the points that q owns, in the
+    /// order in which q lists these points.
     rows: Vec<Vec<u32>>,
 }
 

@@ -1,5 +1,5 @@
 //! Switch for the fsync of files that are written through MPI. HDF5 calls `MPI_File_sync` at every flush,
-//! also if no fsync is needed.
+//! even if no fsync is needed.
 
 use std::cell::Cell;
 use std::os::raw::c_int;

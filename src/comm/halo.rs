@@ -1,6 +1,6 @@
-//! The halo plan: the owned points sent to each rank, and the ghosts received from it.
+//! The halo plan: the owned points sent to each rank, and the ghosts received from each rank.
 //!
-//! Ghosts follow the owned points, grouped by owner and sorted by id. So the ghosts of one owner are
+//! Ghosts follow the owned points, grouped by owner and sorted by id. Therefore the ghosts of one owner are
 //! one contiguous range.
 
 use std::ops::Range;

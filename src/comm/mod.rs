@@ -36,8 +36,8 @@ pub struct PeerBuffers {
 /// Work that overlaps with an exchange; see [`Communicator::exchange`].
 pub type During<'a> = dyn FnMut(&mut dyn FnMut() -> bool) + 'a;
 
-/// A group of ranks. All methods except [`Self::rank`], [`Self::size`], [`Self::abort`] and [`Self::raw`]
-/// are collective.
+/// A group of ranks. All methods except [`Self::rank`], [`Self::size`], [`Self::abort`] and [`Self::raw`] are
+/// collective.
 pub trait Communicator {
     /// This rank's number, from 0.
     fn rank(&self) -> usize;
@@ -57,8 +57,7 @@ pub trait Communicator {
     /// Send `outgoing[q]` to rank q. Return the received buffers by rank.
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
 
-    /// Gather the bytes of all ranks, concatenated in rank order. Ranks may have different numbers of
-    /// bytes.
+    /// Gather the bytes of all ranks, concatenated in rank order. Ranks may have different numbers of bytes.
     fn all_gather(&self, own: &[u8]) -> Vec<u8>;
 
     /// Send and receive all buffers, and call `during` while messages are in flight.
@@ -113,9 +112,9 @@ pub struct Found<T, const N: usize = 1> {
     pub payload: T,
 }
 
-/// Find the candidate with the smallest key over all ranks. Among candidates with this key, the ids are
-/// compared in lexicographic order. `None` if there are no candidates. The result is the same on all ranks.
-/// Collective.
+/// Find the candidate with the smallest key over all ranks. Among candidates with equal keys, the ids decide,
+/// in lexicographic order. `own` is the candidate of this rank. `None` if there are no candidates. The result
+/// is the same on all ranks. Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,

@@ -99,7 +99,7 @@ impl World {
         })
     }
 
-    /// Take the empty set of requests; all earlier requests have completed.
+    /// Borrow the vector of requests. This vector is empty, because all earlier requests have completed.
     fn in_flight(&self) -> InFlight<'_> {
         InFlight(self.requests.borrow_mut())
     }
@@ -140,8 +140,8 @@ impl InFlight<'_> {
     /// The bytes must stay valid and unchanged until `self` is dropped, and `self` must be dropped.
     unsafe fn send(&mut self, bytes: &[u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks(LARGEST_MESSAGE) {
-            // SAFETY: the caller keeps the chunk valid, and its length fits a C integer. MPI aborts
-            // the job on an invalid rank or call.
+            // SAFETY: the caller keeps the chunk valid, and its length fits a C integer. MPI aborts the job
+            // on an invalid rank or call.
             self.0.push(unsafe {
                 let mut request = mpi_sys::RSMPI_REQUEST_NULL;
                 mpi_sys::MPI_Isend(
@@ -307,8 +307,8 @@ impl Communicator for World {
         let mut in_flight = self.in_flight();
         for peer in buffers.iter_mut() {
             let bytes = bytemuck::cast_slice_mut(&mut peer.receive);
-            // SAFETY: `buffers` outlives `in_flight`, is borrowed exclusively by this function, and is
-            // not accessed before the drop.
+            // SAFETY: `buffers` outlives `in_flight`, is borrowed exclusively by this function, and is not
+            // accessed before the drop.
             unsafe { in_flight.receive(bytes, peer.rank, HALO_TAG) };
         }
         for peer in buffers.iter() {

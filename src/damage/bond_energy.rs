@@ -15,9 +15,9 @@ use crate::dimension::Dimension;
 pub enum Calibration {
     /// Breaking all bonds across a unit area dissipates the fracture energy.
     Energy,
-    /// Opening a crack dissipates the fracture energy: w_c of [`Self::Energy`] is divided by the separation
-    /// energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run; `None`
-    /// until then.
+    /// Opening a crack dissipates the fracture energy, so w_c of [`Self::Energy`] is divided by the
+    /// separation energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run;
+    /// `None` until then.
     Opening(Option<f64>),
     /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no factor ½, and in the plane w_c is
     /// 3G0/(πδ³h). This w is the work on η, so the criterion holds for small rotations only.

@@ -56,10 +56,12 @@ pub type HorizonRatios = [[f64; 2]; 2];
 ///
 /// An end e acts on the bond if the bond is within the horizon of e. The energy of the bond at this end is
 /// then ½ k_e s² |ξ|, with the stiffness k_e.
+///
 /// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k, with the critical stretch
 /// t_k of point k and the factor r_ek of [`Self::ratios`].
-/// The bond breaks when the energies of the acting ends add up to the sum of their energies at the stretches
-/// m_e: s² = Σ k_e m_e²/Σ k_e.
+///
+/// The bond breaks when the sum of the energies of the acting ends reaches the sum of their energies at the
+/// stretches m_e. The critical stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. r_ek is 1 if
@@ -141,16 +143,16 @@ impl Sense {
     }
 }
 
-/// Data of both ends of eight bonds that criteria read, besides laws and point numbers.
+/// Data that criteria read at both ends of eight bonds, in addition to laws and point numbers.
 #[derive(Clone, Copy)]
 pub struct Ends<'a> {
-    /// Data of points i and j that only criteria read.
+    /// Data of points i and j.
     pub limits: [&'a Limits; 2],
     /// Influence function times volume correction of the bonds.
     pub weights: Weights,
 }
 
-/// Data of eight points. Criteria read these data at both ends of a bond.
+/// Data that only criteria read, at one end of eight bonds.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Stretches, works (J/m⁶) or stresses (Pa) at which the bonds of the points break.
@@ -371,8 +373,8 @@ impl Criterion {
 
     /// Return the fraction of the energy of each broken bond that exceeds the criterion: 1 − (s_c/s)²,
     /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0, with the threshold s_c, w_c or σ_c. Bonds exceed the criterion
-    /// because it is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`, the
-    /// factor [`Law::toughness_scale`] of laws that scale critical stretches.
+    /// because the criterion is checked only once per step. Criteria of stretch read [`Bond::stretch`] and
+    /// `scale`, the factor [`Law::toughness_scale`] of laws that scale critical stretches.
     #[inline(always)]
     pub fn overshoot<S: Simd, const D: usize>(
         &self,

@@ -30,8 +30,8 @@ use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 
-/// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, few bonds
-/// have a large critical work, and these bonds hold the faces of cracks together.
+/// Maximum number of squarings of c, so k is at most 2. With k = 4 and a horizon of three spacings, only few
+/// bonds would have a large critical work. These bonds would hold the faces of cracks together.
 const MOST_SQUARINGS: u32 = 1;
 
 /// Minimum of p.
@@ -96,7 +96,7 @@ impl ToughnessByDirection {
         })
     }
 
-    /// Compute w_c/w of eight bonds. Both ends of a bond compute the same bits.
+    /// Compute w_c/w of eight bonds from ξ and `inverse`, 1/|ξ|. Both ends of a bond compute the same bits.
     #[inline(always)]
     fn factor<S: Simd, const D: usize>(&self, simd: S, xi: [Lanes; D], inverse: Lanes) -> Lanes {
         let mut along = xi[0] * self.axis[0];

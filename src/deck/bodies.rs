@@ -18,7 +18,7 @@ use crate::problem;
 /// longest bond in the bond search. These tables grow with the square of the number of bodies.
 const MOST_BODIES: usize = 256;
 
-/// Validate the bodies.
+/// Validate the bodies. `spacing` has the edges of a lattice cell in `[grid]`, m.
 ///
 /// # Errors
 /// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
@@ -138,11 +138,10 @@ fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     Ok(())
 }
 
-/// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin,
-/// so that their points stay aligned. In each direction, the origin follows from the first body
-/// with this spacing that is a whole number of cells long between flat faces. The origin is 0 if a
-/// grid with this origin fills the body exactly, otherwise the lower face of the body. Without such
-/// a body, the origin is 0.
+/// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin, so that
+/// their points stay aligned. In each direction, the origin depends on the first body with this spacing that
+/// is a whole number of cells long between flat faces. The origin is 0 if a grid with the origin 0 fills this
+/// body exactly, otherwise the lower face of the body. Without such a body, the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -192,9 +191,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 }
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
-/// faces normal to this axis. For the sides of a prism or polygon, even if they are slanted, these are the
-/// smallest and the largest coordinate of the corners. A union has the lowest and the highest of the faces of
-/// its parts, and no flat faces if a part has none. A difference has the faces of its first part.
+/// faces normal to this axis. Across the sides of a prism or polygon, the positions are the smallest and the
+/// largest coordinate of the corners, even if the sides are slanted. A union has the lowest and the highest
+/// face of its parts, and no flat faces if a part has none. A difference has the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),

@@ -14,8 +14,8 @@ use crate::problem::{self, Action, Depth, Selector};
 /// Validate the initial values.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression or file, a table without values, or a table with both a
-/// file and expressions. On a velocity in a run that begins with a method that computes equilibria.
+/// On an unknown set, an invalid expression or file, a table without values, or a table with both a file and
+/// expressions. On an initial velocity in a run whose first stage is quasi-static.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,

@@ -197,8 +197,8 @@ pub(super) fn rule(
     }))
 }
 
-/// Return the names of the two bodies of a pair; return an error on an unknown body or another
-/// number of names.
+/// Return the names of the two bodies of a pair; return an error on an unknown body, or unless there are
+/// exactly two names.
 fn pair(
     scope: &Scope,
     key: &str,

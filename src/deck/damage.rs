@@ -214,7 +214,7 @@ fn of_crack<'a>(energy: &'a Option<Number>, toughness: &'a Option<Number>) -> [M
     ]
 }
 
-/// Return the toughness, from the only measure that the table gives.
+/// Return the toughness. A table without exactly one measure of toughness is an error.
 fn measure<T>(
     scope: &Scope,
     table: &Spanned<T>,

@@ -21,7 +21,7 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
 /// # Errors
-/// On bonded bodies whose laws exert forces of different directions, and on an invalid or repeated pair. Also
+/// On bonded bodies whose laws exert forces in different directions, and on an invalid or repeated pair. Also
 /// on a rule or strength that the material laws of a pair do not allow. The solver checks whether the laws
 /// allow the damage law of a pair.
 pub fn interface(
@@ -94,7 +94,7 @@ pub fn interface(
     Ok(interface)
 }
 
-/// Context for the validation of the damage of a pair's bonds.
+/// Context for the validation of `damage` and `strength` of a pair of bodies.
 struct Damages<'a> {
     scope: &'a Scope<'a>,
     key: &'a str,
@@ -235,7 +235,7 @@ fn pair(
     Ok([a.min(b), a.max(b)])
 }
 
-/// Return an error if the laws of two bodies exert forces of different directions on a bond.
+/// Return an error if the laws of two bodies exert forces in different directions on a bond.
 fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
     let law = |body: &problem::Body| body.material.law.declaration;
     let linear = pair.into_iter().find(|body| law(body).linear);

@@ -155,8 +155,7 @@ impl Section<'_> {
     }
 
     /// Return the elastic constants of the material. A bond-based law fixes Poisson's ratio, except for a bar
-    /// under uniaxial stress. Some laws compute the elastic constants from the keys that only these laws
-    /// have.
+    /// under uniaxial stress. Some laws compute the elastic constants from their own keys.
     fn elastic(&self, law: &problem::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
         if let Some(own) = own {

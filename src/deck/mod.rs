@@ -57,13 +57,13 @@ pub struct Deck {
     with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
-/// Read a deck. `set` has pairs of a name and a value or expression. The name is that of a parameter, a key
-/// with its section, such as `time.safety`, or a key outside of all sections, such as `thickness`.
+/// Read a deck. `set` has pairs of a name and a value or expression. The name is a parameter, a key with its
+/// section (`time.safety`), or a key outside of all sections (`thickness`).
 ///
 /// # Errors
 /// If the file cannot be read, its text does not follow the grammar, or an entry of `set` has an unknown name
-/// or an invalid value. The message has file, line, column, key and the allowed values; about an entry of
-/// `set`, it has the name and the value.
+/// or an invalid value. The message has file, line, column, key and the allowed values. For an entry of
+/// `set`, the message has the name and the value instead.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
     read_with(path, &[], set)
 }

@@ -13,7 +13,7 @@ pub struct Origins {
     pieces: Vec<Piece>,
 }
 
-/// A byte range of the merged text that comes from a file.
+/// A byte range of the merged text (`changed`) that comes from a file.
 #[derive(Debug)]
 struct Piece {
     changed: Range<usize>,

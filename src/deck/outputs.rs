@@ -1,4 +1,4 @@
-//! Validation of the result's content and interval, of checkpoints and of rebalancing.
+//! Validation of the content and interval of results, of checkpoints, and of rebalancing.
 
 use super::grammar::{self, Balance, Deck};
 use super::resolve::{Scope, find};

@@ -27,7 +27,7 @@ pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<(
             return Err(scope.error(name.span(), message));
         }
     }
-    // Each round evaluates the parameters that depend on evaluated parameters only.
+    // Each round evaluates the parameters that depend only on parameters that are already evaluated.
     while scope.parameters.len() < written.len() {
         let before = scope.parameters.len();
         for (name, number) in written {

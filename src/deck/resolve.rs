@@ -1,4 +1,4 @@
-//! Numbers, vectors and expressions of a deck, evaluated against its parameters.
+//! Evaluation of the numbers, vectors and expressions of a deck.
 
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -20,7 +20,8 @@ use crate::message::suggestion;
 /// Allowed lengths, m. Squares and volumes of these lengths do not overflow or underflow.
 const LENGTHS: RangeInclusive<f64> = 1e-30..=1e30;
 
-/// Context for the evaluation of values: text, parameters, tables and dimension of the deck.
+/// Context for the evaluation of values: text, parameters, tables and dimension of the deck. In the methods,
+/// `key` is the section and key in error messages, such as `[time] end`.
 pub struct Scope<'a> {
     /// Text of the deck, for error messages.
     pub source: &'a Source,
@@ -260,8 +261,8 @@ impl<'a> Scope<'a> {
         Ok((scaled / scaled.dot(&scaled).sqrt()).into())
     }
 
-    /// Return the index of the only given key among mutually exclusive keys. No key and several keys are
-    /// errors. `place` is the byte range of the table with these keys.
+    /// Return the index of the only given key among mutually exclusive keys. It is an error if none or
+    /// several of the keys are given. `place` is the byte range of the table with these keys.
     pub fn exactly_one(
         &self,
         place: Range<usize>,

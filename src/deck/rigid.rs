@@ -14,8 +14,8 @@ use crate::problem::{self, RigidMotion, RigidShape, Shape};
 ///
 /// # Errors
 /// On a missing or surplus shape, and on a shape that cannot be rigid. On keys of free bodies for a driven
-/// body, or the reverse. On a free half space, on a free body or friction in a relaxation, and on numbers out
-/// of range.
+/// body, and on `motion` for a free body. On a free half space, on a free body or friction in a relaxation,
+/// and on numbers out of range.
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies

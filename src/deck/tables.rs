@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-9;
 /// Maximum size of a file, bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// Default names of the column of times, in upper or lower case.
+/// Default names of the column of times; upper and lower case are equivalent.
 const TIME: [&str; 2] = ["t", "time"];
 
 /// Read the tables, and store them in the scope.

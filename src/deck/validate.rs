@@ -1,4 +1,4 @@
-//! Validation of a deck: convert the grammar to the problem, check every value and resolve every name.
+//! Validation of a deck: conversion of the parsed deck to a problem, with a check of every value and name.
 
 use super::grammar::{ConstraintName, Deck, DimensionName, Family, VolumeCorrection};
 use super::number::{Edges, Number};

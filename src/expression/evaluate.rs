@@ -7,7 +7,7 @@ use super::{Table, Variable};
 /// Largest absolute integer exponent for which a power is computed by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
 
-/// Stack size, in values, that is enough for nearly all expressions. A small stack is cheap to set to zero.
+/// Stack size, in values, that is enough for nearly all expressions. Setting a small stack to zero is cheap.
 const SHALLOW_STACK: usize = 16;
 
 /// Stack size, in values, for the most deeply nested expression. A level of nesting holds at most two pending

@@ -2,8 +2,8 @@
 //!
 //! # Language
 //!
-//! Every value is a 64-bit float; a condition is true if it is not 0, and comparisons give 1 or 0.
-//! From the tightest to the loosest, the operators are:
+//! Every value is a 64-bit float. A condition is true if its value is not 0. Comparisons give 1 or 0. The
+//! operators are, from the tightest to the loosest:
 //!
 //! | operators | |
 //! |---|---|
@@ -18,9 +18,9 @@
 //! `and`, `or` and `not` are synonyms of `&&`, `||` and `!`. `not x < 1` reads like `not (x < 1)` but would
 //! mean `(not x) < 1`. A `!` at the start of a comparison therefore requires parentheses.
 //!
-//! The variables are `x`, `y`, `z` and `t`, where the deck allows these; the only constant is `pi`. These
-//! names hide parameters of the same name; names of functions do not. In keys that are functions of the
-//! length of a bond, `r` is the only variable; elsewhere `r` can be a parameter. The name of a
+//! The variables are `x`, `y`, `z` and `t`, where the deck allows these. The only constant is `pi`. These
+//! names hide parameters of the same name, but names of functions do not. In keys that are functions of the
+//! length of a bond, `r` is the only variable. Elsewhere, `r` can be a parameter. The name of a
 //! [table](Table) stands for the value of the table at the time `t`, and is allowed where `t` is allowed. The
 //! functions are:
 //!

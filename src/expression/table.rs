@@ -1,4 +1,4 @@
-//! Tables of values by time, with linear interpolation.
+//! Tables of values over time, with linear interpolation.
 
 /// A piecewise linear function of time.
 #[derive(Debug, Clone, PartialEq)]

@@ -554,7 +554,7 @@ impl Tree {
     }
 }
 
-/// Return the smaller value, the right one of equal values, and NaN if either is NaN.
+/// Return the smaller value, `right` if both are equal, and NaN if either is NaN.
 fn lesser(left: f64, right: f64) -> f64 {
     if left.is_nan() || right.is_nan() {
         f64::NAN

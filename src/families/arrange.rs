@@ -7,8 +7,8 @@ use crate::partition::Domain;
 
 use super::grid::GridFrame;
 
-/// Number of lines per tile in y and in z. The points are sorted tile by tile; the points of a tile and their
-/// neighbours fit in the cache.
+/// Number of lines per tile in y and in z. The points are sorted tile by tile, because the points of a tile
+/// and their neighbours fit in the cache.
 const TILE: i64 = 8;
 
 /// Local index and sort keys of a grid point.

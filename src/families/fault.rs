@@ -30,7 +30,7 @@ pub enum Fault {
     /// Bonds that do not fit in memory.
     TooLittleMemory {
         /// The pair of blocks whose lattice or weights do not fit. If the lists or bond histories of all
-        /// pairs do not fit together, the pair that takes most memory.
+        /// pairs do not fit together, this is the pair that takes most memory.
         blocks: [usize; 2],
         /// Needed and available memory.
         shortage: Shortage,

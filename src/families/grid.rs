@@ -2,10 +2,10 @@
 //! memory, and so are their neighbours at the same offset.
 //!
 //! - A slot is an index in this layout. It contains one point or is a hole.
-//! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
-//!   last. Lines are stored one after the other without gaps.
-//! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two
-//!   bands, and no line covers the space between them.
+//! - A line is a range of slots with equal y and z and ascending x, from its first local point to its last.
+//!   Lines are stored one after the other without gaps.
+//! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two bands,
+//!   and no line covers the space between them.
 
 use std::ops::Range;
 
@@ -82,7 +82,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Lay out the points of a domain that lie on a grid; `longest` is the longest bond, m.
+    /// Lay out the points of those blocks of a domain that lie on a grid; `longest` is the longest bond, m.
     ///
     /// # Errors
     /// If two points coincide, or the layout has too many holes.
@@ -125,8 +125,8 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // Width of the padding. A line is extended to all x of its band, and by the longest bond at both
-        // ends. The slots of the extended line must be in bounds.
+        // The padding must be wide enough to extend each line to all x of its band, and by the longest bond
+        // at both ends.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];
@@ -326,8 +326,8 @@ fn by_point(runs: &[Run]) -> Vec<Run> {
     sorted
 }
 
-/// The longest runs of the selected slots, split at the boundaries of chunks of [`CHUNK`] slots. Also return
-/// the index of the first run of each chunk, followed by the number of runs.
+/// Return the longest runs of the selected slots, split at the boundaries of chunks of [`CHUNK`] slots. Also
+/// return the index of the first run of each chunk, followed by the number of runs.
 fn runs(points: &[u32], selected: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut starts = Vec::new();

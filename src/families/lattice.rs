@@ -1,5 +1,5 @@
-//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is
-//! stored as one bit, without a neighbour index. Up to eight points adjacent along x form a lane group.
+//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is stored as
+//! one bit, without a neighbour index. Up to eight points adjacent along x form a lane group.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -22,9 +22,9 @@ const CHUNK: usize = 256;
 /// The bonds from points i of one block to points j of one block, both on the same grid.
 #[derive(Debug, Clone)]
 pub struct BondLattice {
-    /// Block of i, the points that sum over these bonds.
+    /// Block of the points i, which sum over these bonds.
     pub block_i: usize,
-    /// Block of j, the neighbours of the points i.
+    /// Block of the neighbours j.
     pub block_j: usize,
     /// Index of the grid among all grids.
     pub index: usize,
@@ -294,7 +294,7 @@ impl BondLattice {
         }
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
+    /// Make a bond unbreakable if `protected` is true for the local index of one of its ends.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let all = || vec![u8::MAX; self.store.intact.len()];
         let mut breakable = self.store.breakable.take().unwrap_or_else(all);

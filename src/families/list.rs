@@ -1,5 +1,5 @@
-//! List families, for any cloud of points: the neighbour indices of each point, in groups of eight, and
-//! one intact bit per bond.
+//! List families, for any cloud of points: the neighbour indices of each point, in groups of eight, and one
+//! intact bit per bond.
 
 use rayon::prelude::*;
 
@@ -13,9 +13,9 @@ const CHUNK: usize = 512;
 /// The bonds from points i of one block to points j of one block.
 #[derive(Debug, Clone, Default)]
 pub struct BondList {
-    /// Block of i, the points that sum over these bonds.
+    /// Block of the points i, which sum over these bonds.
     pub block_i: usize,
-    /// Block of j, the neighbours of the points i.
+    /// Block of the neighbours j.
     pub block_j: usize,
     /// Local index of each row's point, ascending.
     pub(super) points: Vec<u32>,
@@ -160,7 +160,7 @@ impl BondList {
         (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
+    /// Make a bond unbreakable if `protected` is true for the local index of one of its ends.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let all = || vec![u8::MAX; self.neighbours.len()];
         let mut breakable = self.store.breakable.take().unwrap_or_else(all);

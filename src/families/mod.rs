@@ -70,7 +70,7 @@ impl BlockBonds {
         with!(self, bonds => bonds.bytes())
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
+    /// Make a bond unbreakable if `protected` is true for the local index of one of its ends.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         with!(self, bonds => bonds.protect(protected));
     }

@@ -14,8 +14,8 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
 use super::neighbours::Neighbours;
 
-/// Relative tolerance of the cutoff. Without it, round-off would decide whether bonds as long as the horizon
-/// exist.
+/// Relative tolerance of the cutoff. Without this tolerance, round-off would decide whether bonds as long as
+/// the horizon exist.
 const HORIZON_TOLERANCE: f64 = 1e-9;
 
 /// Number of points that one task searches.
@@ -97,8 +97,8 @@ struct Chunk {
     sorted: Vec<u32>,
 }
 
-/// Build the bond lists of a domain. `cutoffs` is the symmetric `blocks` × `blocks` matrix of longest
-/// bonds, m; 0 for a pair of blocks without bonds.
+/// Build the bond lists of a domain. `cutoffs` is the symmetric `blocks` × `blocks` matrix of longest bonds,
+/// m; 0 for a pair of blocks without bonds.
 ///
 /// # Errors
 /// If two points coincide, a point has too many neighbours, or memory is insufficient.

@@ -1,5 +1,6 @@
 //! The state of bonds in groups of eight: intact bits, breakable bits, and the bond history of the law. A
-//! group contains eight neighbours of one point in a list, or eight points at one offset in a lattice.
+//! group contains eight bonds of one point in a list, or the bonds of eight points at one offset in a
+//! lattice.
 
 use std::ops::Range;
 

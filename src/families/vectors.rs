@@ -165,8 +165,7 @@ impl VectorBonds<'_> {
     #[inline(always)]
     pub unsafe fn far(&self, offset: &Offset) -> usize {
         debug_assert!((offset.line as usize) < self.shifts.len());
-        // SAFETY: the line of an offset is below the number of line offsets, and each line offset has a
-        // shift.
+        // SAFETY: `offset.line` is the index of a line offset, and each line offset has a shift.
         let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
         (self.slot as isize + (shift + offset.x) as isize) as usize
     }

@@ -1,5 +1,5 @@
-//! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family. Without correction, the
-//! factor is 1 within the horizon and 0 beyond.
+//! Volume correction: the factor Ṽ_j/V_j from the volume of a lattice cell to its corrected volume. Without
+//! correction, the factor is 1 within the horizon and 0 beyond.
 //!
 //! - `linear`: with the cell edge dx, the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so
 //!   families contain points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014).

@@ -61,7 +61,7 @@ pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &No
     }
 }
 
-/// Laws whose bonds do not break by stretch.
+/// Laws whose bonds cannot break by a critical stretch.
 const BY_ENERGY: [&str; 3] = [
     "ordinary_plastic",
     "correspondence",
@@ -72,8 +72,8 @@ const BY_ENERGY: [&str; 3] = [
 const BOND_BASED: [&str; 1] = ["pmb"];
 
 /// Write the damage law of a body and return the name of the damage law. `horizon` is the horizon of the
-/// body, m. Return `None` if the criterion is a stretch, the material law breaks bonds by energy only, and
-/// the elastic constants do not determine the fracture energy.
+/// body, m. Return `None` if the criterion is a stretch, bonds of the material law cannot break by a critical
+/// stretch, and the elastic constants do not determine the fracture energy.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,

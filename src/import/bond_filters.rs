@@ -79,7 +79,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Write a rectangle as a pre-crack; in 2-D its bottom edge.
+/// Write a rectangle as a pre-crack; in 2-D, write the bottom edge of the rectangle as a segment.
 ///
 /// From the corner, the bottom edge is b·ub and the side edge is a·(ub × n). ub is the bottom unit vector, n
 /// the normal, b the bottom length and a the side length.

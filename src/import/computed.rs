@@ -62,7 +62,7 @@ impl<'n> Quantity<'n> {
     }
 
     /// Write the quantity to the new deck. `bodies` has pairs of the name of a block and the name of the body
-    /// of this block. `has_temperature` is whether points have temperatures.
+    /// of this block. `has_temperature` says whether points have temperatures.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.

@@ -35,8 +35,8 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act; no
-    /// numbers mean all steps.
+    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act;
+    /// empty for all steps.
     pub written: Vec<(String, Vec<u64>)>,
     /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,
@@ -213,8 +213,8 @@ impl Conditions {
         Ok(())
     }
 
-    /// Write the initial values, one table per set. In points of several sets, the last table counts. Log the
-    /// initial values that a later table may replace by 0.
+    /// Write the initial values, one table per set. At a point in several sets, the last table counts. Log
+    /// the initial values that a later table may replace by 0.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self

@@ -90,8 +90,8 @@ impl Constants {
     /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return false if
     /// the constants determine neither modulus.
     ///
-    /// If `factor` is given, a bulk modulus is that of the plane, and `factor` is Young's modulus divided by
-    /// this bulk modulus. Without `factor`, a bulk modulus is that of a solid.
+    /// With `factor`, a bulk modulus is the modulus of a plane problem, and `factor` is Young's modulus
+    /// divided by this bulk modulus. Without `factor`, a bulk modulus is the modulus of a solid in 3-D.
     pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {

@@ -51,7 +51,7 @@ pub fn rewrite(
     }
     match Expression::parse(&result, &|_| None, &[], variables) {
         Ok(expression) => Ok(match expression.as_constant() {
-            // A plain number keeps its notation; of any other constant, the value is written.
+            // A plain number keeps its notation. Any other constant expression is replaced by its value.
             Some(value) if result.parse::<f64>().is_err() => format!("{value:?}"),
             _ => result,
         }),
@@ -233,7 +233,8 @@ impl Rewriter<'_> {
         Ok((Some(set), end))
     }
 
-    /// Same as [`statement`](Self::statement), for a block in braces or one statement.
+    /// Translate a block in braces or one statement. Parameters and result are those of
+    /// [`block`](Self::block).
     fn body(
         &self,
         tokens: &[Token],
@@ -257,8 +258,8 @@ impl Rewriter<'_> {
         }
     }
 
-    /// Translate a formula in which the name `value` stands for the expression `value`, or for 0 without such
-    /// an expression.
+    /// Translate a formula. The name `value` in the formula is replaced by the expression `value`, or by 0 if
+    /// there is no such expression.
     fn with_value(
         &self,
         tokens: &[Token],

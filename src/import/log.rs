@@ -80,7 +80,7 @@ pub(super) const OTHER_INFLUENCE: &str =
 /// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
-/// Lines of keys that are left out, or of files that are read in part, which changes the results.
+/// Lines of the losses that change the results: keys that are left out, and files that are read in part.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.
@@ -138,7 +138,7 @@ impl Losses {
         losses
     }
 
-    /// Test whether no key is lost.
+    /// Test whether there are no losses.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }

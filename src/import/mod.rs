@@ -95,12 +95,12 @@ impl Import {
 ///
 /// # Errors
 /// If the file cannot be read or parsed, the code is unknown, or data that a run needs are missing or wrong.
-/// The message gives the file, and the line except if the file cannot be read.
+/// The message gives file and line, or only the file if the file cannot be read.
 pub fn import(path: &Path, code: Option<Code>, target: &Path) -> Result<Import> {
     translate(&Source::read(path)?, code, target)
 }
 
-/// Same as [`import`], for a text.
+/// Same as [`import`], for a deck that has been read.
 ///
 /// # Errors
 /// Same as [`import`].
@@ -178,7 +178,7 @@ fn finish(translation: Translation, root: &Node, code: Code, target: &Path) -> I
     }
 }
 
-/// Read the points of a problem to find errors in its files and meshes, if no body is a shape.
+/// If no body of a problem is a shape, read the points, to find errors in the point files and meshes.
 ///
 /// # Errors
 /// If a file or a set is invalid.

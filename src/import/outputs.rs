@@ -173,7 +173,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Create outputs without fields and intervals. `has_temperature` is whether points have temperatures.
+    /// Create outputs without fields and intervals. `has_temperature` says whether points have temperatures.
     pub fn new(has_temperature: bool) -> Self {
         Self {
             has_temperature,

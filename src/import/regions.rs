@@ -3,8 +3,8 @@
 use super::draft::Value;
 use super::script::Variables;
 
-/// Enlargement of a shape over its region, as a fraction of the spacing. LAMMPS includes atoms on the
-/// surface, which round-off could exclude.
+/// Distance by which a shape extends beyond its region, in spacings. LAMMPS includes atoms on the surface,
+/// which round-off could exclude.
 const MARGIN: f64 = 1e-6;
 
 /// A region; its numbers are lengths in the units of the script.

@@ -41,15 +41,15 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Set the ids of the points of each node set of the mesh, by the name of the set. Call this for PeriLab,
-    /// which counts an element as part of a node set only if all its nodes are in the set. A set that is not
-    /// in the list is written as a set of the mesh and logged as approximated.
+    /// Set the ids of the points of each node set of the mesh, by the name of the set. Call this function for
+    /// PeriLab, in which an element belongs to a node set only if all nodes of the element are in the set. A
+    /// set that is not in the list is written as a set of the mesh and logged as approximated.
     pub fn set_ids_by_name(&mut self, sets: Vec<(String, Vec<u64>)>) {
         self.ids_by_name = Some(sets);
     }
 
-    /// Add a node set of the source deck. `is_declared` is whether Peridigm or PeriLab treats the entry as a
-    /// node set because of its name or position. Any other entry is a node set only if something uses it.
+    /// Add a node set of the source deck. `is_declared` says whether Peridigm or PeriLab treats the entry as
+    /// a node set because of its name or position. Any other entry is a node set only if something uses it.
     pub fn define(&mut self, name: &str, node: &'n Node, is_declared: bool) {
         self.defined.push(Defined {
             name: name.to_owned(),
@@ -126,8 +126,8 @@ impl<'n> Sets<'n> {
         Ok(written)
     }
 
-    /// Return the number of points of a set that lists point numbers, in the deck or in a file. Return
-    /// `None` for other sets.
+    /// Return the number of points of a set whose ids are known: a node set of the mesh with ids, or a list
+    /// of point numbers in the deck or in a file. Return `None` for other sets.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
         let mut of_mesh = self.ids_by_name.iter().flatten();
         if let Some((_, ids)) = of_mesh.find(|(known, _)| known == name) {
@@ -224,7 +224,7 @@ fn set_text(node: &Node) -> Option<String> {
     }
 }
 
-/// Largest count of a range; longer lists would make the new deck unreadable.
+/// Largest number of ids in a range; longer lists would make the new deck unreadable.
 const MOST_NUMBERS: u64 = 1_000_000;
 
 /// Read the numbers of a list `1 2 3`, a range `1:27` or a range with a step `1:2:27`.

@@ -6,7 +6,7 @@ use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::{Result, excerpt};
 
-/// Number of load steps of a deck that does not give this number.
+/// Number of load steps if the deck gives none.
 const LOAD_STEPS: u64 = 1;
 
 /// Quasi-static solvers.
@@ -33,7 +33,7 @@ pub enum Method {
         /// Fraction of the stable step.
         safety: Option<Value>,
     },
-    /// A sequence of this many equilibria.
+    /// Quasi-static solution with this number of load steps.
     Equilibria(u64),
 }
 
@@ -72,7 +72,7 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Read a solver that starts at the time `start` (s), and return its stages. `damage_by_default` is whether
+/// Read a solver that starts at the time `start` (s), and return its stages. `damage_by_default` says whether
 /// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
@@ -183,7 +183,7 @@ pub fn stage(
             });
         let mut load_steps = LOAD_STEPS;
         let fixed = solver.get("Fixed dt");
-        // Only PeriLab's `Static` reads it; a value of 0 or less counts as missing.
+        // Only PeriLab's `Static` reads `Fixed dt`. A value of 0 or less counts as missing.
         let fixed = fixed.filter(|_| is_perilab && is(&["Static"]));
         let step = fixed.map(|fixed| translation.number(fixed, "Fixed dt"));
         let step = step.transpose()?.filter(|step| *step > 0.0);
@@ -267,7 +267,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Log those keys of a static solver that have not been read.
+/// Log the tolerances of a static solver, and its keys that have not been read.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
@@ -288,8 +288,9 @@ fn tolerances(translation: &Translation, solver: &Node) {
 
 /// Write the stages of a run.
 ///
-/// `conditions` holds the names of conditions and the numbers of their steps; no numbers mean all steps.
-/// Equilibria are found by Newton's method in runs without contact, and by relaxation in runs with contact.
+/// `conditions` holds the names of the conditions and the numbers of the steps in which they act; empty for
+/// all steps. Equilibria are found by Newton's method in runs without contact, and by relaxation in runs with
+/// contact.
 pub fn write(
     translation: &mut Translation,
     stages: &[Stage],

@@ -61,7 +61,7 @@ impl<'a> Translation<'a> {
         line_error(self.source, line, message)
     }
 
-    /// Return the value of a required key.
+    /// Return the value of a required key. `name` describes the table in the error message.
     ///
     /// # Errors
     /// If the key is missing.
@@ -182,7 +182,8 @@ impl<'a> Translation<'a> {
     }
 
     /// Return a name that no table of the section has yet, even if an earlier table had the same source name.
-    /// For a body, give `set` as the section: bodies are also sets, so a body and a set need different names.
+    /// For a body, pass `set` as the section: a body is also a set, so a body and a set must not have the
+    /// same name.
     pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
         let plain = slug(name);
         let taken = |written: &str| {
@@ -209,7 +210,7 @@ impl<'a> Translation<'a> {
     }
 
     /// Return the path of a file of the source deck, relative to the new deck, and note that the new deck
-    /// reads this file. An absolute path stays.
+    /// reads this file. An absolute path stays absolute.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
         self.files.borrow_mut().push(path.clone());

@@ -7,8 +7,8 @@ use super::tree::{Content, DEEPEST, MOST_NODES, Mistake, Node};
 /// Parse a YAML text of one document.
 ///
 /// # Errors
-/// If the text is empty, not YAML, too long or too deep, or a key occurs twice in a table. References, keys
-/// that are not text, and a second document are also rejected.
+/// If the text is empty, not YAML, too long or too deep, or a key occurs twice in a table. Aliases such as
+/// `*name`, keys that are not text, and a second document are also rejected.
 pub fn parse(text: &str) -> Result<Node, Mistake> {
     let mut builder = Builder {
         parser: Parser::new_from_str(text),

@@ -52,13 +52,13 @@ impl Instructions {
         Self::up_to(level[0] as usize).ok_or_else(unsupported)
     }
 
-    /// The largest set that this machine has; `None` if it has none of the sets.
+    /// Return the largest set that this machine has; `None` if the machine has none of the sets.
     pub fn of_this_machine() -> Option<Self> {
         Self::up_to(BUILT.len() - 1)
     }
 
-    /// The largest set of this machine up to a level, which is an index in [`BUILT`]; `None` if there is
-    /// none.
+    /// Return the largest set of this machine up to a level, an index in [`BUILT`]; `None` if the machine has
+    /// none of the sets.
     #[cfg(target_arch = "x86_64")]
     fn up_to(level: usize) -> Option<Self> {
         match Avx512::detect() {
@@ -67,13 +67,13 @@ impl Instructions {
         }
     }
 
-    /// The only set of this machine.
+    /// Return the only set of this machine.
     #[cfg(not(target_arch = "x86_64"))]
     fn up_to(_: usize) -> Option<Self> {
         Some(Self::Portable)
     }
 
-    /// Index in [`BUILT`].
+    /// Return the index of the set in [`BUILT`].
     fn level(self) -> usize {
         match self {
             #[cfg(not(target_arch = "x86_64"))]
@@ -85,7 +85,7 @@ impl Instructions {
         }
     }
 
-    /// Name of the set, as printed in the summary.
+    /// Return the name of the set, as printed in the summary.
     pub fn name(self) -> &'static str {
         BUILT[self.level()]
     }
@@ -97,7 +97,7 @@ fn unsupported() -> Error {
     )
 }
 
-/// Index in [`BUILT`] of the instruction set with this name. Hyphens and case are ignored.
+/// Return the index in [`BUILT`] of the instruction set with this name. Hyphens and case are ignored.
 ///
 /// # Errors
 /// If no set has this name.

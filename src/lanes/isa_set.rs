@@ -1,7 +1,7 @@
 //! Instruction sets for which a loop is compiled.
 
-/// The compiled versions of a loop on x86-64; other processors have one version. All versions give bitwise
-/// the same results.
+/// The compiled versions of a loop on x86-64; other processors have one version. All versions of a loop give
+/// bitwise the same results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IsaSet {
     /// AVX-512 and AVX2.
@@ -13,12 +13,12 @@ pub enum IsaSet {
 }
 
 impl IsaSet {
-    /// Whether there is a version for each instruction set.
+    /// Test whether there is a version for each instruction set.
     pub const fn is_each(self) -> bool {
         matches!(self, Self::Each)
     }
 
-    /// Whether there is only one version.
+    /// Test whether there is only one version.
     pub const fn is_one(self) -> bool {
         matches!(self, Self::One)
     }

@@ -1,4 +1,4 @@
-//! Tuples of [`Lanes`], and the columns of numbers from which they are read and to which they are added.
+//! Tuples of [`Lanes`], and the columns of numbers that loops read as tuples and to which they add tuples.
 
 use std::ops::{Deref, DerefMut};
 
@@ -40,17 +40,17 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// If there are fewer columns.
     fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_>;
 
-    /// The column of a quantity.
+    /// Return the column of a quantity.
     fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64];
 
     /// Split each column into the entries before `middle` and the entries from `middle` on.
     fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2];
 
-    /// The column of a quantity, to add to.
+    /// Return the column of a quantity, to add to.
     fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64];
 
-    /// Whether every column has at least `entries` entries. Quantities without a column, see
-    /// [`Self::PADDED`], are ignored.
+    /// Test whether every column has at least `entries` entries. Quantities without a column
+    /// ([`Self::PADDED`]) are ignored.
     fn covers(columns: &Self::Columns<'_>, entries: usize) -> bool {
         (0..Self::COUNT).all(|k| {
             let column = Self::column(columns, k);
@@ -65,7 +65,7 @@ pub trait LaneTuple: Copy + Send + Sync {
         Self::load_first::<Self>(columns, take)
     }
 
-    /// Same as [`Self::load`], from the first columns of another type of tuple with at least as many
+    /// Same as [`Self::load`], from the first columns of another type of tuple, which has at least as many
     /// quantities.
     #[inline(always)]
     fn load_first<T: LaneTuple>(columns: &T::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {

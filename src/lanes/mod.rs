@@ -57,44 +57,45 @@ impl Lanes {
         ])
     }
 
-    /// Square root.
+    /// Return the square root of each lane.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
         self.map(f64::sqrt)
     }
 
-    /// Exponential. A function that gives the same result on every processor is called for each lane.
+    /// Return the exponential of each lane, computed by `libm::exp`, which gives the same result on every
+    /// processor.
     #[inline(always)]
     pub fn exp(self) -> Self {
         self.map(libm::exp)
     }
 
-    /// Power with the same exponent in all lanes. Calls `libm::pow` for each lane, because it gives the same
-    /// result on every processor.
+    /// Return the power of each lane with this exponent, computed by `libm::pow`, which gives the same result
+    /// on every processor.
     #[inline(always)]
     pub fn pow(self, exponent: f64) -> Self {
         self.map(|base| libm::pow(base, exponent))
     }
 
-    /// The smaller of each pair of lanes. If either is NaN, the result is the lane of `other`.
+    /// Return the smaller lane of each pair. If one of the lanes is NaN, the result is the lane of `other`.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
     }
 
-    /// The larger of each pair of lanes. If either is NaN, the result is the lane of `other`.
+    /// Return the larger lane of each pair. If one of the lanes is NaN, the result is the lane of `other`.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
 
-    /// Absolute value.
+    /// Return the absolute value of each lane.
     #[inline(always)]
     pub fn abs(self) -> Self {
         self.map(f64::abs)
     }
 
-    /// Bits of the lanes that are larger than `limit`.
+    /// Return one bit per lane, set if the lane is larger than `limit`.
     #[inline(always)]
     pub fn above(self, limit: f64) -> u8 {
         let mut bits = 0;
@@ -104,14 +105,14 @@ impl Lanes {
         bits
     }
 
-    /// The sum of all lanes, in a fixed order.
+    /// Return the sum of all lanes, added in a fixed order.
     #[inline(always)]
     pub fn sum(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.0;
         ((a + e) + (c + g)) + ((b + f) + (d + h))
     }
 
-    /// The smallest lane. No lane may be NaN.
+    /// Return the smallest lane. No lane may be NaN.
     #[inline(always)]
     pub fn smallest(self) -> f64 {
         let mut smallest = self.0[0];

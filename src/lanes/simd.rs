@@ -9,10 +9,10 @@ use super::Lanes;
 /// Proof that the machine has an instruction set. The methods are the operations that depend on this
 /// instruction set.
 pub trait Simd: Copy + Send + Sync + 'static {
-    /// a b + c, rounded once except by [`Portable`] without fused multiply-add.
+    /// Return a b + c, rounded once except by [`Portable`] without fused multiply-add.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
 
-    /// Bits of the lanes in which `a` is at least as large as `b`.
+    /// Return one bit per lane, set if `a` is at least as large as `b`.
     #[inline(always)]
     fn at_least(self, a: Lanes, b: Lanes) -> u8 {
         let mut bits = 0;
@@ -34,7 +34,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
         result
     }
 
-    /// The lanes of `a` whose bit is set; 0 in the other lanes.
+    /// Return the lanes of `a` whose bit is set, and 0 in the other lanes.
     #[inline(always)]
     fn keep(self, a: Lanes, bits: u8) -> Lanes {
         self.select(a, bits, Lanes::splat(0.0))
@@ -43,14 +43,14 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Run a rarely needed task out of line, so that the task uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
-    /// Return `a`. With AVX2 and AVX-512, the result is opaque to the compiler, which then does not split the
-    /// operations before and after this call by lane.
+    /// Return `a`. With AVX2 and AVX-512, the compiler cannot see that the result is `a`. It then keeps the
+    /// operations before and after this call in whole vectors, instead of splitting them by lane.
     #[inline(always)]
     fn whole(self, a: Lanes) -> Lanes {
         a
     }
 
-    /// The transpose of eight rows of eight numbers: lane k of result j is number j of row k.
+    /// Return the transpose of eight rows of eight numbers: lane k of result j is number j of row k.
     #[inline(always)]
     fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
         std::array::from_fn(|column| Lanes(std::array::from_fn(|row| rows[row][column])))
@@ -246,7 +246,7 @@ mod x86 {
         task.run(simd)
     }
 
-    /// The two halves of a vector of eight numbers.
+    /// Return the two halves of a vector of eight numbers.
     #[inline(always)]
     fn halves(a: Lanes) -> [__m256d; 2] {
         // SAFETY: both types are eight numbers.
@@ -271,7 +271,8 @@ mod x86 {
         unsafe { std::mem::transmute(a) }
     }
 
-    /// Masks of four lanes, indexed by one bit per lane. All 64 bits of a selected lane are set.
+    /// Masks of four lanes. The index has one bit per lane, and all 64 bits of a lane are set if this bit is
+    /// set.
     static MASKS: [[u64; 4]; 16] = {
         let mut masks = [[0; 4]; 16];
         let mut bits = 0;
@@ -428,11 +429,11 @@ mod x86 {
         ]
     }
 
-    /// Make a value opaque to the compiler. The compiler then keeps the operations before and after this call
-    /// in whole vectors instead of splitting them by lane. Measured with rustc 1.95 on AMD Zen 3 (AVX2):
-    /// without this call, the law `pmb` in lists has only 0.68 times its speed with the call, and `ordinary`
-    /// in lattices 0.75 times. `pmb` in lattices does not need the call, and `correspondence` is faster
-    /// without the call.
+    /// Return the value, but hide from the compiler that it is unchanged. The compiler then keeps the
+    /// operations before and after this call in whole vectors, instead of splitting them by lane. Measured
+    /// with rustc 1.95 on AMD Zen 3 (AVX2): without this call, the law `pmb` in lists runs at 0.68 times the
+    /// speed, and `ordinary` in lattices at 0.75 times. `pmb` in lattices does not need the call, and
+    /// `correspondence` is faster without the call.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {

@@ -16,8 +16,8 @@ pub struct Counts {
     pub constants: usize,
     /// Count of the numbers of a point, [`Law::Point`].
     pub point: usize,
-    /// Count of the own values of a point, [`Law::OWN_NUMBERS`]. The loops over bonds do not read these
-    /// values.
+    /// Count of the own numbers of a point, [`Law::OWN_NUMBERS`]. The loops over bonds do not read these
+    /// numbers.
     pub own: usize,
     /// Count of the passes, [`Law::PASSES`].
     pub passes: usize,
@@ -45,7 +45,7 @@ impl Counts {
         }
     }
 
-    /// Return the larger of each size; `central` is true only if it is true in both.
+    /// Return the larger of each size. `central` is true only if it is true in both arguments.
     const fn or_more(self, other: Self) -> Self {
         const fn more(a: usize, b: usize) -> usize {
             if a > b { a } else { b }
@@ -86,7 +86,7 @@ fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))
 }
 
-/// Return a shorter tuple, padded with zeros.
+/// Pad a shorter tuple with zeros.
 #[inline(always)]
 fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
     B::each(|k| {
@@ -166,7 +166,7 @@ impl AnyLaw {
 
 impl PairLaw {
     /// Return [`Law::toughness_scale`] of eight bonds, from the numbers of points i and j; `None` if the law
-    /// does not define it, or if the laws of points i and j differ.
+    /// does not define this factor, or if the laws of points i and j differ.
     #[inline(never)]
     pub fn toughness_scale<const D: usize>(
         &self,
@@ -185,8 +185,8 @@ impl PairLaw {
 }
 
 /// This implementation serves bonds between different laws, and breaking bonds of all laws (`BreakingBonds`).
-/// Bonds between different laws are never linear, because a linear law is paired only with itself. Functions that are called per bond are not inlined; otherwise every loop
-/// would contain the code of all laws.
+/// Bonds between different laws are never linear, because a linear law is paired only with itself. Functions
+/// that are called per bond are not inlined. Otherwise, every loop would contain the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;

@@ -1,8 +1,7 @@
 //! Geometry of eight deformed bonds, without square roots and divisions at small strains.
 //!
-//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², the square of its length |Y| is
-//! |Y|² = |ξ|² (1 + x).
-//! Laws need two functions of x:
+//! The deformed bond is Y = ξ + η. With γ = η·(2ξ + η) and x = γ/|ξ|², its squared length is
+//! |Y|² = |ξ|² (1 + x). Laws need two functions of x:
 //!
 //! - the stretch Q(x) = √(1 + x) − 1;
 //! - the extension over the deformed length, P(x) = 1 − (1 + x)^(−½). With the micromodulus c and the stretch
@@ -51,10 +50,10 @@ pub struct Bond<const D: usize> {
     pub inverse: Lanes,
     /// x = (|Y|² − |ξ|²)/|ξ|²; for linear laws ξ·η/|ξ|².
     pub relative_square_extension: Lanes,
-    /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|². Set for intact bonds, if [`Wanted::stretch`].
+    /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|². Valid for intact bonds if [`Wanted::stretch`] is set.
     pub stretch: Lanes,
-    /// (|Y| − |ξ|)/|Y|; for linear laws ξ·η/|ξ|². Set for intact bonds, if
-    /// [`Wanted::extension_over_deformed`].
+    /// (|Y| − |ξ|)/|Y|; for linear laws ξ·η/|ξ|². Valid for intact bonds if
+    /// [`Wanted::extension_over_deformed`] is set.
     pub extension_over_deformed: Lanes,
     /// η by component, m.
     pub eta: [Lanes; D],
@@ -118,7 +117,8 @@ impl Weights {
         }
     }
 
-    /// Return the weighted sum of the contributions of i and j. Both ends compute the same bits.
+    /// Return the weighted sum of the contributions of i and j. The result has the same bits if i and j are
+    /// exchanged.
     #[inline(always)]
     pub fn sum(self, here: Lanes, there: Lanes) -> Lanes {
         match self {
@@ -138,7 +138,7 @@ pub struct Elastic<const D: usize> {
     pub slope: Lanes,
 }
 
-/// Separation of the thermal stretch a of bonds from their relative displacement η (m).
+/// Task that removes the thermal stretch a of bonds from their relative displacement η (m).
 ///
 /// Laws receive Y/(1 + a) instead of Y. Forces are multiplied by the slope 1/(1 + a), so that they remain the
 /// derivative of the energy.
@@ -274,8 +274,8 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 }
 
 impl<const D: usize> Bond<D> {
-    /// Compute [`Self::stretch`]; with `linear`, [`deform`] has set it already. Loops call this function only
-    /// for the groups of bonds that need stretches.
+    /// Compute [`Self::stretch`]. For linear laws, [`deform`] has already set the stretch. Loops call this
+    /// function only for the groups of bonds that need stretches.
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);
@@ -316,7 +316,7 @@ fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     }))
 }
 
-/// Task of [`with_far`] for the lanes with |x| above [`NEAR`]. Pairs are a number and its rounding error.
+/// Task of [`with_far`] for the lanes with |x| above [`NEAR`]. Each pair is a number and its rounding error.
 struct ClosedForm<O> {
     relative_square_extension: Lanes,
     beyond_series: u8,
@@ -383,7 +383,7 @@ mod tests {
             inverse: one,
             inverse_square: Lanes(relative_square_extension),
         };
-        // γ = η (0 + η) = 1, and the field 1/|ξ|² holds x.
+        // γ = η (2ξ + η) = 1, and `inverse_square` is x.
         deform::<_, false, 1>(simd, &reference, [one], u8::MAX, NEAR, ALL)
     }
 

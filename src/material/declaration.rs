@@ -21,7 +21,8 @@ pub struct Declaration {
     /// Whether Poisson's ratio is free, so that the deck gives two elastic constants. Otherwise the ratio is
     /// that of [bond-based laws](Dimension::bond_based_poisson_ratio).
     pub any_poisson_ratio: bool,
-    /// Reason for the lack of a 1-D form, and the alternative; `None` if the law has a 1-D form.
+    /// Message for a 1-D deck with this law: the law has no 1-D form, and the alternative if there is one.
+    /// `None` if the law has a 1-D form.
     pub no_line: Option<&'static str>,
     /// Whether forces act along ξ and are linear in the displacements, so that the law holds for small
     /// rotations only.
@@ -38,8 +39,8 @@ pub struct Declaration {
     pub breaks_by_energy: bool,
     /// Whether the stress criterion can break bonds of this law.
     pub breaks_by_stress: bool,
-    /// Return the critical stretch for a fracture energy (J/m²); `None` if no stretch criterion can break the
-    /// bonds.
+    /// Return the critical stretch for a fracture energy (J/m²). The field is `None` if no stretch criterion
+    /// can break bonds of this law.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
     /// The field is `None` for laws without such a stretch.
@@ -47,14 +48,15 @@ pub struct Declaration {
     /// Whether the law breaks bonds because of their history, in addition to a damage law. Bonds of such a
     /// law also break without a damage law.
     pub wears_out: bool,
-    /// Check the horizon, and return an error message if it is wrong; `None` if every horizon is allowed.
+    /// Return the error message for a horizon that is not allowed. The field is `None` if every horizon is
+    /// allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
     /// Whether the law, with these values of its keys, scales the critical stretch by a factor per bond. The
     /// law scales only a critical stretch that follows from a fracture energy.
     pub scales_thresholds: fn(&Values) -> bool,
     /// Create the law from the constants of one body.
     pub build: fn(&Given) -> Built,
-    /// Examples for the tests: keys in addition to density and Young's modulus.
+    /// Examples for the tests. Each example has keys in addition to density and Young's modulus.
     pub examples: &'static [&'static str],
 }
 
@@ -107,14 +109,14 @@ impl fmt::Debug for Declaration {
     }
 }
 
-/// Invariants of a law: which of these statements hold for any motion.
+/// Invariants of a law. A field is true if its statement holds for all motions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Invariants {
     /// Forces are the gradient of the strain energy. This holds neither for laws that dissipate energy nor
     /// for `stress = "willberg2022"`.
     pub conservative: bool,
-    /// Rotating a motion rotates the forces. [Linear](Declaration::linear) laws are excepted: their forces
-    /// keep the direction of ξ.
+    /// If a motion is rotated, its forces rotate with it. This does not apply to
+    /// [linear](Declaration::linear) laws, whose forces keep the direction of ξ.
     pub objective: bool,
     /// The internal forces of a body have no resultant moment.
     pub angular_momentum: bool,
@@ -267,7 +269,7 @@ impl Values {
     /// Return the number of a key.
     ///
     /// # Panics
-    /// If the key has no number: it is not declared as a number, or the deck does not give it.
+    /// If the key is not declared as a number, or has no value.
     pub fn number(&self, key: &str) -> f64 {
         match self.get(key) {
             Some(Value::Number(number)) => *number,

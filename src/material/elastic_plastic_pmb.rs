@@ -53,10 +53,11 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Return the critical stretch s0 for a fracture energy (J/m²). Breaking a bond at s0 dissipates the same
-/// energy as breaking an elastic bond at s_e, the critical stretch of `pmb` for this fracture energy.
+/// Return the critical stretch s0 for a fracture energy (J/m²). Stretching a bond to s0 and breaking it
+/// dissipates the same energy as breaking an elastic bond at s_e. Here s_e is the critical stretch of `pmb`
+/// for this fracture energy.
 ///
-/// Breaking dissipates c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
+/// The energy is c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
 /// s0 = s_e²/(2 s_y) + s_y/2 if s_e > s_y; otherwise s0 = s_e.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let elastic = bond_based_critical_stretch(given, energy);

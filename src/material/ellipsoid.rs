@@ -1,14 +1,16 @@
-//! Surface correction by axes: the factors of a point for its bonds form an ellipsoid.
+//! Surface correction by axes. The factor of a point for a bond is the radius of an ellipsoid in the
+//! direction of the bond.
 //!
-//! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. For each coordinate axis a, the factor g_a scales a sum over
-//! the family of a point, under unit extension along a, to the value of the solid. A bond of direction n has
-//! the factor g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
+//! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. Consider a unit extension along a coordinate axis a. The
+//! factor g_a scales a sum over the family of a point to the value that this sum has in the solid. A bond of
+//! direction n has the factor g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
 //!
 //! In the sources, a bond has the ellipsoid of the mean semi-axes of both ends. Here each end has its own
-//! ellipsoid, because the force state of a point depends on the numbers of this point only, and a bond-based
-//! bond has the mean of both radii. The difference is of second order in the difference of the semi-axes.
+//! ellipsoid, because the force state of a point depends on the numbers of this point only. In bond-based
+//! laws, a bond then has the mean of both radii. The difference from the sources is of second order in the
+//! difference of the semi-axes.
 //!
-//! The factors depend on the coordinate axes: they are not exact for extensions along other directions.
+//! The factors depend on the coordinate axes, so they are not exact for extensions along other directions.
 
 use nalgebra::SMatrix;
 
@@ -20,11 +22,12 @@ use crate::lanes::Lanes;
 /// plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
-/// Diagonal entry of the tensor of points without bonds of their own. Their radii are nearly 0, such that
-/// this end has no share in the bonds from other points.
+/// Diagonal entry of the tensor of a point without bonds of its own. The radii are then nearly 0, so this end
+/// contributes nothing to bonds with points of a larger horizon.
 pub const WITHOUT_BONDS: f64 = 1e300;
 
-/// Return the semi-axis g_a of the wanted value and the value of the family, at most [`LARGEST`].
+/// Return the semi-axis g_a, the ratio of the value in the solid, `wanted`, to the value of the family,
+/// `found`; at most [`LARGEST`].
 pub fn semi_axis(wanted: f64, found: f64) -> f64 {
     if found * LARGEST > wanted {
         wanted / found

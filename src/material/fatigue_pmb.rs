@@ -13,8 +13,8 @@
 //! factor.
 //!
 //! The law stores the used life 1 − λ. The number of cycles in a time step is the length of the step times
-//! [`FatiguePmb::cycles_per_second`]; all these cycles have the stretches at the end of the step. λ does not
-//! change the force of an intact bond.
+//! [`FatiguePmb::cycles_per_second`]; all these cycles have the stretch that the bond has at the end of the
+//! step. λ does not change the force of an intact bond.
 //!
 //! The law of SAND2014-18590 has separate constants A and m for the nucleation of cracks (phase I) and for
 //! their growth (phase II). This law has one pair of constants for both phases.
@@ -168,7 +168,8 @@ impl<const D: usize> Law<D> for FatiguePmb {
         if step == 0.0 || excess.above(0.0) == 0 {
             return [*used];
         }
-        // The product of 0 and infinity would be NaN, and bonds with this used life would never break.
+        // The factor must be finite and above 0. The product of 0 and infinity would be NaN, and a bond with
+        // the used life NaN would never break.
         let factor = self.coefficient * self.cycles_per_second * step;
         let factor = factor.clamp(f64::MIN_POSITIVE, f64::MAX);
         [*used + excess.pow(self.exponent) * factor]

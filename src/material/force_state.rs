@@ -15,7 +15,7 @@ pub trait ForceState<const D: usize>: Copy {
     /// Multiply by one factor per bond.
     fn times(self, factor: Lanes) -> Self;
 
-    /// Add the force state of the other end, −T_j⟨−ξ⟩.
+    /// Add `other`, which is −T_j⟨−ξ⟩ of the other end.
     fn plus(self, other: Self) -> Self;
 
     /// Add to `sums` the force density (N/m³) of the bonds whose bit in `bits` is set: the force state times
@@ -26,8 +26,8 @@ pub trait ForceState<const D: usize>: Copy {
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
     /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. The
-    /// bits of the result are the same whether point i or point j computes it. A central force works on the
-    /// extension, so R does not matter.
+    /// result has the same bits if i and j are exchanged. A central force does work only on the extension, so
+    /// R does not matter.
     fn work<S: Simd>(
         self,
         simd: S,

@@ -49,7 +49,7 @@ impl Influence {
     pub fn moment(self, power: i32) -> f64 {
         let cells = 2000;
         let at = |k: i32| match f64::from(k) / f64::from(cells) {
-            // For `Inverse`, the power of r cancels the pole.
+            // The integrand is 0 at r = 0, also for `Inverse`, because n ≥ 2.
             0.0 => 0.0,
             r => self.at(r, 1.0) * r.powi(power),
         };

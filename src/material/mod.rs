@@ -1,18 +1,17 @@
-//! Material laws. A law evaluates bonds, eight at a time. Laws are independent of decks, points, ranks and
-//! fields.
+//! Material laws. A law computes forces and energies of bonds, eight bonds at a time. Laws do not depend on
+//! decks, points, ranks and fields.
 //!
-//! The force density that a bond exerts on point i, per volume of its neighbour j, is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩
-//! (Silling et al. 2007).
-//! The force state T_i depends on three inputs:
+//! The force density that a bond exerts on point i, per volume of point j, is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling
+//! et al. 2007). The force state T_i depends on three inputs:
 //!
 //! - the bond;
 //! - the *numbers* of point i, which the law stores per point, such as the dilatation of its family;
 //! - the *bond history*, which the law stores per bond and end, such as a plastic stretch.
 //!
-//! A law declares how many point numbers and history values it has, and computes their values. An *end* of a
-//! bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
-//! cracks. The *initial* family of a point has the bonds of step 1 of [`Law`], before any bond breaks.
-//! Y = ξ + η is the deformed bond, and Ṽ the corrected volume of point j.
+//! A law declares the counts of its point numbers and history values, and computes these values. An *end* of
+//! a bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
+//! cracks. The *initial* family of a point contains the bonds over which step 1 of [`Law`] sums, before any
+//! bond breaks. Y = ξ + η is the deformed bond, ω the influence function, and Ṽ the corrected volume of j.
 
 mod any;
 pub mod bond;
@@ -107,7 +106,7 @@ pub struct FamilyStress<const D: usize> {
     pub gradient: SMatrix<f64, D, D>,
     /// First Piola–Kirchhoff stress P, Pa.
     pub piola: SMatrix<f64, D, D>,
-    /// Plastic state of the point at this gradient, after flow.
+    /// Plastic state of the point after the plastic flow at this gradient.
     pub plastic: PlasticState,
 }
 
@@ -117,23 +116,25 @@ pub trait Described {
     fn described(&self) -> Vec<(&'static str, Property)>;
 }
 
-/// A material law: the contributions of bonds to the numbers of a point, and the resulting force state.
+/// A material law. It computes the numbers of a point from the bonds of the point, and the force states of
+/// bonds.
 ///
-/// The loops multiply each contribution by Ṽ and by the influence function; the law contains neither.
-/// The loops over the bonds call a law in these steps:
+/// The loops over the bonds multiply the results of the law by ω and Ṽ, so the law contains neither factor.
+/// The loops call a law in these steps:
 ///
 /// 1. Once, over the bonds that pre-cracks do not cut (over all bonds if [`Self::needs_shape`]):
 ///    [`Self::reference_contribution`] → sums → [`Self::constants`], and [`Self::truncation_factor`] if a
-///    damage criterion reads it.
+///    damage criterion reads this factor.
 /// 2. Before each force evaluation, over the intact bonds, [`Self::PASSES`] times:
 ///    [`Self::pass_contribution`] → sums → [`Self::update_point`]. Then the numbers are sent to the ghosts.
 /// 3. In the force evaluation: [`Self::bond_history`] and [`Self::force_state`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
-    /// The numbers of a point that the loops over bonds read, at both ends of a bond. The constants come
-    /// first; the others are recomputed before each force evaluation.
+    /// Numbers of a point that the loops over bonds read for both ends of a bond. The
+    /// [constants](Self::constants) come first. The other numbers are recomputed before each force
+    /// evaluation.
     type Point: LaneTuple;
 
-    /// The bond history: numbers stored per bond for each of its ends; initially 0.
+    /// Bond history: numbers that are stored for each end of a bond; initially 0.
     type BondHistory: LaneTuple;
 
     /// Sums over the initial family, computed once.
@@ -168,8 +169,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::pass_contribution`] reads [`Bond::stretch`].
     const SUM_READS_STRETCH: bool = true;
 
-    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds. Padding bonds of a
-    /// lane group have no direction and no length.
+    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds. Lanes without a bond
+    /// have neither. The loops therefore set the contributions of these lanes to 0.
     const SUM_READS_DIRECTION: bool = false;
 
     /// Whether forces act along ξ and are linear in η. Otherwise forces depend on the deformed bonds.
@@ -191,8 +192,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// is computed only in evaluations that store the history.
     const FORCE_READS_HISTORY: bool = true;
 
-    /// Whether the stress of a point is the mean of the stresses of its bonds, so that
-    /// [`Self::bond_stress_across`] replaces [`Self::stress_across`].
+    /// Whether the out-of-plane stress of a point is the mean of the stresses of its bonds. The sum of
+    /// [`Self::bond_stress_across`] then replaces the value of [`Self::stress_across`], unless this value is
+    /// `None`.
     const HAS_BOND_STRESS_ACROSS: bool = false;
 
     /// Return the contribution of an undeformed bond to the sums over the initial family.
@@ -201,7 +203,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::ReferenceSum::splat(0.0)
     }
 
-    /// Compute the constants of a point from the sums over its initial family.
+    /// Compute the constants of a point from the sums over its initial family, and write them to the first
+    /// entries of `_numbers`.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
     /// Return the contribution of an intact bond to the sums of pass `S`. The contribution may read the
@@ -216,10 +219,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// Compute the numbers of a point from the sums of a pass: the numbers of [`Self::Point`], then the
-    /// [`Self::OWN_NUMBERS`]. Also update `_plastic`, the plastic state of the point. The caller stores an
-    /// updated plastic state only at the end of a step. `_step` is the time since the stored plastic state
-    /// (s); 0 if no time has passed.
+    /// Compute the numbers of a point from the sums of a pass. `_numbers` contains the numbers of
+    /// [`Self::Point`], then the own numbers ([`Self::OWN_NUMBERS`]). Also update `_plastic`, the plastic
+    /// state of the point. The caller stores an updated plastic state only at the end of a step. `_step` is
+    /// the time (s) since the plastic state was stored; 0 if no time has passed.
     fn update_point(
         &self,
         _pass: usize,
@@ -231,7 +234,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return the sizes of the data per point and per bond. An instance may need fewer passes and fewer own
-    /// values ([`Self::OWN_NUMBERS`]) than its type declares.
+    /// numbers ([`Self::OWN_NUMBERS`]) than its type declares.
     fn counts(&self) -> Counts {
         Counts::of::<Self, D>()
     }
@@ -270,8 +273,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) -> Self::Force;
 
     /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
-    /// ends. A force along the bond is divided by a length, as in [`Self::force_state`]. The results of both
-    /// ends are equal to the last bit, except for the sign. Laws may override this function to save
+    /// ends. A force along the bond is divided by a length, as in [`Self::force_state`]. The results for
+    /// points i and j have the same bits, except for the sign. Laws may override this function to save
     /// operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
@@ -314,7 +317,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Compute the stress of a point, for laws with a deformation gradient per point. `None` for all other
     /// laws, and if the point carries no stress. The arguments are the sums of the first pass, the point
-    /// numbers, and the plastic state before or after the flow of a step.
+    /// numbers, and the plastic state before or after the plastic flow of the step.
     fn family_stress(
         &self,
         _sums: &[f64],
@@ -338,15 +341,16 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Return the dilatation θ of a point, without thermal strain, from its numbers. `None` for the default
-    /// θ = (d/m) Σ ω|ξ| e Ṽ, with the number of dimensions d and the extension e = |Y| − |ξ|.
+    /// Return the dilatation θ of a point, without thermal strain, from the numbers of this point. If `None`,
+    /// the caller computes θ = (d/m) Σ ω|ξ| e Ṽ, with the number of dimensions d and the extension
+    /// e = |Y| − |ξ|.
     fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 
-    /// Return the Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the
-    /// plane. If `None`, this stress is ν (τ_xx + τ_yy), with the Kirchhoff stress τ of the plane; this holds
-    /// for laws that are linear in the strain.
+    /// Return the out-of-plane Kirchhoff stress τ_zz (Pa) in plane strain, at an in-plane displacement
+    /// gradient. If `None`, the caller uses ν (τ_xx + τ_yy), which is correct for laws that are linear in the
+    /// strain.
     fn stress_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -355,15 +359,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Return the contribution of a bond to the Kirchhoff stress across the plane, per volume of j, Pa/m³;
-    /// for laws with [`Self::HAS_BOND_STRESS_ACROSS`].
+    /// Return the contribution of a bond to the out-of-plane Kirchhoff stress, per volume of j, Pa/m³; for
+    /// laws with [`Self::HAS_BOND_STRESS_ACROSS`].
     #[inline(always)]
     fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// Return the stretch F_zz across the plane in plane stress, at a displacement gradient of the plane.
-    /// If `None`, F_zz follows from Hooke's law with logarithmic strains.
+    /// Return the out-of-plane stretch F_zz in plane stress, at an in-plane displacement gradient. If `None`,
+    /// the caller computes F_zz from Hooke's law with logarithmic strains.
     fn stretch_across(
         &self,
         _gradient: &SMatrix<f64, D, D>,
@@ -372,22 +376,21 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Test whether the law needs enough bonds in all directions. The initial family of a point then includes
-    /// the bonds that pre-cracks cut, so that the law can compare the intact bonds with all bonds of the
-    /// point.
+    /// Test whether the law inverts the shape tensor of a point, and therefore needs bonds in all directions.
+    /// The initial family of a point then includes the bonds that pre-cracks cut, so that the law can compare
+    /// the intact bonds with all bonds of the point.
     fn needs_shape(&self) -> bool {
         false
     }
 
-    /// Test whether a point carries no force, because the law cannot use the intact bonds of the point (too
-    /// few or too stiff), or because the law has no stress at the deformation of the point or of one of its
-    /// bonds.
+    /// Test whether a point carries no force. This is so if its intact bonds are too few or too stiff, or if
+    /// the law has no stress at the deformation of the point or of one of its bonds.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
 
-    /// Return the energy that a bond, intact or broken, has dissipated at one end, without the energy of
-    /// breaking, J/m⁶.
+    /// Return the energy that an intact or broken bond has dissipated at one end, J/m⁶. The energy of
+    /// breaking the bond is not included. `_length` is |ξ|, m.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
@@ -400,9 +403,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Lanes::splat(0.0)
     }
 
-    /// Return one bit per bond that breaks because of its history at one end, with or without a damage law.
-    /// The bond breaks if this bit is set at an end whose force state acts on the bond. The bits are checked
-    /// after each step that stores the history.
+    /// Return one bit per bond, set if the bond breaks because of its history at one end. The bit counts only
+    /// if the force state of this end acts on the bond. Such bonds also break without a damage law. The bits
+    /// are checked in each force evaluation that stores the history.
     #[inline(always)]
     fn is_worn_out<S: Simd>(&self, _simd: S, _history: &Self::BondHistory) -> u8 {
         0
@@ -428,8 +431,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         1.0
     }
 
-    /// Return the factor on the critical stretch of a bond, from the numbers of points i and j and the law
-    /// of point j. Both ends compute the same factor.
+    /// Return the factor on the critical stretch of a bond, from the numbers of points i and j and the law of
+    /// point j. Points i and j compute the same factor.
     #[inline(always)]
     fn toughness_scale(&self, _bond: &Bond<D>, _points: [&Self::Point; 2], _other: &Self) -> Lanes {
         Lanes::splat(1.0)

@@ -1,4 +1,4 @@
-//! Sums of monomials of the bond directions over a family, and solution of linear least-squares problems.
+//! Monomials of the bond directions, for sums over a family, and solution of linear least-squares problems.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,8 +17,9 @@ pub fn index_of(wanted: [usize; 3]) -> usize {
     found.expect("the degree is the sum of the exponents")
 }
 
-/// Return the number of tensor components that have each of the indices x, y and z as often as these
-/// exponents say. For example, (1, 1, 0) stands for the components xy and yx, so the result is 2.
+/// Return the number of components of a symmetric tensor whose indices differ only in their order. The
+/// exponents say how often x, y and z occur among the indices. For example, (1, 1, 0) stands for the
+/// components xy and yx, so the result is 2.
 pub fn multiplicity(exponents: [usize; 3]) -> f64 {
     let factorial = |n: usize| (1..=n).product::<usize>();
     let all = factorial(exponents.iter().sum());

@@ -5,10 +5,11 @@
 //! w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch
 //! is therefore correct at surfaces and on any lattice. A bond has the mean of the micromoduli of points i
 //! and j, c_ij = (c_i + c_j)/2. A critical stretch s_c that follows from a fracture energy is scaled to s_c
-//! √(c/c_ij), with the micromodulus c of an untruncated family. This keeps the energy of breaking the bond.
+//! √(c/c_ij), with the micromodulus c of an untruncated family. Breaking the bond then takes the same energy
+//! as in an untruncated family.
 //!
-//! With the influence function δ/|ξ| this is eq. 15 of Diehl & Schweitzer: w = c̄_i s²/2 with
-//! c̄_i = c_i δ = 4 W₁ / Σ Ṽ, but their equation has the constant 9K/4 in place of the classical W₁.
+//! With the influence function δ/|ξ|, the bond energy is w = c̄_i s²/2 with c̄_i = c_i δ = 4 W₁/Σ Ṽ. This is
+//! eq. 15 of Diehl & Schweitzer, except that their equation contains 9K/4 instead of the classical W₁.
 
 use std::f64::consts::PI;
 
@@ -23,12 +24,12 @@ use crate::lanes::Lanes;
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalised {
-    /// Energy density W₁ at unit isotropic stretch, J/m³: the classical one, or 9K/4 for
+    /// Energy density W₁ at unit isotropic stretch, J/m³: the classical value, or 9K/4 for
     /// `form = "diehl2016"`.
     pub energy: f64,
-    /// Micromodulus c of an untruncated family, N/m⁶, for which the damage law has computed the critical
-    /// stretch. `None` if the deck gives the critical stretch, which then holds for all bonds, or if the
-    /// bonds have no damage.
+    /// Micromodulus c of an untruncated family, N/m⁶, if the critical stretch follows from a fracture energy.
+    /// `None` if the deck gives the critical stretch, which then holds for all bonds, or if the bonds have no
+    /// damage.
     pub reference: Option<f64>,
 }
 
@@ -126,10 +127,10 @@ impl Described for Normalised {
 }
 
 impl<const D: usize> Law<D> for Normalised {
-    /// 1 / Σ |ξ| Ṽ, 1/m⁴.
+    /// 1/Σ ω|ξ| Ṽ, 1/m⁴. The influence function ω is 1 for `form = "energy"`.
     type Point = [Lanes; 1];
     type BondHistory = [Lanes; 0];
-    /// Σ |ξ| Ṽ, m⁴.
+    /// Σ ω|ξ| Ṽ, m⁴.
     type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 0];
     type Force = Along;

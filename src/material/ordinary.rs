@@ -13,9 +13,9 @@
 //! | plane strain | K + G/3 | 8G |
 //! | plane stress | E/(2(1−ν)) | 8G |
 //!
-//! With κ = k′ − A/d² the same law is t = (d κ θ/m) ω|ξ| + (A/m) ω e and W = ½ κθ² + ½ (A/m) Σ ω e² Ṽ.
-//! Here m sums over the initial family, and θ sums over the intact bonds. Then t is the derivative of W with
-//! broken bonds as well.
+//! With κ = k′ − A/d² the same law is t = (d κ θ/m) ω|ξ| + (A/m) ω e and W = ½ κθ² + ½ (A/m) Σ ω e² Ṽ. Here m
+//! is a sum over the initial family, whereas θ is a sum over the intact bonds. Therefore t is the derivative
+//! of W even if bonds are broken.
 
 use super::bond::Weights;
 use super::{
@@ -109,8 +109,8 @@ impl Ordinary {
     }
 }
 
-/// Return k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion θ in this dimension. `None` in
-/// 1-D.
+/// Return k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion with the dilatation θ in this
+/// dimension. `None` in 1-D.
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
     match dimension {
         Dimension::Line { .. } => None,
@@ -203,8 +203,9 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
 
-/// Return the force state of bonds with an inelastic deviatoric extension. `extension_factor` is A/m and
-/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension divided by |ξ|.
+/// Return the force state t = v |ξ| + a (e − e_i) of bonds with the inelastic deviatoric extension e_i. Here
+/// a = A/m is `extension_factor` and v is `volume_factor`, for example d κ θ/m, both N/m⁷. `taken` is
+/// e_i/|ξ|.
 #[inline(always)]
 pub(super) fn eased_force<const D: usize>(
     bond: &Bond<D>,

@@ -6,25 +6,24 @@
 //!
 //! W = ½ κθ² + ½ (A/m) Σ ω (e − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (e − e_p) Ṽ.
 //!
-//! The deviatoric force is t_d = (A/m) ω e_d. Here e_d is e − e_p minus its mean over the intact bonds:
-//! e_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//! The deviatoric force is t_d = (A/m) ω e_d. Here e_d is the elastic extension without the mean elastic
+//! stretch of the intact bonds: e_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ and the yield value ψ₀.
 //! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by
 //! (1 − r) e_d.
 //!
-//! Plastic flow preserves volume, Σ ω|ξ| e_p Ṽ = 0. Therefore this is Mitchell's law until bonds of the
-//! family break.
-//! After that, Mitchell's θ of the total extension e would not give a force that derives from the energy. The
-//! remaining plastic extensions would expand the family, and breaking bonds would add energy.
+//! Plastic flow preserves volume, so Σ ω|ξ| e_p Ṽ = 0. Therefore the law equals Mitchell's law until bonds of
+//! the family break. After that, the sum over the remaining bonds is not 0. Mitchell computes θ from the
+//! total extension e. The force would then not be the derivative of the energy: the plastic extensions would
+//! expand the family, and breaking bonds would add energy.
 //!
-//! ψ₀ is calibrated in pure shear: the point yields where the equivalent stress of von Mises is σ_y.
-//! A deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent
-//! stress is σ_y at ε:ε = σ_y²/(6G²).
-//! Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane.
-//! With the m of an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵).
-//! With the thickness h, Mitchell's value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G,
-//! whereas this law has A = 8G in the plane.
+//! ψ₀ is calibrated in pure shear: the point yields when the equivalent stress of von Mises reaches σ_y. A
+//! deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent stress
+//! is σ_y at ε:ε = σ_y²/(6G²). Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane. With m of
+//! an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵). With the thickness h, Mitchell's
+//! value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G, whereas this law has A = 8G in the
+//! plane.
 
 use super::ordinary::{Ordinary, SURFACE_CORRECTION, eased_force};
 use super::{
@@ -39,8 +38,8 @@ use crate::lanes::{IsaSet, Lanes};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrdinaryPlastic {
     elastic: Ordinary,
-    /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by a weighted volume, see
-    /// `whole`.
+    /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by the weighted volume m.
+    /// `whole` determines which m.
     strength: f64,
     /// m of an untruncated family (m⁵), if this m determines the yield value of all points. `None` if the m
     /// of each point determines the yield value of the point.

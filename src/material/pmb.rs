@@ -1,9 +1,9 @@
-//! Prototype microelastic material: the force density of a bond per volume is f = c s Y/|Y|, and its energy
-//! is w = c s² |ξ| / 2 (J/m⁶). Each end exerts half of the force.
+//! Prototype microelastic material: the force density of a bond per volume of point j is f = c s Y/|Y|, and
+//! the energy of a bond is w = c s² |ξ|/2 (J/m⁶). The force state of each end is half of f.
 //!
-//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6.
-//! The micromodulus c follows from equal strain energy under isotropic expansion. Without failure this is the
-//! proportional microelastic material of Emmrich & Weckner 2006, eq. 9.
+//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6. The
+//! micromodulus c gives the body the classical strain energy under isotropic expansion. Without failure, the
+//! law is the proportional microelastic material of Emmrich & Weckner 2006, eq. 9.
 
 use std::f64::consts::PI;
 
@@ -114,7 +114,8 @@ fn build(given: &Given) -> Built {
     match given.values.word(SURFACE_CORRECTION.name) {
         "none" => Built::plain(Pmb::of(given)),
         "energy" => Built::plain(Normalised::classical(given)),
-        // In 1-D all bonds have the same direction, so these corrections, without their limits, are equal.
+        // In 1-D all bonds have the same direction. The other corrections would then equal `energy`, except
+        // for their limits.
         _ if given.dimension.count() == 1 => Built::plain(Normalised::classical(given)),
         "tensor" => Built::plain(TensorPmb::of(given)),
         _ => Built::plain(DirectionalPmb::of(given)),

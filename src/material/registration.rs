@@ -2,7 +2,7 @@
 //! declarations.
 
 /// Generate, from the list of laws, the enums of laws and the macros that dispatch to a law. The first
-/// argument is `$`, because the generated macros need it.
+/// argument is the token `$`, which the generated macros contain.
 macro_rules! register {
     ($d:tt $($file:ident :: $law:ident),+ $(,)?) => {
         $(pub use $file::$law;)+
@@ -48,7 +48,8 @@ macro_rules! register {
             }
         }
 
-        /// Run code for the law in an [`AnyLaw`]. The code is compiled once per law.
+        /// Evaluate an expression in which a name stands for the law in an [`AnyLaw`]. The expression is
+        /// compiled once per law.
         macro_rules! with_law {
             ($d any:expr, $d law_name:ident => $d body:expr) => {
                 match $d any {
@@ -58,7 +59,8 @@ macro_rules! register {
         }
         pub(crate) use with_law;
 
-        /// Run code for the laws in a [`PairLaw`]. The code is compiled once per law.
+        /// Evaluate an expression in which a name stands for the two laws in a [`PairLaw`]. The expression is
+        /// compiled once per law.
         macro_rules! with_pair {
             ($d pair:expr, $d laws:ident => $d body:expr) => {
                 match $d pair {

@@ -23,7 +23,7 @@ pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 /// iterations.
 const MOST_ITERATIONS: usize = 40;
 
-/// R has converged if no entry changes by this number or more in an iteration; the next change would be of
+/// R has converged if an iteration changes every entry by less than this number. The next change would be of
 /// the order of the square of this number.
 const CONVERGED: f64 = 1e-9;
 
@@ -65,8 +65,8 @@ fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
     }
 }
 
-/// Return R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986); `None` if det F ≤ 0 or without
-/// convergence.
+/// Return R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986); `None` if det F ≤ 0 or if the
+/// iteration does not converge.
 fn orthogonal_factor(f: Matrix3<f64>) -> Option<Matrix3<f64>> {
     let mut x = f;
     for _ in 0..MOST_ITERATIONS {

@@ -1,10 +1,9 @@
 //! Softening microelastic material. In tension f = c (1 − d) s Y/|Y| with the micromodulus c, where the
 //! damage variable d depends on the largest past stretch κ. In compression f = c s Y/|Y|.
 //!
-//! On first loading |f|/c is F(κ), and 1 − d = F(κ)/κ.
-//! F is κ up to the strength stretch s0, and then falls from s0 to 0 at the critical stretch sc. Unloading
-//! is along the straight line to the origin.
-//! Damage does not act in compression, because the faces of a crack close.
+//! On first loading |f|/c is F(κ), and 1 − d = F(κ)/κ. F is κ up to the strength stretch s0, and then falls
+//! from s0 to 0 at the critical stretch sc. Unloading follows the straight line to the origin. Damage does
+//! not act in compression, because the faces of a crack close.
 //!
 //! | curve | F between s0 and sc |
 //! |---|---|
@@ -12,10 +11,10 @@
 //! | trilinear | linear from s0 to β s0 at κ = s0 + γ (sc − s0), and from there to 0 at sc |
 //! | exponential | s0 (exp(−(κ − s0)/a) − r)/(1 − r), sc = s0 + a ln(1/r), with the decay stretch a |
 //!
-//! A body in uniaxial tension bears a stress of more than E s0. When the bonds along the axis soften, bonds
-//! in other directions approach their strength.
-//! Therefore s0 is chosen such that the tensile strength f_t is the largest stress in uniaxial tension. This
-//! stress is computed by quadrature over the directions of the bonds.
+//! A body in uniaxial tension bears a stress of more than E s0. When the bonds along the axis soften, the
+//! forces of bonds in other directions still increase. Therefore s0 is chosen such that the tensile strength
+//! f_t is the largest stress in uniaxial tension. This stress is computed by quadrature over the directions
+//! of the bonds.
 //!
 //! Stretching a bond to sc dissipates c |ξ| A with A = ∫ F dκ. Breaking a `pmb` bond at the stretch s_e
 //! dissipates c |ξ| s_e²/2. With A = s_e²/2, the bonds across a unit area dissipate the fracture energy for
@@ -229,8 +228,8 @@ fn fullness(values: &Values) -> f64 {
     }
 }
 
-/// Return the ratio of stress to strain in uniaxial tension, Pa. In plane strain and under uniaxial strain
-/// the Poisson ratio is 1/4, which overrides the given ratio.
+/// Return the ratio of stress to strain in uniaxial tension, Pa. The ratio depends on Poisson's ratio only in
+/// plane strain and under uniaxial strain, where Poisson's ratio of this law is 1/4.
 fn tensile_modulus(given: &Given) -> f64 {
     let elastic = Isotropic {
         poisson_ratio: 0.25,
@@ -239,7 +238,7 @@ fn tensile_modulus(given: &Given) -> f64 {
     CriticalStretch::tensile_modulus(given.dimension, elastic)
 }
 
-/// Return sc from the deck, or from the fracture energy of the deck and this s0.
+/// Return sc: the value in the deck, or the value that follows from the fracture energy and s0, `strength`.
 fn critical_stretch(given: &Given, strength: f64) -> f64 {
     let values = given.values;
     number(values, &CRITICAL_STRETCH).unwrap_or_else(|| {
@@ -299,8 +298,8 @@ fn rounded(number: f64) -> String {
     digits.parse().map_or(digits, format_number)
 }
 
-/// Return the error message if sc is not above s0: bonds would then break before they soften. A cause is a
-/// long horizon, with which bonds at s0 store more than the fracture energy.
+/// Return the error message if sc is not above s0, because bonds would then break before they soften. A
+/// possible cause is a long horizon: the bonds then store more than the fracture energy already at s0.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -470,8 +469,8 @@ impl SofteningPmb {
         }
     }
 
-    /// Return ∫ F dκ from s0 to the largest past stretch of a bond, divided by s0. The largest past stretches
-    /// are between s0 and sc.
+    /// Return ∫ F dκ from s0 to the largest past stretch of each bond, divided by s0. The largest past
+    /// stretches must be between s0 and sc.
     #[inline(always)]
     fn relative_area(&self, largest: Lanes) -> Lanes {
         let one = Lanes::splat(1.0);

@@ -24,7 +24,7 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate along `axis`, which has the value `value`.
+    /// Return the reference coordinate along `axis` at the position `value`; its gradient is 1 along `axis`.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;

@@ -366,7 +366,7 @@ pub fn suggestion(key: &GroupKey, known: &[String]) -> String {
 }
 
 /// Read the bytes of a regular file. A pipe is rejected, because opening a pipe blocks until its other end is
-/// opened. Of an HDF5 file, only the first bytes are read, because the HDF5 library reads the file.
+/// opened. For an HDF5 file, only the first bytes are read, because the HDF5 library opens the file itself.
 ///
 /// # Errors
 /// If the file cannot be read.

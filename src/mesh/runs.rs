@@ -18,7 +18,7 @@ impl Runs {
         runs
     }
 
-    /// Add a number that is not below any number of the set.
+    /// Add a number, which must be at least as large as the largest number of the set.
     pub fn push(&mut self, number: u64) {
         match self.ranges.last_mut() {
             Some([_, end]) if *end > number => debug_assert_eq!(*end, number + 1),
@@ -43,7 +43,8 @@ impl Runs {
         &self.ranges
     }
 
-    /// Return the union of several sets, each with an offset that is first added to all numbers of the set.
+    /// Return the union of several sets. Each set is given by its ranges and an offset that is added to its
+    /// numbers.
     pub fn union<'a>(sets: impl Iterator<Item = (&'a [[u64; 2]], u64)>) -> Self {
         let raised = sets.flat_map(|(ranges, offset)| {
             ranges

@@ -28,7 +28,8 @@ const PART: &str = "checkpoint.part";
 /// Version of the file layout.
 const VERSION: i64 = 9;
 
-/// Test whether a path is in use; a link to a missing or unreadable file is also in use.
+/// Test whether a path is in use. A link to a missing file and a path that cannot be examined count as in
+/// use.
 pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }

@@ -23,9 +23,9 @@ const OBJECT_BYTES: u64 = 8192;
 /// with the same message: file, object and HDF5's innermost cause.
 ///
 /// # After a failure
-/// The file is abandoned: further calls fail. The handles of the file are leaked on purpose: closing them
-/// makes HDF5 write, which would fail or hang again. The state of the last successful [`flush`](Self::flush)
-/// stays readable. The process can continue and call `MPI_Finalize`, provided that
+/// The file is abandoned: further calls fail. The handles of the file are leaked on purpose, because closing
+/// them makes HDF5 write, which would fail or hang again. The state of the last successful
+/// [`flush`](Self::flush) stays readable. The process can continue and call `MPI_Finalize`, provided that
 /// [`initialise`](super::transfer::initialise) was called before MPI.
 ///
 /// # Full disk
@@ -87,11 +87,11 @@ impl<'a> CollectiveFile<'a> {
             .map_err(|error| Error::run(format!("cannot open {error}")))
     }
 
-    /// Open an existing file for reading and writing. With several ranks, datasets may grow but not shrink:
-    /// HDF5 1.10 deadlocks otherwise.
+    /// Open an existing file for reading and writing. With several ranks, datasets may grow but not shrink,
+    /// because HDF5 1.10 deadlocks if they shrink.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and if the file is not writable.
+    /// Same as [`open`](Self::open), and also if the file is not writable.
     pub fn open_to_append(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
         let raw = comm.raw();
         Self::begin(path, comm, true, || access::open_to_append(path, raw))

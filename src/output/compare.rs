@@ -152,7 +152,8 @@ impl Comparison {
 /// number of all pairs and the time (s).
 ///
 /// # Errors
-/// If a file is damaged, or if ids must be matched in any order and two points of an output have the same id.
+/// If a file is damaged, or if the points of two outputs cannot be matched in order and one of these outputs
+/// has two points with the same id.
 pub fn compare(
     first: &ResultReader,
     second: &ResultReader,
@@ -231,7 +232,7 @@ struct OutputPair<'a> {
 enum Matching {
     /// Block by block: the ids of both outputs ascend, or are the same sequence.
     InOrder,
-    /// By these pairs of rows, one row of each output, by ascending row of the first output.
+    /// By these pairs of rows, one row of each output, sorted by the row of the first output.
     Rows(Vec<[usize; 2]>),
 }
 
@@ -239,7 +240,8 @@ impl OutputPair<'_> {
     /// Find out how the points are matched.
     ///
     /// # Errors
-    /// If an output cannot be read, or if two of its points have the same id.
+    /// If an output cannot be read. If the points cannot be matched in order and an output has two points
+    /// with the same id.
     fn matching(&self) -> Result<Matching> {
         let counts = self.counts();
         let (mut ascend, mut equal) = (true, counts[0] == counts[1]);
@@ -295,7 +297,8 @@ impl OutputPair<'_> {
                 matched = pairs.len();
             }
         }
-        // The earlier outputs, if equal, all have this count if their sum is `done` times this count.
+        // If the earlier pairs of outputs have equal counts, this count equals theirs exactly if their sum is
+        // `done` times this count.
         comparison.has_equal_counts &= comparison.points == done as u64 * matched as u64;
         comparison.points += matched as u64;
         for side in 0..2 {
@@ -304,7 +307,7 @@ impl OutputPair<'_> {
         Ok(())
     }
 
-    /// Number of points of each output.
+    /// Return the number of points of each output.
     fn counts(&self) -> [usize; 2] {
         [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]))
     }

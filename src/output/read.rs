@@ -1,4 +1,4 @@
-//! Serial reader of result files.
+//! Serial reader of result files. A step of a result is an output, as in VTKHDF.
 
 use super::failure::{innermost, system_error};
 use super::field::{Number, POINT_DATA};
@@ -103,8 +103,8 @@ impl ResultReader {
                 return problem(text);
             }
         };
-        // After a loss of power, NSteps and the lengths of these two tables can differ. Steps up to the
-        // smallest of these numbers are valid.
+        // After a loss of power, NSteps and the lengths of the tables `Values` and `Step` can differ. Steps
+        // up to the smallest of these three numbers are valid.
         let mut complete = steps;
         for name in ["Values", "Step"] {
             let rows = match file.dataset(&format!("{STEPS}/{name}")) {
@@ -151,7 +151,7 @@ impl ResultReader {
         id.is_ok_and(|dataset| dataset.is_resizable())
     }
 
-    /// Return the times (s) of the complete steps. A step of a result is an output.
+    /// Return the times (s) of the complete steps.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -159,7 +159,7 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Values"))
     }
 
-    /// Return, for each complete output, the number of the time step at which it was written.
+    /// Return the number of the solver's time step at each complete output.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -167,8 +167,8 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// Return the range of rows of a dataset that belong to a range of points at a step. `offsets` is the
-    /// path of the table that has the first row of each step in the dataset.
+    /// Return the rows of a dataset that belong to a range of points at one of the [times](Self::times).
+    /// `offsets` is the path of the table with the first row of each step in the dataset.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);

@@ -126,9 +126,9 @@ fn what_is_no_result_is_named_so() {
     std::fs::remove_file(&path).unwrap();
 }
 
-/// Write a result of a deck `one` with two steps, for which space was allocated. Resume the result after its
-/// first step with the deck `deck`, and write three more steps. Return true if the file was continued in
-/// place.
+/// Write a result of a deck `one` with allocated space for two steps, and write these steps. Resume the
+/// result after its first step with the deck `deck`, and write three more steps. Return true if the file was
+/// continued in place.
 fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
 

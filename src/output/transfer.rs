@@ -18,7 +18,7 @@ unsafe extern "C" {
 /// True if HDF5 was initialised before MPI.
 static BEFORE_MPI: AtomicBool = AtomicBool::new(false);
 
-/// Initialise HDF5. Every program that opens collective files must call this before MPI starts.
+/// Initialise HDF5. Every program that opens collective files must call this function before MPI starts.
 ///
 /// If MPI is already running, HDF5 registers itself with `MPI_Finalize`. In `MPI_Finalize`, HDF5 then flushes
 /// open files. This flush hangs or crashes for a file that was abandoned on a full disk.
@@ -109,8 +109,8 @@ impl Transfer {
         })
     }
 
-    /// Return the causes if the last transfer was not collective, as HDF5's bits over all ranks. Return 0 if
-    /// this transfer was collective, or if the file is serial.
+    /// Return why the last transfer was not collective, as HDF5's bits over all ranks. Return 0 if the
+    /// transfer was collective, or if the file is serial.
     fn causes(&self) -> hdf5::Result<u32> {
         let (mut local, mut global) = (0, 0);
         if self.collective {

@@ -40,8 +40,8 @@ pub fn domain(
     let bins = Bins::new(&positions, cutoff);
     let mut border = vec![false; owned.len()];
     let mut ghosts = Vec::new();
-    // For each rank, the ids of the points that become ghosts on this rank, and the local indices of these
-    // ghosts.
+    // For each rank q, the ids of the points of q that become ghosts on this rank, and the local indices of
+    // these ghosts.
     let mut requests = Vec::new();
     for bytes in offered {
         let mut candidates: Vec<Point> = received(&bytes).collect();

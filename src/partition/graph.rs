@@ -9,8 +9,8 @@ use super::cells::{Cells, Loads};
 /// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
-/// Additional factor on the weight of graph edges between cells that differ along x: lane groups lie along x,
-/// so cuts across x are costly.
+/// Additional factor on the weight of graph edges between cells that differ along x. Cuts between such cells
+/// are costly, because they cut lane groups, which lie along x.
 const ALONG_X: f64 = 1.5;
 
 /// Owner of cells without points.
@@ -20,15 +20,15 @@ pub const NO_OWNER: u32 = u32::MAX;
 /// parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If the
-/// number of cells with points is at most the number of ranks, each of these cells gets its own rank.
+/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If the number
+/// of cells with points is at most the number of ranks, each of these cells gets its own rank.
 ///
 /// - `occupation` is the number of points in each cell.
 /// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
 ///   edge is proportional to the estimated number of bonds across it, multiplied by `ALONG_X` if its cells
 ///   differ along x.
-/// - With measured loads, this weight is multiplied by the measured time per estimated bond of the rank that
-///   has the cell at present. Parts are numbered so that few points migrate.
+/// - With measured loads, the weight of a cell is multiplied by the measured time per estimated bond of the
+///   rank that has the cell at present. Parts are numbered so that few points migrate.
 ///
 /// # Errors
 /// If METIS fails.
@@ -258,8 +258,8 @@ mod tests {
         assert!((1.5..3.5).contains(&ratio), "{sizes:?}");
     }
 
-    /// Points in a dense region have more bonds, and therefore take more time. The weights must not count both
-    /// this time and the bonds: if both ranks take the same time, nothing moves.
+    /// Points in a dense region have more bonds, and therefore take more time. The weights must not count
+    /// both this time and the bonds. If both ranks take the same time, few cells move.
     #[test]
     fn dense_regions_count_once() {
         let mut plate = Plate::new();

@@ -86,7 +86,7 @@ struct Root {
     /// Vector from the tail to the tip of the arrow, in pixels. Components are positive to the right and
     /// downwards.
     arrow: [f64; 2],
-    /// The vector is longer than the vector that the longest arrow represents, so the arrow is cut.
+    /// The arrow is cut, because the vector is longer than the vector that the longest arrow represents.
     is_cut: bool,
     /// Depth of the point, m; points with a larger depth are nearer to the camera. 0 in flat views.
     depth: f64,
@@ -96,9 +96,9 @@ struct Root {
 /// least `reach` away from each other. The edge `cell` of a cell and `reach` are in pixels, and `reach` is at
 /// most `cell`.
 ///
-/// Of each cell, only the candidate nearest to the camera is considered; among candidates of equal depth, the
-/// candidate nearest to the centre of the cell. This candidate is left out if it is too close to the
-/// candidate of another cell.
+/// In each cell, the candidate nearest to the camera is chosen. Among candidates of equal depth, the
+/// candidate nearest to the centre of the cell is chosen. A chosen candidate is left out if it is too close
+/// to the chosen candidate of another cell.
 fn thinned(roots: impl Iterator<Item = Root>, cell: f64, reach: f64) -> Vec<Root> {
     let rank = |root: &Root, number: [i64; 2]| {
         let offset = [0, 1].map(|k| root.place[k] / cell - number[k] as f64 - 0.5);

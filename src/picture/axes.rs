@@ -8,7 +8,7 @@ use super::projection::{Bounds, Projection};
 use super::scale::Scale;
 use super::scene::Axis;
 
-/// Picture, fonts and text size, with which rulers, labels and outlines are drawn.
+/// Picture, fonts and text size for drawing rulers, labels and outlines.
 pub struct Pen<'a> {
     /// The picture.
     pub image: &'a mut Image,
@@ -37,7 +37,7 @@ fn moved(position: [f64; 2], direction: [f64; 2], distance: f64) -> [f64; 2] {
     [0, 1].map(|axis| position[axis] + distance * direction[axis])
 }
 
-/// Return half the extent of a text in a direction. The size of the text is its width and height.
+/// Return half the extent of a text along a unit vector. The text is given by its width and height.
 fn half_extent([width, height]: [f64; 2], direction: [f64; 2]) -> f64 {
     (direction[0].abs() * width + direction[1].abs() * height) / 2.0
 }
@@ -54,7 +54,7 @@ impl Pen<'_> {
             .draw(self.image, text, self.text, centre, running, INK);
     }
 
-    /// Draw a ruler.
+    /// Draw the line of a ruler, its ticks with labels, and its caption.
     pub fn ruler(&mut self, ruler: &Ruler) {
         let height = CAPITAL_HEIGHT * self.text;
         let (tick, gap) = (0.35 * self.text, 0.4 * self.text);

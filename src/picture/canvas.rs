@@ -103,7 +103,8 @@ impl Image {
         }
     }
 
-    /// Draw a straight line. A line along a row or a column covers whole pixels; any other line is smoothed.
+    /// Draw a straight line. A line along a row or a column covers whole pixels. Any other line is
+    /// antialiased.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64, colour: Colour) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = along[0].hypot(along[1]);
@@ -132,7 +133,8 @@ impl Image {
         }
     }
 
-    /// Blend `colour` into one pixel. `coverage` is the weight of the colour, from 0 to 1.
+    /// Blend `colour` into one pixel. `coverage` is the weight of the colour, and is clamped to the range
+    /// from 0 to 1.
     pub fn blend(&mut self, column: i64, row: i64, coverage: f64, colour: Colour) {
         let inside = (0..i64::from(self.width)).contains(&column)
             && (0..i64::from(self.height)).contains(&row);
@@ -147,9 +149,9 @@ impl Image {
     }
 }
 
-/// Return the rows of pixels of a convex polygon in a picture of this height (pixels). Each row comes with
-/// the first column of the polygon and the first column after the polygon. [`Image::fill_polygon`] defines
-/// which pixels belong to a polygon.
+/// Return the rows of pixels of a convex polygon in a picture of this height (pixels). For each row, also
+/// return the first column of the polygon and the first column after the polygon. [`Image::fill_polygon`]
+/// defines which pixels belong to a polygon.
 pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i64; 2])> + '_ {
     let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
     let rows = first_centre(top).max(0)..first_centre(bottom).min(height);

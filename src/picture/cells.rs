@@ -1,9 +1,9 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
-//! These cells are the Voronoi cells of the points. A cell ends at a distance from its point that depends
-//! on the volume of the point, so borders, holes and open cracks of a body stay visible. At pixels with
-//! points on all sides, cells extend farther to close gaps. In a slice, the plane of the slice cuts the
-//! Voronoi cells of the points in space.
+//! These cells are the Voronoi cells of the points. The volume of a point limits the distance between the
+//! point and the border of its cell, so borders, holes and open cracks of a body stay visible. At pixels with
+//! points on all sides, cells extend farther to close gaps. A slice shows the sections of the 3-D Voronoi
+//! cells with the plane of the slice.
 
 use super::canvas::{Colour, Image};
 use super::layout::Layout;
@@ -16,7 +16,7 @@ use super::scene::Mark;
 /// of a lattice end at 0.5 to 0.71 times this size.
 const REACH: f64 = 0.6;
 
-/// Largest distance as in [`REACH`], for pixels that have points within this distance on all sides.
+/// The same ratio as [`REACH`], for pixels that have points within this larger distance on all sides.
 const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
@@ -67,7 +67,7 @@ struct Pixel {
     square: f32,
     /// Colour of the nearest point so far.
     colour: Colour,
-    /// Whether a point is within [`REACH`] of the pixel.
+    /// A point is within [`REACH`] of the pixel.
     is_near: bool,
     /// Directions from the pixel in which there are points within [`REACH_INSIDE`]: one bit per eighth of a
     /// full turn.
@@ -101,8 +101,8 @@ impl Pixels {
 
     /// Add a point to the pixels around it.
     fn add(&mut self, point: &Point) {
-        // The cell of a point in the drawn plane extends at least to the centre of the pixel that contains
-        // the point.
+        // If a point lies in the drawn plane, its cell extends at least to the centre of the pixel that
+        // contains the point.
         let least = std::f64::consts::FRAC_1_SQRT_2.max(point.depth.abs());
         let [reach, inside] = [REACH, REACH_INSIDE].map(|reach| (reach * point.size).max(least));
         let range = |k: usize| {
@@ -143,7 +143,8 @@ impl Pixels {
     }
 }
 
-/// Return the number (0 to 7) of the eighth of a full turn that contains a direction in the picture.
+/// Return the number (0 to 7) of the eighth of a full turn that contains a direction in the picture. `along`
+/// is the component to the right, `down` the component downwards.
 fn eighth(along: f64, down: f64) -> u32 {
     match (along >= 0.0, down >= 0.0, along.abs() >= down.abs()) {
         (true, true, true) => 0,
@@ -157,8 +158,8 @@ fn eighth(along: f64, down: f64) -> u32 {
     }
 }
 
-/// Test whether there are points on all sides: no three adjacent eighths of a full turn are empty. Every half
-/// turn contains three whole eighths, and therefore has a point.
+/// Test whether there are points on all sides: at least one of any three adjacent eighths of a full turn has
+/// a point. Every half turn then has a point, because a half turn contains three whole eighths.
 fn is_surrounded(directions: u8) -> bool {
     let empty = !directions;
     empty & empty.rotate_left(1) & empty.rotate_left(2) == 0

@@ -34,7 +34,7 @@ const COLOURS: [Colour; 7] = [
 /// first entry, the next seven curves have the second entry, and so on.
 const DASHES: [Option<[f64; 2]>; 3] = [None, Some([5.0, 2.5]), Some([1.5, 1.8])];
 
-/// Colour of the lines at the ticks.
+/// Colour of the grid lines, which cross the frame at the ticks.
 const GRID: Colour = [228, 228, 232];
 
 /// White space between the data and the frame, as a fraction of the range.
@@ -46,7 +46,7 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the square that marks an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points of a curve. The samples tell which of the possible
+/// Number of samples on each line between two points of a curve. The samples show which of the possible
 /// places of the legend the curve crosses.
 const LINE_SAMPLES: usize = 32;
 
@@ -373,7 +373,8 @@ impl Chart<'_> {
         shapes
     }
 
-    /// Draw the legend in the corner of the frame where it covers the fewest of the points `drawn`.
+    /// Draw the legend in the corner of the frame where the legend covers the fewest of the points `drawn`.
+    /// `columns` and `rows` are the edges of the frame, and `text` is the text size, pixels.
     fn legend(
         &self,
         shapes: &mut Vec<Shape>,
@@ -448,8 +449,8 @@ fn scale(low: f64, high: f64, unit: &str, most: f64) -> Scale {
     Scale::new(low, high, unit, magnitude, (most as usize).clamp(2, 9))
 }
 
-/// Split a curve at points that are not finite, and leave out points that coincide with the previous point.
-/// Positions are in pixels.
+/// Split a curve at points that are not finite, and leave out points within [`RESOLUTION`] of the previous
+/// point. Positions are in pixels.
 fn reduced(pixels: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     let mut curves = vec![Vec::new()];
     for pixel in pixels {

@@ -38,7 +38,7 @@ impl ColourMap {
         }
     }
 
-    /// Return the default map of a field. The name of the field selects the map, so that all pictures of a
+    /// Return the default map of a field. Only the name of the field selects the map, so all pictures of a
     /// series use the same map.
     pub fn for_field(field: &str) -> Self {
         if is_damage(field) {
@@ -106,7 +106,8 @@ fn viridis(fraction: f64) -> Colour {
     colour.map(|channel| (channel * 255.0).round() as u8)
 }
 
-/// Colours at the low and the high end of the grey map. The high end is darker than the white background.
+/// Red, green and blue value at the low and the high end of the grey map. The high end is darker than the
+/// white background.
 const GREY: [f64; 2] = [24.0, 226.0];
 
 /// Equally spaced colours of the diverging map of K. Moreland, "Diverging color maps for scientific

@@ -19,8 +19,8 @@ pub struct Sample {
 }
 
 /// Return the samples that no later returned sample covers. A sample covers the positions within half its
-/// cell edge. A slice between two layers of points shows both layers, and the later samples are nearer to the
-/// plane of the slice.
+/// cell edge. A slice between two layers of points shows both layers. Later samples are nearer to the plane
+/// of the slice.
 pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
     let largest = samples
         .iter()
@@ -66,8 +66,8 @@ pub fn segments(samples: &[Sample], levels: &[f64]) -> Vec<[[f64; 2]; 2]> {
         }
         for level in levels {
             let mut crossings = sides.iter().filter_map(|side| crossing(side, *level));
-            // A line crosses a side if exactly one end of the side is below the level, so a line crosses
-            // either no side or two sides.
+            // A line crosses a side if exactly one end of the side is below the level. The line therefore
+            // crosses no side or two sides of a triangle.
             if let (Some(from), Some(to)) = (crossings.next(), crossings.next()) {
                 found.push([from, to]);
             }

@@ -5,8 +5,8 @@ use super::colours::shaded;
 use super::points::{OVERLAP, edges};
 use super::projection::{Camera, Projection};
 
-/// Edge of a larger cube painted behind each cube, divided by the edge of the cube. A drawn deformation opens
-/// gaps between cubes; the larger cubes fill these gaps.
+/// Edge of the larger cube that is painted behind each cube, divided by the edge of the cube. A drawn
+/// deformation opens gaps between cubes; the larger cubes fill these gaps.
 const BACKING: f64 = 1.3;
 
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
@@ -15,8 +15,8 @@ const LEAST_CUBE: f64 = 2.0;
 /// Brightness of the faces of a cube with a normal along x, y and z.
 const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 
-/// Edge of a cube below which the brightness of its pixels is averaged, pixels. Each face of a larger cube
-/// has one brightness.
+/// Smallest edge of a cube whose faces have one brightness each, pixels. For smaller cubes, the brightness of
+/// the pixels is averaged.
 const SMALL_CUBE: f64 = 10.0;
 
 /// Largest difference in depth between pixels whose brightness is averaged, in edges of a cube.
@@ -34,8 +34,8 @@ const LEAST_COSINE: f64 = 1e-3;
 /// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
 pub struct Cubes<'a> {
     image: &'a mut Image,
-    /// Vectors in the picture, to the right and down, of edges of a cube with an edge of 1. The edges are
-    /// parallel to x, y and z, and start at the corner nearest to the viewer.
+    /// Three edges of a cube with an edge of 1, as vectors in the picture (to the right and down). The edges
+    /// are parallel to x, y and z, and start at the corner nearest to the viewer.
     edges: [[f64; 2]; 3],
     /// Decrease of depth along each of these edges: the cosine of the angle between the direction of view and
     /// the axis.
@@ -125,9 +125,9 @@ impl<'a> Cubes<'a> {
         let overlap = 2.0 * OVERLAP;
         self.paint_box((centre, depth), edge, [edge + overlap; 3], colour);
         // If a face moves outwards by a distance d, its surface at a given pixel comes nearer to the camera
-        // by d divided by the cosine of the face. For the larger cube, d is half of the growth. The larger
-        // cube is shifted back by 4/3 of the largest of these approaches, so it lies behind the faces of the
-        // cube itself. In a gap, the larger cube hides the sides of other cubes.
+        // by d/c, where c is the cosine of the face. For the larger cube, d is half of the growth. The larger
+        // cube is shifted back by 4/3 of the largest d/c, so it lies behind the faces of the cube itself. In
+        // a gap, the larger cube hides the sides of other cubes.
         let visible = self
             .visible()
             .map(|axis| self.growth[axis] / self.cosines[axis]);
@@ -142,9 +142,9 @@ impl<'a> Cubes<'a> {
         (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
     }
 
-    /// Paint the visible faces of a box without shading: the cube itself, or the larger box behind it.
-    /// `centre` is the position of the centre of the box, and `depth` the depth of this centre. `sizes` are
-    /// the edges of the box along x, y and z, and `edge` is the edge of the cube, all in pixels.
+    /// Paint the visible faces of a box without shading. The box is a cube, or the larger box behind the
+    /// cube. `centre` is the position of the centre of the box, and `depth` the depth of this centre. `sizes`
+    /// are the edges of the box along x, y and z, and `edge` is the edge of the cube, all in pixels.
     fn paint_box(
         &mut self,
         (centre, depth): ([f64; 2], f64),
@@ -188,9 +188,9 @@ impl<'a> Cubes<'a> {
 
     /// Shade all pixels, after all cubes have been painted.
     ///
-    /// Small cubes on a deformed surface form steps, whose sides show as specks of other brightness. A pixel
-    /// of a small cube therefore has the mean brightness of the surface in a square window, half a
-    /// cube to each side.
+    /// Small cubes on a deformed surface form steps. Without averaging, the sides of these steps would look
+    /// like specks. A pixel of a small cube therefore gets the mean brightness of the surface in a square
+    /// window, which extends half an edge of the cube to each side.
     pub fn shade(self) {
         let [width, height] = [self.image.width, self.image.height].map(i64::from);
         for row in 0..height {
@@ -378,7 +378,7 @@ mod tests {
         let reds = (130..170).flat_map(|row| (100..200).map(move |column| (column, row)));
         let reds = reds.map(|(column, row)| image.pixel(column, row)[0]);
         let (low, high) = reds.fold((255, 0), |(low, high), red| (red.min(low), red.max(high)));
-        // Without the mean, the sides of the steps have 0.7 and 0.86 times the brightness of the tops.
+        // Without averaging, the sides of the steps have 0.7 and 0.86 times the brightness of the tops.
         assert!(high - low <= 20, "{low} to {high}");
     }
 }

@@ -1,4 +1,4 @@
-//! Animated PNG files, which browsers and slides play.
+//! Animated PNG files, for browsers and presentations.
 
 use std::fs::File;
 use std::io::BufWriter;

@@ -31,7 +31,7 @@ pub struct Bar {
     pub columns: [f64; 2],
     /// Top and bottom edge.
     pub rows: [f64; 2],
-    /// The bar is vertical at the right of the frame; otherwise it is horizontal below the frame.
+    /// True for a vertical bar to the right of the frame, false for a horizontal bar below the frame.
     pub upright: bool,
 }
 
@@ -47,7 +47,7 @@ const UPRIGHT_BAR: f64 = 8.0;
 const LYING_BAR: f64 = 5.4;
 /// Additional room in text sizes for a ruler between the frame and the colour bar.
 const RIGHT: f64 = 3.0;
-/// Height in text sizes of the legend at the bottom of the picture.
+/// Height in text sizes of the legend of the arrows, at the bottom of the picture.
 const LEGEND: f64 = 1.5;
 /// Margin at a side without labels, in text sizes.
 const EMPTY: f64 = 2.2;
@@ -156,8 +156,8 @@ impl Layout {
     }
 }
 
-/// Return whether the labels of a ruler are to the right of the box of the points, and need room beyond the
-/// right edge of the frame.
+/// Test whether a ruler has its labels to the right of the box of the points. Such labels need room beyond
+/// the right edge of the frame.
 fn has_ruler_on_the_right(camera: Camera) -> bool {
     let mut outward = [Axis::X, Axis::Y, Axis::Z]
         .into_iter()

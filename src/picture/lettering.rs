@@ -32,8 +32,8 @@ impl Lettering {
         }
     }
 
-    /// Return the first font that has the character. Otherwise return the last font, which shows a sign for a
-    /// missing character.
+    /// Return the first font that has the character. If no font has the character, return the last font,
+    /// which draws the sign for missing characters.
     fn font_of(&self, character: char) -> &FontRef<'static> {
         let [usual, substitute] = &self.fonts;
         if usual.glyph_id(character) == GlyphId(0) {

@@ -59,10 +59,10 @@ use projection::Projection;
 use scale::Scale;
 use scene::{Mark, Marks};
 
-/// Render a scene.
+/// Draw the points of a scene with frame, rulers, title and colour bar.
 ///
 /// # Errors
-/// If the scene has too many points.
+/// If the scene has 2³² points or more.
 pub fn render(scene: &Scene) -> Result<Image> {
     let marks = scene.marks()?;
     let projection = Projection::of(scene);
@@ -133,7 +133,7 @@ pub fn render(scene: &Scene) -> Result<Image> {
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
-/// Draw the lines of a scene over its points. The number that each line comes with selects its colour.
+/// Draw the lines of a scene over its points. The number of a line selects its colour.
 fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
     let thickness = 2.0 * pen.thickness();
     for (number, line) in scene.lines {
@@ -146,8 +146,8 @@ fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) 
     }
 }
 
-/// Draw the contour lines of a scene, on which the interpolated value equals one of the values of the
-/// contours. On a logarithmic scale, the logarithms of the values are interpolated.
+/// Draw the contour lines of a scene. On each line, the interpolated value equals an entry of
+/// `scene.contours`. On a logarithmic scale, the logarithms of the values are interpolated.
 fn contour_lines(
     pen: &mut Pen,
     layout: &Layout,
@@ -182,8 +182,8 @@ fn contour_lines(
     }
 }
 
-/// Write a line of text above the frame, smaller if the line is too long. The size `size` of the text and the
-/// height `rise` of its middle above the frame are in text sizes of the layout.
+/// Write a line of text above the frame. If the line is too long, reduce the text size. `size` is the text
+/// size, and `rise` is the height of the middle of the text above the frame, both in units of `layout.text`.
 fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)) {
     let size = size * layout.text;
     let available = layout.width - 2.0 * layout.text;
@@ -198,14 +198,15 @@ fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)
     pen.text = previous;
 }
 
-/// Return the number of ticks (2 to 10) that fit on a ruler whose labels need `spacing` text sizes each.
-/// `text` is the text size, pixels.
+/// Return the largest number (2 to 10) of intervals between the ticks of a ruler. `from` and `to` are the
+/// ends of the ruler, and `text` is the text size, pixels. Each label needs `spacing` text sizes.
 fn ticks_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     ((length / (spacing * text)) as usize).clamp(2, 10)
 }
 
-/// Draw the frame of a flat view with a ruler below it. With a second axis, also draw a ruler on the left.
+/// Draw the frame of a flat view, with the ruler of the first axis below the frame. If there is a second
+/// axis, draw its ruler on the left.
 fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
     pen.outline(layout.columns, layout.rows);
     let ([left, right], [top, bottom]) = (layout.columns, layout.rows);

@@ -286,7 +286,7 @@ mod tests {
         let (steps, towards) = view(-90.0, 0.0);
         assert_eq!(steps, [[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]);
         assert_eq!(towards, [0.0, -1.0, 0.0]);
-        // From above with the camera south of the body, the picture is a map.
+        // From above with an azimuth of −90°, x points to the right and y up, as on a map.
         let (steps, towards) = view(-90.0, 90.0);
         assert_eq!(steps, [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]);
         assert_eq!(towards, AXES[2]);

@@ -118,7 +118,7 @@ pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
     let first = (low / step - 1e-6).ceil();
     let last = (high / step + 1e-6).floor();
     let count = (last - first + 1.0).clamp(0.0, most as f64 + 1.0) as usize;
-    // Adding zero turns a negative zero into a positive one.
+    // Adding 0 replaces −0 by 0.
     let numbers = (0..count).map(|index| (first + index as f64) * step + 0.0);
     (step, numbers.collect())
 }
@@ -140,9 +140,9 @@ const PREFIXES: [(i32, &str); 10] = [
 /// Unit symbols that take a prefix. Other symbols have a prefix already (kg, MPa) or take none (°C, %).
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
-/// Return the exponent of a power of ten that suits numbers up to `magnitude`, and the unit with this power:
-/// with a prefix, such as "MPa", or with a factor, such as "×10⁻³ m²", if no prefix is possible. A unit
-/// without prefix gets no factor if `magnitude` is from 0.01 to 10⁴.
+/// Return the exponent of a power of ten that suits numbers up to `magnitude`, and the unit with this power.
+/// The power becomes a prefix, as in "MPa", or for units that take no prefix a factor, as in "×10⁻³ m²". A
+/// unit that takes no prefix stays as it is if `magnitude` is from 0.01 to 10⁴.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     let size = magnitude.abs();
     if !(size.is_finite() && size > 0.0) {

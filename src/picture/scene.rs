@@ -56,8 +56,8 @@ pub enum View {
 
 /// A point cloud with values, labels and view.
 ///
-/// The shortest of `positions`, `sizes` and `values` gives the number of points. A point is omitted if one of
-/// its coordinates is not finite or has an absolute value of 10¹⁰⁰ or more.
+/// The number of points is the length of the shortest of `positions`, `sizes` and `values`. A point is
+/// omitted if one of its coordinates is not finite or has an absolute value of 10¹⁰⁰ or more.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
     /// Dimension of the body: 1, 2 or 3.
@@ -66,22 +66,23 @@ pub struct Scene<'a> {
     pub positions: &'a [[f64; 3]],
     /// Edge length of the cell of each point (m).
     pub sizes: &'a [f64],
-    /// True for each scattered point; empty if no point is scattered. In flat views, a scattered point is
-    /// drawn as a Voronoi cell, and any other point as a square.
+    /// For each point, whether its body has scattered points (points that are not on a lattice); empty if no
+    /// body has scattered points. In flat views, scattered points are drawn as Voronoi cells, and other
+    /// points as squares.
     pub scattered: &'a [bool],
-    /// Value of each point, which determines the colour; a point whose value is NaN is grey, or pale blue in
-    /// the grey map.
+    /// Value of each point; the value determines the colour. A point whose value is NaN is grey, or pale blue
+    /// if the colour map is grey.
     pub values: &'a [f64],
-    /// Name of the values, for the colour bar. If the name contains "damage", the values have by default the
-    /// colour map of damage and a range from 0.
+    /// Name of the values, for the colour bar. If the name contains "damage", the colour map of damage and a
+    /// range from 0 are the defaults.
     pub field: &'a str,
     /// Unit of the values without prefix; empty if dimensionless.
     pub unit: &'a str,
     /// The colour map; `None` for the default of the field.
     pub colours: Option<ColourMap>,
-    /// Colours follow the logarithm of the value.
+    /// The colours have a logarithmic scale.
     pub is_logarithmic: bool,
-    /// Line above the picture.
+    /// Title above the frame.
     pub title: &'a str,
     /// Values at the ends of the colour bar; `None` for the smallest and the largest value.
     pub range: Option<(f64, f64)>,
@@ -89,7 +90,8 @@ pub struct Scene<'a> {
     pub view: View,
     /// Width of the picture in pixels, from 200 to 16384.
     pub width: u32,
-    /// Lines over the points of a flat view (m), each with the index of its colour.
+    /// Lines that are drawn over the points of a flat view: index of the colour and positions (m) of each
+    /// line.
     pub lines: &'a [(usize, Vec<[f64; 3]>)],
     /// Values of the contour lines that are drawn over the points of a flat view.
     pub contours: &'a [f64],
@@ -115,8 +117,8 @@ pub struct Mark {
     pub scattered: bool,
 }
 
-/// Largest absolute coordinate. Points with a larger coordinate are omitted, because they result from a
-/// failed run.
+/// Limit of the absolute value of a coordinate, m. Points beyond this limit are omitted, because they result
+/// from a failed run.
 const LARGEST_COORDINATE: f64 = 1e100;
 
 impl Scene<'_> {
@@ -197,7 +199,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Return the position with zeros for coordinates that the body does not have.
+    /// Return the position, with 0 for the coordinates that a 1-D or 2-D body does not have.
     fn without_unused(&self, mut position: [f64; 3]) -> [f64; 3] {
         for coordinate in position.iter_mut().skip(self.dimension.max(1)) {
             *coordinate = 0.0;
@@ -272,7 +274,7 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// The arrows of this fraction of the vectors, the shortest ones, are never cut.
+/// Fraction of the vectors, from the shortest on, whose arrows are never cut.
 const WHOLE_ARROWS: f64 = 0.995;
 
 /// Arrows are cut only if the longest of all vectors is more than this many times as long as the longest of
@@ -287,7 +289,7 @@ pub struct Marks<'a> {
 }
 
 impl Marks<'_> {
-    /// Test whether no point is drawn.
+    /// Test whether there is no point to draw.
     pub fn is_empty(&self) -> bool {
         self.order.is_empty()
     }
@@ -351,8 +353,8 @@ impl Marks<'_> {
 }
 
 /// Test whether a slice shows a point. The slice is at the coordinate `position` (m) of `axis`. The point is
-/// at `place` (m), and its cell has the edge `edge` (m). Deformed layers can have gaps, so the largest
-/// distance from the slice is more than half an edge.
+/// at `place` (m), and its cell has the edge `edge` (m). The distance from the slice may be up to 0.75 edges
+/// rather than half an edge, because deformed layers can have gaps.
 pub fn is_in_slice(axis: Axis, position: f64, place: [f64; 3], edge: f64) -> bool {
     (place[axis.index()] - position).abs() <= 0.75 * edge
 }

@@ -3,7 +3,7 @@
 use super::distance_squared;
 
 /// Boxes over a cloud of positions, for searches within a radius. The edge of a box is at least half the
-/// radius. Boxes with a full radius as edge would contain more points out of range.
+/// radius. With boxes as large as the radius, searches would visit more points out of range.
 pub struct Bins {
     lower: [f64; 3],
     inverse_edge: f64,

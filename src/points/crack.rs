@@ -13,7 +13,8 @@ const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.
 ///
-/// - For a crack without width, a point in the plane of the crack counts as on the side of the normal.
+/// - For a crack without width, an end of a bond in the plane of the crack counts as on the side to which the
+///   normal points.
 /// - A bond crosses a slot if the bond touches the volume between the faces of the slot.
 /// - Pass the end with the lower id first, so that both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {

@@ -119,7 +119,7 @@ impl<'a> LatticeBody<'a> {
         })
     }
 
-    /// Return the position (m) at an offset, in edges, from the centre of cell 0.
+    /// Return the position (m) at an offset (in cell edges) from the centre of cell 0.
     pub fn position(&self, edges: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| {
             if k < self.dimension {

@@ -138,9 +138,9 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
 /// Read a mesh and generate its points, on one rank.
 ///
 /// # Errors
-/// If the name of the file does not end like a mesh file, if the file cannot be read or parsed, or if an
-/// element is invalid, belongs to two bodies or coincides with another. Also if a body's block is no group
-/// with elements of the problem's dimension, or the name of a block or set is ambiguous.
+/// If the file name does not have the ending of a mesh format, or the file cannot be read or parsed. If an
+/// element is invalid, belongs to two bodies or coincides with another element. If the block of a body is no
+/// group with elements of the problem's dimension, or the name of a block or set is ambiguous.
 pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     let bodies = BodyPoints::of(&problem.bodies);
     let MeshPoints {
@@ -300,12 +300,12 @@ fn bodies_of_elements(
     Ok(bodies)
 }
 
-/// Return the name of a part of the mesh that should belong to `rest`, the body without a block, but has
-/// only single-node elements without a volume. `None` if there is no such part.
+/// Return the name of a part of the mesh that should belong to `rest`, the body without a block, but has only
+/// single-node elements without a volume. `None` if there is no such part.
 ///
 /// The part is the whole rest of the mesh, if all elements that belong to no other body are such elements. In
 /// files of Exodus, the part may also be a block of spheres that no other body selects. In other files,
-/// single-node elements may define sets, so no smaller part than the whole rest counts.
+/// single-node elements may define sets, so only the whole rest of the mesh counts.
 fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {
     let is_left = |element: usize| bodies[element] == NO_BODY;
     let is_single = |element: usize| mesh.elements.kind(element).dimension() == 0;

@@ -78,7 +78,7 @@ pub struct BodyPoints<'a> {
 }
 
 impl<'a> BodyPoints<'a> {
-    /// Return names and sources of some bodies.
+    /// Return the names of the bodies and the sources of their points.
     pub fn of(bodies: &'a [Body]) -> Vec<Self> {
         let own = |body: &'a Body| Self {
             name: &body.name,

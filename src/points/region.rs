@@ -34,8 +34,8 @@ struct CellBox {
     end: [i64; 3],
 }
 
-/// Consecutive layers along one direction that contain the same cells in the lower directions. The order of
-/// directions is x, y, z.
+/// Consecutive layers of cells along one direction. All layers of a span contain the same cells. The
+/// outermost spans lie along z, the spans within them along y, and the innermost along x.
 #[derive(Debug)]
 struct Span {
     first: i64,
@@ -144,7 +144,8 @@ fn cells(
     Some(cells)
 }
 
-/// Compute the union of boxes as spans along `direction`, with nested spans along the lower directions.
+/// Compute the union of boxes as spans along `direction`, with nested spans along the lower directions. With
+/// more than [`MANY_PARTS`] boxes, the result may contain further cells.
 fn spans_along(boxes: &[&CellBox], direction: usize) -> Vec<Span> {
     let span = |cells: &CellBox| [cells.first[direction], cells.end[direction]];
     let mut spans: Vec<[i64; 2]> = boxes.iter().map(|cells| span(cells)).collect();

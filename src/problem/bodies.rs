@@ -27,7 +27,8 @@ pub struct Body {
     pub damage: Option<Damage>,
     /// Horizon δ, m.
     pub horizon: f64,
-    /// Span of the horizon in the deck, in the section of the body or of the grid.
+    /// Span of the horizon in the deck: in the section of the body, or in `[grid]` if the body gives no
+    /// horizon.
     pub horizon_place: Range<usize>,
     /// Source of the points.
     pub points: PointSource,
@@ -40,7 +41,8 @@ impl Body {
         self.damage.is_some() || law.breaks_by_itself() || law.wears_out
     }
 
-    /// Test whether the points are the centres or Gauss points of the cells of a lattice.
+    /// Test whether the points are the centres or Gauss points of the cells of a lattice. `jitter` is the
+    /// jitter of the problem.
     pub fn is_on_lattice(&self, jitter: Option<Jitter>) -> bool {
         jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })
     }
@@ -106,7 +108,7 @@ pub enum VolumeCorrection {
 pub enum Quadrature {
     /// One point at the centre.
     Midpoint,
-    /// Two points in each direction, at ±√3/3 of half the edge.
+    /// Two points along each axis, at a distance of √3/3 of half the edge from the centre.
     Gauss,
 }
 
@@ -136,7 +138,7 @@ pub enum FamilyRule {
     Auto,
     /// Lists for all bodies.
     List,
-    /// Lattice families for all bodies, each of which must lie on a lattice.
+    /// Lattice families for all bodies; every body must lie on a lattice.
     Lattice,
 }
 
@@ -168,7 +170,7 @@ pub struct InterfacePair {
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
     /// By the damage laws of both bodies. If the horizons are equal, a bond breaks at the smaller of the two
-    /// thresholds.
+    /// thresholds. Otherwise, both thresholds determine the threshold of the bond.
     OfBodies,
     /// Bonds never break.
     Unbreakable,
@@ -270,7 +272,8 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The mean of the stress measures of the ends that act on the bond and whose points carry stress.
+    /// The mean of the stress measures of the bond's ends. An end counts only if it acts on the bond and its
+    /// point carries stress.
     Stress(StressRule),
 }
 
@@ -290,7 +293,7 @@ pub enum Toughness {
 /// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// Points in those cells of a lattice whose centres lie within a shape, and within the shape of no later
+    /// Points in the lattice cells whose centres lie within a shape, but not within the shape of a later
     /// body.
     Lattice {
         /// The region that the cells fill.
@@ -410,7 +413,7 @@ pub enum Selector {
         /// Span of the largest id in the deck, or of the name of the file that contains the ids.
         largest: Range<usize>,
     },
-    /// Points of a group of the meshes from which bodies get their points.
+    /// Points of a group of elements or nodes in the meshes.
     Mesh(MeshSet),
 }
 
@@ -444,7 +447,7 @@ impl MeshSet {
         }
     }
 
-    /// Set the ids of the points at the first call. Return whether the ids are those of the first call.
+    /// At the first call, store the ids of the points. Return whether `ids` are equal to the stored ids.
     pub fn resolve(&self, ids: Runs) -> bool {
         let ids = &ids;
         self.ids.get_or_init(|| ids.clone()) == ids

@@ -161,7 +161,8 @@ impl Problem {
 }
 
 impl Action {
-    /// Return the deck's key for this condition. A traction or pressure is stored as a body force.
+    /// Return the deck's key for this condition: `body_force` also for tractions and pressures, which are
+    /// stored as body forces.
     fn quantity(&self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",

@@ -83,7 +83,7 @@ impl Condition {
         }
     }
 
-    /// Return the different values of [`Self::divisor`] on some bodies.
+    /// Return the distinct values of [`Self::divisor`] for some bodies; bodies with `None` are skipped.
     pub fn divisors<'b>(
         &self,
         bodies: impl IntoIterator<Item = &'b Body>,

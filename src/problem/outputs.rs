@@ -86,7 +86,7 @@ pub struct History {
     pub every: Option<Interval>,
     /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
-    /// Components of support forces along given directions.
+    /// Sets whose reaction force along a direction is recorded.
     pub support_forces: Vec<SupportForce>,
     /// Whether fragments are counted.
     pub fragments: bool,
@@ -141,7 +141,7 @@ pub struct CrackPath {
     pub from: [f64; 3],
     /// Index of the set that is evaluated.
     pub set: usize,
-    /// Threshold that the damage must exceed.
+    /// Damage above which a point counts as cracked.
     pub threshold: f64,
 }
 
@@ -199,7 +199,7 @@ pub struct Tip {
     pub line: Line,
     /// Index of the set that is evaluated.
     pub set: usize,
-    /// Threshold that the damage must exceed.
+    /// Damage above which a point counts as damaged.
     pub threshold: f64,
 }
 
@@ -246,8 +246,8 @@ pub enum Field {
     /// Weighted volume m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
     /// Kirchhoff stress Σ T⊗Y Ṽ of the three-dimensional body, Pa: xx, yy, zz, xy, yz, xz. In plane strain,
-    /// correspondence laws give zz; for other laws, zz = ν (xx + yy). Under uniaxial strain,
-    /// yy = zz = ν/(1 − ν) xx.
+    /// correspondence laws compute zz; for other laws, zz = ν (xx + yy). Under uniaxial strain, yy and zz are
+    /// ν/(1 − ν) xx.
     Stress,
     /// Cauchy stress, Pa: Kirchhoff stress divided by the ratio of deformed to undeformed volume. The order
     /// of the components is that of [`Self::Stress`].
@@ -258,7 +258,7 @@ pub enum Field {
     /// few intact bonds.
     DeformationGradient,
     /// Green–Lagrange strain ½(FᵀF − I) of the three-dimensional body: xx, yy, zz, xy, yz, xz. In plane
-    /// stress, the law gives the out-of-plane stretch; under uniaxial stress, the lateral stretch follows
+    /// stress, the law computes the out-of-plane stretch. Under uniaxial stress, the lateral stretch follows
     /// from ν.
     Strain,
     /// Number of intact bonds of the point. A bond counts if one of its ends lies within the horizon of the
@@ -277,8 +277,8 @@ pub enum Field {
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.
     Temperature,
-    /// Fragment id: the smallest id in the fragment of the point, which contains all points that chains of
-    /// intact bonds connect to the point.
+    /// Fragment id: the smallest id of the points in the fragment. A fragment contains all points that chains
+    /// of intact bonds connect to one another.
     Fragment,
     /// The rank that owns the point.
     Rank,

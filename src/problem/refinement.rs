@@ -44,8 +44,8 @@ pub struct Trigger {
     pub condition: Option<Expression>,
     /// A condition on reference position and time that every triggering point must fulfil.
     pub only: Option<Expression>,
-    /// Time (s) after which the grid is coarsened at a refined point, if the point has been outside the
-    /// horizons of triggering points and of points with broken bonds for this time. `None` for no coarsening.
+    /// Time (s) that a refined point must lie outside the horizons of triggering points and of points with
+    /// broken bonds before the grid is coarsened at the point. `None` for no coarsening.
     pub coarsen_after: Option<f64>,
 }
 

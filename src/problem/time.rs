@@ -23,7 +23,7 @@ pub struct Adaptive {
     /// Largest number of bonds of one point that may break in a step. If more bonds break, the step is
     /// repeated with a smaller Δt.
     pub most_broken: u64,
-    /// Largest number of bonds of one point that break in a calm step.
+    /// A step is calm if at most this number of bonds of each point break.
     pub stable_broken: u64,
     /// Number of consecutive calm steps before Δt is raised.
     pub steps: u64,
@@ -66,7 +66,7 @@ pub enum Method {
     /// At least one equilibrium per load step, by relaxation; more if bonds break. The time t is the load
     /// parameter, and [`Time::step`] is not used.
     Relaxation(Relaxation),
-    /// Same as [`Method::Relaxation`], by Newton's method.
+    /// Same as [`Method::Relaxation`], but by Newton's method.
     Static(Static),
 }
 

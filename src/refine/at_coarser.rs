@@ -8,14 +8,14 @@ use super::pattern::Pattern;
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// Indices, in steps of the level, at which the refinement of coarser levels creates nodes in addition to
-    /// the grid of level 0. An index counts only if [`Pattern::is_possible`] holds there.
+    /// Indices, in spacings of the level, at which the refinement of coarser levels creates nodes in addition
+    /// to the grid of level 0. A node exists at such an index only if [`Pattern::is_possible`] holds there.
     finer: GridIndexSet,
     /// Bits of a word whose indices lie on the grid of level 0. These bits are the same for all words that
     /// contain indices of this grid.
     coarsest: u64,
-    /// For each bit of a word: offsets to the words within the distance, and the bits of these words that lie
-    /// within the distance.
+    /// For each bit of a word: offsets to the words within the distance of the bit's index, and the bits of
+    /// these words whose indices lie within the distance.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
@@ -65,8 +65,8 @@ impl<'a> AtCoarser<'a> {
         }
     }
 
-    /// Test whether a coarser node lies within the distance of `index`. This is the case if a node of the
-    /// level is possible, but missing, at an index within the distance.
+    /// Test whether a coarser node lies within the distance of the node at `index`. This is the case if, at
+    /// an index within the distance, a node of the level is possible but missing.
     ///
     /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {
@@ -83,7 +83,7 @@ impl<'a> AtCoarser<'a> {
         })
     }
 
-    /// The bits of a word at which nodes exist. Bits at which no node is possible have no meaning.
+    /// The bits of a word at which nodes exist. Bits of indices at which no node is possible have no meaning.
     fn occupied(&self, word: GridIndex) -> u64 {
         let steps = (1 << self.level).max(EDGE);
         let on_coarsest = word.iter().all(|x| x * EDGE % steps == 0);

@@ -38,7 +38,7 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// For the point at a grid index in steps of the finest level, return the fraction that belongs to the
+    /// For the point at a grid index in spacings of the finest level, return the fraction that belongs to the
     /// set.
     fn at(
         &mut self,

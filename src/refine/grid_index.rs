@@ -13,16 +13,16 @@ pub(super) fn between(low: GridIndex, high: GridIndex) -> impl Iterator<Item = G
     })
 }
 
-/// The parents of an index, in steps of the next coarser level. An index that lies half-way between coarser
-/// indices in 0, 1, 2 or 3 directions has 1, 2, 4 or 8 parents.
+/// The parents of an index, in spacings of the next coarser level. An index that lies half-way between
+/// coarser indices in 0, 1, 2 or 3 directions has 1, 2, 4 or 8 parents, respectively.
 pub(super) fn parents(index: GridIndex) -> impl Iterator<Item = GridIndex> {
     let low = index.map(|x| x.div_euclid(2));
     let high = index.map(|x| (x + 1).div_euclid(2));
     between(low, high)
 }
 
-/// The indices at half-spacing offsets around an index, in steps of the next finer level: 2 in 1-D, 8 in 2-D,
-/// 26 in 3-D.
+/// The indices around an index, at a distance of half a spacing along one or several axes: 2 in 1-D, 8 in
+/// 2-D, 26 in 3-D. The results are in spacings of the next finer level.
 pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item = GridIndex> {
     let middle = index.map(|x| 2 * x);
     let step = |k: usize| i64::from(k < dimension);
@@ -32,8 +32,8 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
 }
 
 /// The grid index with a given number in a level-0 cell. The indices of a level in the cell are numbered from
-/// 0, with x fastest, starting at `origin`, the index of the centre of the cell. All indices are in steps of
-/// the level.
+/// 0, with x fastest, starting at `origin`, the index of the centre of the level-0 cell. All indices are in
+/// spacings of the level.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)
@@ -44,7 +44,7 @@ pub(super) fn halves(index: GridIndex) -> u32 {
     index.iter().map(|x| (x & 1) as u32).sum()
 }
 
-/// The coarsest level whose grid contains the position of an index, and the index in steps of this level.
+/// The coarsest level whose grid contains the position of an index, and the index in spacings of this level.
 pub(super) fn canonical(mut level: u32, mut index: GridIndex) -> (u32, GridIndex) {
     while level > 0 && halves(index) == 0 {
         level -= 1;

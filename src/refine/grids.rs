@@ -32,7 +32,7 @@ struct BodyGrid<'a> {
     pattern: Pattern,
 }
 
-/// A node: body, level, and the three components of its grid index. The index is in steps of the node's
+/// A node: body, level, and the three components of its grid index. The index is in spacings of the node's
 /// level, except in the result of [`Grids::coarsen`].
 pub type NodeKey = [i64; 5];
 
@@ -42,8 +42,8 @@ fn finest_first([body, level, x, y, z]: &NodeKey) -> NodeKey {
 }
 
 impl<'a> Grids<'a> {
-    /// Create unrefined grids; there are none for a problem without refinement. `coarsest` is the number of
-    /// level-0 points of all ranks.
+    /// Create unrefined grids. A problem without refinement has no grids. `coarsest` is the number of level-0
+    /// points of all ranks.
     ///
     /// # Errors
     /// If the cells of a body are too far from the origin to be numbered.
@@ -137,7 +137,7 @@ impl<'a> Grids<'a> {
 
     /// Coarsen nodes, except permanent nodes and parents of refined nodes.
     ///
-    /// Return each removed node once, finest level first: body, canonical level, and index in steps of the
+    /// Return each removed node once, finest level first: body, canonical level, and index in spacings of the
     /// finest level.
     pub fn coarsen(&mut self, keys: &[NodeKey]) -> Vec<NodeKey> {
         let mut coarse: Vec<NodeKey> = keys.to_vec();
@@ -257,21 +257,21 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// The grid index in steps of the finest level at a position (m) in a body. `None` if the body is on no
-    /// lattice, or if the problem has no refinement.
+    /// The grid index in spacings of the finest level at a position (m) in a body. `None` if the body is on
+    /// no lattice, or if the problem has no refinement.
     pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
-    /// Reference position (m) of a grid index in steps of the finest level. `None` if the index is not on the
-    /// grid of level 0, if the body is on no lattice, or if the problem has no refinement.
+    /// Reference position (m) of a grid index in spacings of the finest level. `None` if the index is not on
+    /// the grid of level 0, if the body is on no lattice, or if the problem has no refinement.
     pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))
     }
 
-    /// The parents of a node that is not on the grid of level 0. All indices are in steps of the finest
+    /// The parents of a node that is not on the grid of level 0. All indices are in spacings of the finest
     /// level.
     pub fn parents(&self, index: GridIndex) -> Vec<GridIndex> {
         let (level, index) = canonical(self.finest, index);
@@ -345,8 +345,8 @@ impl<'a> Grids<'a> {
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
-            // Without enlarged horizons, no test is needed: nodes at interfaces can share a lattice with
-            // other nodes.
+            // Without enlarged horizons, no test is needed, because nodes at interfaces can be in the same
+            // block as other nodes.
             return Vec::new();
         }
         let of_level = |level| {
@@ -389,7 +389,7 @@ impl<'a> Grids<'a> {
         Some(grid.pattern.changed())
     }
 
-    /// The cell of level 0 that contains a grid index in steps of the finest level.
+    /// The cell of level 0 that contains a grid index in spacings of the finest level.
     pub fn cell_of(&self, index: GridIndex) -> GridIndex {
         index.map(|x| x >> self.finest)
     }
@@ -401,7 +401,7 @@ impl BodyGrid<'_> {
         self.pattern.node(&|cell| cells.has_cell(cell), index)
     }
 
-    /// Reference position (m) of a grid index in steps of a level.
+    /// Reference position (m) of a grid index in spacings of a level.
     fn position(&self, level: u32, index: GridIndex) -> [f64; 3] {
         let scale = 0.5_f64.powi(level as i32);
         self.cells.position(index.map(|x| x as f64 * scale))

@@ -18,7 +18,7 @@ pub struct Node {
     pub whole: bool,
 }
 
-/// The refined nodes of a body, by level. A node is stored as a grid index in steps of its level.
+/// The refined nodes of a body, by level. A node is stored as a grid index in spacings of its level.
 ///
 /// - The `body` arguments test whether a level-0 cell belongs to the body.
 /// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level, except
@@ -93,8 +93,8 @@ impl Pattern {
         self.permanent = self.refined.as_slice().into();
     }
 
-    /// The finest level at which a grid index is a refined node, and the index in steps of this level. The
-    /// argument is in steps of the finest level. `None` if the node is permanent or not refined.
+    /// The finest level at which a grid index is a refined node, and the index in spacings of this level. The
+    /// argument is in spacings of the finest level. `None` if the node is permanent or not refined.
     pub fn refined_at(&self, index: GridIndex) -> Option<(u32, GridIndex)> {
         let finest = self.finest();
         let (coarsest, _) = canonical(finest, index);
@@ -107,7 +107,7 @@ impl Pattern {
     }
 
     /// The nodes that have been removed by coarsening the node at `index` of `level`, as grid indices in
-    /// steps of the finest level.
+    /// spacings of the finest level.
     pub fn removed(
         &self,
         body: &impl Fn(GridIndex) -> bool,
@@ -133,7 +133,7 @@ impl Pattern {
         self.is_taken(level, index) && self.is_possible(body, level, index)
     }
 
-    /// Test whether a node exists at an index of a level, if a node is possible at this index.
+    /// Test whether a node exists at an index of a level, given that a node is possible at this index.
     fn is_taken(&self, level: u32, index: GridIndex) -> bool {
         let (level, index) = canonical(level, index);
         level == 0 || {
@@ -142,8 +142,8 @@ impl Pattern {
         }
     }
 
-    /// Test whether a level-0 cell, given by the index of its centre, can contain nodes other than its
-    /// centre.
+    /// Test whether a level-0 cell, given by the index of its centre, can contain nodes other than the node
+    /// at its centre.
     pub fn touches(&self, cell: GridIndex) -> bool {
         let Some(refined) = self.refined.first() else {
             return false;
@@ -152,8 +152,7 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The level-0 cells whose nodes may differ from the nodes without refinement, or that can contain finer
-    /// nodes.
+    /// The level-0 cells whose nodes may differ from the nodes without refinement.
     pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
         let mut changed = GridIndexSet::default();
@@ -165,7 +164,7 @@ impl Pattern {
         changed
     }
 
-    /// The node at a grid index in steps of the finest level; `None` if there is none.
+    /// The node at a grid index in spacings of the finest level; `None` if there is none.
     pub fn node(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> Option<Node> {
         let finest = self.finest();
         if !self.exists(body, finest, index) {
@@ -268,7 +267,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All nodes of a body, by grid index in steps of the finest level.
+    /// All nodes of a body, by grid index in spacings of the finest level.
     fn nodes(
         pattern: &Pattern,
         body: &impl Fn(GridIndex) -> bool,
@@ -413,7 +412,7 @@ mod tests {
         assert_eq!(before.len() as f64, cells);
     }
 
-    /// The indices at half a spacing of a level around an index. All indices are in steps of the finest
+    /// The indices at half a spacing of a level around an index. All indices are in spacings of the finest
     /// level.
     fn around_by_half(
         level: u32,

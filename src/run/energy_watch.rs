@@ -1,7 +1,8 @@
 //! Detection of unstable time steps and of lost energy by the energy balance.
 //!
 //! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
-//! last load step or the start, without negative fracture energy. The energy input is `EnergyWatch::input`.
+//! last load step or the start. Negative fracture energy is left out of this change. The energy input is
+//! `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -25,7 +26,8 @@ const FATAL_GAIN: f64 = 100.0;
 /// this ratio.
 const CERTAIN_GAIN: f64 = 1e9;
 
-/// If breaking bonds have added more energy than this fraction of the energy input, a warning is printed.
+/// Fraction of the energy input. If breaking bonds have added more energy than this fraction, a warning is
+/// printed.
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
 /// Error of the energy balance at the end of a run, as a fraction of the largest energy, above which a
@@ -99,8 +101,8 @@ impl EnergyWatch {
         }
     }
 
-    /// Look at a row of the history; `simulation` is at the time of this row. Return warnings; they are the same
-    /// on all ranks. `is_last`: whether this is the last row of the run.
+    /// Check a row of the history, and return warnings. `simulation` is at the time of this row. `is_last`
+    /// says whether this row is the last of the run. The warnings are the same on all ranks.
     ///
     /// # Errors
     /// If a time step is clearly unstable, see [`Self::check`].
@@ -120,8 +122,8 @@ impl EnergyWatch {
         Ok(growth.into_iter().chain(of_breaking).collect())
     }
 
-    /// Take note of the row of a load step. Its errors do not come from the time step, so they do not count as
-    /// an energy gain of later time steps.
+    /// Record the row of a load step. The errors of load steps do not come from the time step, so they do not
+    /// count as an energy gain of later time steps.
     fn note_load_step(&mut self, row: &HistoryRow) {
         self.add_input(row);
         self.error_of_load_steps = row.energies.error;
@@ -133,9 +135,9 @@ impl EnergyWatch {
         self.input = self.input.max(input);
     }
 
-    /// Check the ratio of energy gain to energy input in the row of a time step. Return a warning at the first
-    /// row with a ratio above [`WARNING_GAIN`]. `stable` is the stable step of the present stage, s.
-    /// `is_last`: whether this is the last row of the run. The result is the same on all ranks.
+    /// Check the ratio of energy gain to energy input in the row of a time step. Return a warning at the
+    /// first row with a ratio above [`WARNING_GAIN`]. `stable` is the stable step of the present stage, s.
+    /// `is_last` says whether this row is the last of the run. The result is the same on all ranks.
     ///
     /// # Errors
     /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, or above
@@ -176,9 +178,9 @@ impl EnergyWatch {
         Ok(Some(format!("{} ({})", text(), steps())))
     }
 
-    /// Check the fracture energy in the row of a time step. Return a warning at the first row in which breaking
-    /// bonds have added more than [`MAX_ADDED_FRACTION`] of the energy input. Breaking bonds can add energy
-    /// because a correspondence law can store more energy with fewer bonds.
+    /// Check the fracture energy in the row of a time step. Return a warning at the first row in which
+    /// breaking bonds have added more than [`MAX_ADDED_FRACTION`] of the energy input. Breaking bonds can add
+    /// energy, because a family of a correspondence law can store more energy with fewer bonds.
     fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
         self.max_freed = self.max_freed.max(freed);

@@ -321,7 +321,8 @@ impl<'a> Job<'a> {
             }
             let mut saves = complete || decision.checkpoint || decision.stop.is_some();
             if is_checked || saves {
-                // The check and the outputs use velocities at the full step.
+                // The check and the outputs use the velocities at the end of the step, after the second half
+                // kick.
                 stepper.at_full_step();
             }
             if is_agreed {
@@ -485,8 +486,7 @@ impl<'a> Job<'a> {
             .any(|continuation| *continuation != Continuation::Resume)
         {
             recorder.write_first(simulation)?;
-            // The previous checkpoint contains the numbers of outputs of the renamed files, so it cannot be
-            // used any more.
+            // The previous checkpoint counts the outputs of the renamed files, so it cannot be used any more.
             checkpoints.write(simulation, &mut recorder)?;
         }
         Ok((checkpoints, recorder))

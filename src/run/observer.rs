@@ -17,7 +17,7 @@ pub trait Observer {
     /// Called before the first step, with the state of step 0 or of the checkpoint.
     fn begin(&mut self, _now: &mut dyn RunState) {}
 
-    /// Called after each explicit step and each iteration of a load step, when the scheduled output has been
+    /// Called after each explicit step and each iteration of a load step, after the scheduled output has been
     /// written.
     fn step(&mut self, _now: &mut dyn RunState) {}
 
@@ -89,8 +89,8 @@ pub enum Message {
     Warning(String),
 }
 
-/// The state of a run between two steps. All point data are those of the points that this rank owns. The
-/// order of the points may change from step to step, see [`RunState::ids`].
+/// The state of a run between two steps. All point data belong to the points that this rank owns. The order
+/// of the points may change from step to step, see [`RunState::ids`].
 ///
 /// An observer may [stop](RunState::stop) the run and [change a load](RunState::set_load_factor):
 ///

@@ -156,7 +156,7 @@ impl<'a> OutputFile<'a> {
         Ok(())
     }
 
-    /// Close the file. With `will_resume`, unused space in the file is not freed. Collective.
+    /// Close the file. If `will_resume` is true, unused space in the file is not freed. Collective.
     ///
     /// # Errors
     /// If closing the file or an earlier write fails, for example because the disk is full.

@@ -186,7 +186,8 @@ impl<'a> Recorder<'a> {
         self.write(simulation, |file| file.file.steps() == 0, row)
     }
 
-    /// Write outputs to the files for which `is_chosen` is true, and with `row` a history row. Collective.
+    /// Write outputs to the files for which `is_chosen` is true and, if `row` is true, a history row.
+    /// Collective.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.
@@ -254,7 +255,7 @@ impl<'a> Recorder<'a> {
         self.sync()
     }
 
-    /// Close all result files. With `will_resume`, unused space in the files is not freed. Collective.
+    /// Close all result files. If `will_resume` is true, unused space in the files is not freed. Collective.
     ///
     /// # Errors
     /// If closing a file or an earlier write fails, for example because the disk is full.

@@ -11,7 +11,7 @@ const WITHOUT_DECK: &str = "# a problem without a deck\n";
 /// a deck.
 const HISTORY: &str = "# its history\n";
 
-/// Maximum length of a line in a message.
+/// Maximum length of a line in a message, in characters.
 const MAX_LINE: usize = 100;
 
 /// Maximum number of differences in a message.
@@ -78,7 +78,7 @@ fn source(name: &str, text: &str) -> Source {
     Source::new(name, text)
 }
 
-/// Return the differences in the physics, one per line; empty if there are none.
+/// Return the differences in the physics, one per entry; empty if there are none.
 ///
 /// # Errors
 /// If a deck cannot be parsed.

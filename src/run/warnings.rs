@@ -19,7 +19,8 @@ const MAX_INERTIA: f64 = 0.05;
 /// fracture energy of this run by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
-/// Initial fraction of a run without a check of inertia, because the strain energy is then small.
+/// Initial fraction of the time of a run in which inertia is not checked, because the strain energy is still
+/// small.
 const UNCHECKED_FRACTION: f64 = 0.1;
 
 impl<'a> Job<'a> {
@@ -122,8 +123,8 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn if a restarted run with one stage continues with another step than a new run to the same end
-    /// would use.
+    /// Warn if a restarted run with one stage continues with a time step that differs from the step of a new
+    /// run to the same end.
     pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -18,7 +18,7 @@ const ON_GRID: f64 = 1e-6;
 /// Largest cell index; integers up to this size are exact in floating point.
 const FARTHEST: f64 = 1e15;
 
-/// Largest relative difference between the volume of a point and the volume of a cell.
+/// Largest accepted relative difference between the volume of a point and the volume of a cell.
 const VOLUME: f64 = 1e-2;
 
 /// A grid: the centre of one cell, and the edges of all cells, m.

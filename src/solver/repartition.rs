@@ -26,7 +26,8 @@ pub struct Repartition {
     pub seconds: f64,
 }
 
-/// Schedule of the checks of rank loads, with the time that this rank had spent on bonds at the last check.
+/// Schedule of the checks of the ranks' computing times, with the time that this rank had spent on bonds at
+/// the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,

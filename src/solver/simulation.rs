@@ -52,13 +52,13 @@ pub struct Simulation<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// Conditions of the present stage.
     pub conditions: Conditions<D>,
-    /// Rules of all stages.
+    /// Rules of all stages, and conditions of the other stages.
     pub stages: Stages<D>,
     /// Quantities of the undeformed bodies.
     pub undeformed: Undeformed,
     /// Time, time step and number of steps of the run.
     pub clock: Clock,
-    /// Integrator of the present stage; `None` while it advances the simulation.
+    /// Integrator of the present stage; `None` while the integrator advances the simulation.
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
     /// Progress of the run, without point data and clock.
     pub progress: Progress,
@@ -95,7 +95,7 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration and conditions, including writing the bond inputs.
+    /// Integration and conditions, including the copy of displacements and thermal stretches for the passes.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -103,8 +103,8 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// The first point of a rank with a motion, force or reaction that is not finite: of the points with such
-/// values at the earliest step, the one with the smallest id.
+/// A point with a motion, force or reaction that is not finite: of the points of this rank with such values
+/// at the earliest step, the point with the smallest id.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
@@ -155,9 +155,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Distribute the points of the given grids over the ranks, and create the bonds of these points.
-    /// `pieces` are the points of this rank before the distribution. Initial values are not set, and forces
-    /// are not evaluated. Collective. `time` is the measured computing time of this rank's points (ns); `None`
-    /// if it is not known. `between` is the same as for [`Self::set_up`].
+    /// `pieces` are the points of this rank before the distribution. `time` is the measured computing time of
+    /// this rank's points (ns); `None` if this time is not known. `between` is the same as for
+    /// [`Self::set_up`]. Initial values are not set, and forces are not evaluated. Collective.
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -168,8 +168,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let cutoffs = cutoffs(problem);
         let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-        // With this slack, both ends of a bond of the largest length exist on the rank, for any rounding of
-        // the bond length.
+        // With this slack, both ends of the longest bonds exist on the rank, for any rounding of the bond
+        // length.
         let mut domain = distribute_by_time(comm, pieces, total, longest * (1.0 + SLACK), time)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
@@ -456,8 +456,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Set the velocities of supported points, and compute the reactions. Returns whether these velocities
-    /// and reactions are finite.
+    /// Set the velocities of supported points (0 in load steps), and compute the reactions. Returns whether
+    /// these velocities and reactions are finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
         if self.is_quasi_static() {
             return self.walk(|part, here| here.project_residual(part));
@@ -475,7 +475,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Recompute the fields that are not part of the state. Called after the state was restored. Collective.
+    /// Recompute the fields that are not part of the state, after the state was restored. Collective.
     pub(super) fn recompute_derived(&mut self) {
         self.apply_loads(self.clock.time(), true);
         self.update_damping_power();

@@ -20,8 +20,8 @@ pub struct Stages<const D: usize> {
     pub(super) waiting: Vec<Option<Conditions<D>>>,
 }
 
-/// Return for each condition the time (s) from which it acts without interruption up to this stage; `None` if
-/// it does not act in this stage.
+/// Return for each condition the time (s) from which the condition acts without interruption up to this
+/// stage; `None` if the condition does not act in this stage.
 pub(super) fn begins(stages: &[Stage], stage: usize) -> Vec<Option<f64>> {
     let begin = |condition: usize| {
         let acting = stages[..=stage].iter().rev();
@@ -70,7 +70,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Begin another stage at the present positions. Velocities are set to 0 if this stage or the previous
-    /// one consists of load steps. Collective.
+    /// stage consists of load steps. Collective.
     pub(super) fn begin_stage(&mut self, stage: usize) {
         let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);
@@ -103,8 +103,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Set the velocities of supported points at the start of a stage. If a support changes the velocity of a
-    /// point, it exerts an impulse. The work of this impulse equals the change of kinetic energy and is added
+    /// Set the velocities of supported points at the start of a stage. A support that changes the velocity of
+    /// a point exerts an impulse. The work of this impulse equals the change of kinetic energy and is added
     /// to the external work. `density_ratio` is the ratio of the present density to the density at the
     /// impulse. Returns whether the velocities and reactions of supported points are finite.
     fn begin_supports(&mut self, density_ratio: f64) -> bool {
@@ -131,9 +131,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// prescribed motion keep their velocity. Record the change of kinetic energy. Returns whether the
     /// velocities and reactions of supported points are finite. Collective.
     ///
-    /// If momentum is conserved, the change of density exerts no force. To conserve the velocities instead
-    /// would need an impulse. To conserve the kinetic energy would need an impulse that depends on the frame
-    /// of reference.
+    /// If momentum is conserved, the change of density exerts no force. Constant velocities would need an
+    /// impulse. A constant kinetic energy would need an impulse that depends on the frame of reference.
     fn keep_momentum(&mut self, factor: f64) -> bool {
         let before = self.kinetic_energy() / factor;
         let components = self.fields.velocity.iter_mut();

@@ -68,7 +68,7 @@ pub fn figures<const D: usize>(
     let nearest = nearest_neighbours(simulation);
     let neighbours = neighbours(simulation);
     let mut counts = vec![0; 2 * problem.bodies.len()];
-    // Sums of volume, first moments of volume, and distance to the nearest neighbour.
+    // Five sums per body: volume, three first moments of volume, and distance to the nearest neighbour.
     let mut sums = vec![ExactSum::ZERO; 5 * problem.bodies.len()];
     for point in 0..model.owned() {
         let body = problem.body_of(usize::from(model.block[point]));
@@ -154,7 +154,7 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     simulation.comm.sum(&mut histogram);
     for (body, row) in scattered.iter().zip(histogram.chunks_exact(width)) {
         let last = row.iter().sum::<u64>().saturating_sub(1);
-        // Number of neighbours of the point at this position, if the points are sorted by number of
+        // Number of neighbours of the point at `position` in a list of the points sorted by number of
         // neighbours.
         let sorted = |position: u64| {
             let mut below = 0;
@@ -170,7 +170,8 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
 }
 
 /// Return a warning if the volume of a body's points does not fit the volume of its shape. For points from a
-/// file or mesh, return a warning if their mean volume does not fit their mean distance.
+/// file or mesh, return a warning if their mean volume does not fit their mean distance to the nearest
+/// neighbour.
 fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {

@@ -182,10 +182,10 @@ fn history_bytes(problem: &Problem, body: &Body) -> f64 {
 /// is the number of bonds in lists, counted at both ends.
 fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measured {
     let dimension = problem.dimension.count();
-    // Numbers and energies of broken bonds.
+    // Columns with numbers and energies of broken bonds.
     let damage = if problem.has_damage() { 4 * 8 } else { 0 };
-    // Position, displacement, velocity and force; palette indices of the volumes of the point and of its
-    // family; id and block.
+    // Bytes of a point: position, displacement, velocity and force; one byte each for the volumes of the
+    // point and of its family, see `PaletteColumn`; 8 for the id, and 2 for the block.
     let state = 4 * 8 * dimension + damage + 2 + 8 + 2;
     let contact = if problem.has_contact() { CONTACT } else { 0.0 };
     let resident = bonds + (state as f64 + contact) * points;

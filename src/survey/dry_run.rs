@@ -35,7 +35,7 @@ pub struct DryRun {
     pub cost: Cost,
     /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
-    /// For each stage: first step (s) and number of steps if no bond breaks.
+    /// For each stage: first time step (s), and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,
     /// Measured times; `None` if they were not measured.
     pub seconds: Option<Seconds>,
@@ -44,12 +44,12 @@ pub struct DryRun {
 /// Measured wall-clock times on one rank, s.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seconds {
-    /// A force evaluation in the first stage: an explicit time step makes one; an iteration of a load step,
-    /// one or more.
+    /// Time of a force evaluation in the first stage. An explicit time step makes one evaluation. An
+    /// iteration of a load step makes one or more.
     pub evaluation: f64,
-    /// A row of the history.
+    /// Time of a row of the history.
     pub row: f64,
-    /// The computation of the fields of each output of [`Problem::outputs`], without the writing to the disk.
+    /// For each output of [`Problem::outputs`]: time for computing its fields, without writing them to disk.
     pub outputs: Vec<f64>,
 }
 

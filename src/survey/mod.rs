@@ -31,8 +31,8 @@ use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
-/// Number of intact bonds in 1-D, 2-D and 3-D. A warning is printed for points with fewer intact bonds. The
-/// numbers are half the number of neighbours of a complete family with a horizon of two spacings.
+/// Number of intact bonds of a point in 1-D, 2-D and 3-D below which a warning is printed. The numbers are
+/// half the number of neighbours of a complete family with a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Common horizons, in spacings.
@@ -176,8 +176,8 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    // A bond that softens carries almost no force near its critical stretch, so bodies that break by their
-    // law are not checked.
+    // Bodies without `damage` are not checked, even if their law breaks bonds at the end of softening. A
+    // softening bond carries almost no force near its critical stretch.
     let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
     let of_bodies = of_damage.filter_map(|body| {
         let law = block_laws(problem, &Block::unrefined(body)).damage?;

@@ -180,8 +180,8 @@ fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f
     })
 }
 
-/// Return the number of points in the result of an output, from sampled points of each body. `number` is the
-/// index of the output, and `set` is its set.
+/// Estimate the number of points in the result of an output, from sampled points of each body. `number` is
+/// the index of the output, `set` is its set, and `points` has the number of points of each body.
 fn output_points(
     problem: &Problem,
     (number, set): (usize, Option<usize>),

@@ -30,12 +30,12 @@ pub struct Speed {
     pub set_up: Duration,
     /// Time of the steps.
     pub whole: Duration,
-    /// Time of the phases of the steps.
+    /// Time of the steps by phase.
     pub times: Times,
     /// Number, bytes and time of the messages of the steps.
     pub sent: Traffic,
-    /// Number, bytes and time of the messages of one exchange of displacements per step, without overlap of
-    /// messages and computation.
+    /// Number, bytes and time of the messages of further exchanges of displacements after the steps, as many
+    /// as there are steps. No computation overlaps these messages.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
@@ -100,7 +100,7 @@ fn speed_in<const D: usize>(
     })
 }
 
-/// Exchange displacements `times` times, without overlap of messages and computation. Collective.
+/// Exchange displacements `times` times while nothing is computed, and return the traffic. Collective.
 fn exchange_without_overlap<const D: usize>(
     comm: &dyn Communicator,
     simulation: &mut Simulation<'_, D>,

@@ -1,4 +1,4 @@
-//! Check that a picture shows points. If it shows none, the error gives the reason.
+//! Check that a picture shows points. If the picture shows no points, the error gives the reason.
 
 use fissure::error::{Error, Result};
 use fissure::picture::{Axis, View};
@@ -57,9 +57,8 @@ impl Painter<'_> {
                 *ends = [ends[0].min(value), ends[1].max(value)];
             }
         };
-        // Smallest and largest coordinates of all points (`all`) and of the points in the half spaces of
-        // `--clip` (`kept`), and smallest and largest value of the points that are also in the slice
-        // (`values`).
+        // Smallest and largest coordinates of all points (`all`), and of the points in the half spaces of
+        // `--clip` (`kept`). Smallest and largest value of the points that are also in the slice (`values`).
         let (mut all, mut kept, mut values) = ([none; 3], [none; 3], none);
         let mut nearest: Option<f64> = None;
         let power = 1.0 / self.dimension as f64;

@@ -12,8 +12,8 @@ const BLOCK: usize = 1 << 18;
 /// Coordinates of points in one row of a lattice differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
-/// A body of n points counts as scattered if the numbers of different x, y and z, multiplied with each other,
-/// exceed this constant times n^1.5; see [`scattered_bodies`].
+/// A body of n points counts as scattered if the product of the numbers of different x, y and z exceeds this
+/// constant times n^1.5; see [`scattered_bodies`].
 const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Divide `points` points into ranges of at most [`BLOCK`] points.
@@ -36,7 +36,7 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
     Ok(true)
 }
 
-/// Return for each body whether its points are scattered (not on a lattice) at output `index`. The list is
+/// For each body, return whether its points are scattered (not on a lattice) at output `index`. The list is
 /// empty in 1-D and without outputs.
 ///
 /// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z. A
@@ -54,7 +54,7 @@ pub fn scattered_bodies(
     if dimension < 2 || result.times()?.is_empty() {
         return Ok(Vec::new());
     }
-    // Number of points of each body.
+    // Number of points of each body. The field `block` contains the number of the body.
     let mut points_of: Vec<usize> = Vec::new();
     for points in blocks(result.points(index)) {
         for body in result.field_of("block", index, points)? {

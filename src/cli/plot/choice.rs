@@ -75,9 +75,9 @@ pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     chosen.collect()
 }
 
-/// Return the field to draw: the named field. Without a name, return the first existing field of
-/// [`PREFERRED`], else the first field other than `id` that is stored for each output, else the first field.
-/// `path` is the path of the result, for the error message.
+/// Return the field to draw. With a name, this is the named field. Without a name, it is the first existing
+/// field of [`PREFERRED`], else the first field other than `id` that is stored for each output, else the
+/// first field. `path` is the path of the result, for the error message.
 ///
 /// # Errors
 /// If the result has no field with this name, or no fields.

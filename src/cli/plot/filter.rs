@@ -13,7 +13,7 @@ use super::quantity::Quantity;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
     axis: Axis,
-    /// The half space has the coordinates below `position`, not those above.
+    /// True if the half space is below `position`, false if it is above.
     is_below: bool,
     /// Coordinate of the plane that bounds the half space, m.
     position: f64,

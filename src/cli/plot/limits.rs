@@ -66,7 +66,7 @@ pub fn range_of(text: &str) -> Result<Range> {
 /// Range of the drawn values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Values at the ends of the colour bar.
+    /// Values at the low and the high end of the colour bar.
     pub shown: [f64; 2],
     /// Smallest and largest value.
     all: [f64; 2],
@@ -86,7 +86,7 @@ enum Cut {
 impl Limits {
     /// Return the limits of some values for a requested range; `None` without values. For [`Range::Values`],
     /// the limits are those of all values, because the painter applies the two numbers itself. The limits are
-    /// also those of all values if the two percentiles are equal.
+    /// also those of all values if the values at the two percentiles are equal.
     pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);
@@ -136,7 +136,7 @@ impl Limits {
         Some(limits)
     }
 
-    /// Return whether the colour bar was determined by a rule that excludes values.
+    /// Test whether a rule that excludes values sets the ends of the colour bar.
     pub fn is_cut(&self) -> bool {
         self.cut != Cut::Nothing
     }
@@ -162,8 +162,8 @@ impl Limits {
         }
     }
 
-    /// Format a note that gives the range of all values and the rule that excludes values from the colour
-    /// bar; empty without such a rule.
+    /// Format a note that gives the range of all values, and the rule that excludes values from the colour
+    /// bar. The note is empty without such a rule.
     pub fn note(&self, unit: &str) -> String {
         let colours = match self.cut {
             Cut::Nothing => return String::new(),
@@ -238,7 +238,7 @@ mod tests {
         assert_eq!((limits.shown, limits.note("Pa").as_str()), ([0.0, 1e9], ""));
         let limits = Limits::of(values, Range::Percentiles([0.0, 50.0])).unwrap();
         assert_eq!(limits.shown, [0.0, 501.0]);
-        // Few values of a pulse differ from the others; the range must include these few.
+        // Few values of a pulse differ from the others, and the range must include these few values.
         let pulse: Vec<f64> = (0..1000).map(|k| f64::from(u8::from(k == 7))).collect();
         let limits = Limits::of(pulse, Range::Automatic).unwrap();
         assert!(!limits.is_cut());

@@ -24,8 +24,8 @@ use picture::PictureArguments;
 
 /// Draw a field of a result, or curves of a history.
 ///
-/// Plane bodies are drawn in their plane, solids as seen from a camera or as a slice. With `--y`, columns of
-/// histories or of CSV files are drawn as curves.
+/// Draws plane bodies in their plane, and solids as a camera sees them or as a slice. With `--y`, draws
+/// columns of histories or of CSV files as curves.
 #[derive(Args)]
 #[command(after_help = "\
 Examples, fields:
@@ -53,8 +53,9 @@ pub struct PlotArguments {
     #[command(flatten)]
     picture: PictureArguments,
 
-    /// Draw the output that is nearest to the time T (s), the `last` output, or `all` outputs as one picture
-    /// each. The outputs at several times, separated by commas, are drawn side by side.
+    /// Draw the output that is nearest to the time T (s), the `last` output, or `all` outputs, each as a
+    /// separate picture. The outputs at several times, separated by commas, are drawn side by side in one
+    /// picture.
     #[arg(
         short,
         long,

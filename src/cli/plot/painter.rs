@@ -18,7 +18,7 @@ use super::picture::PictureArguments;
 use super::quantity::Quantity;
 
 /// Largest drawn displacement for `--deform auto`, as a fraction of the longest edge of the box of all
-/// points. Displacements are never drawn smaller than they are.
+/// points. The automatic factor is at least 1.
 const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 
 /// Settings of all pictures of a result.
@@ -203,8 +203,8 @@ impl<'a> Painter<'a> {
         Ok(values)
     }
 
-    /// Return whether a colour bar with a linear scale starts at 0: true for damage, which is never negative;
-    /// false for a difference of damages and for all other fields.
+    /// Test whether a colour bar with a linear scale starts at 0. This is true for damage, which is never
+    /// negative, and false for a difference of damages and for all other fields.
     fn starts_at_zero(&self) -> bool {
         self.minus.is_none() && is_damage(&self.quantity.field)
     }
@@ -252,8 +252,8 @@ impl<'a> Painter<'a> {
         Ok(Some(step.unwrap_or(1.0) * power))
     }
 
-    /// Return whether the slice shows the point at a position (m); true without a slice. `size` is the edge
-    /// of the cell of the point, m.
+    /// Test whether the slice shows the point at a position (m); true without a slice. `size` is the edge of
+    /// the cell of the point, m.
     pub(super) fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
         match self.view {
             View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),
@@ -265,7 +265,7 @@ impl<'a> Painter<'a> {
         !self.clips.iter().all(|clip| clip.holds(position))
     }
 
-    /// Return whether a slice, a half space or a threshold may exclude points from the picture.
+    /// Test whether a slice, a half space or a threshold may exclude points from the picture.
     pub(super) fn is_partial(&self) -> bool {
         let is_slice = matches!(self.view, View::Slice { .. });
         is_slice || !self.clips.is_empty() || self.threshold.is_some()
@@ -378,7 +378,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return for each of these points whether its body has scattered points; empty if no body has scattered
+    /// For each of these points, return whether its body has scattered points; empty if no body has scattered
     /// points.
     fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
         if !self.scattered.contains(&true) {
@@ -393,8 +393,8 @@ impl<'a> Painter<'a> {
     }
 
     /// Return the limits of the drawn values; `None` without usable values. For damage, the automatic range
-    /// covers all values: the few points with damage are not outliers. For a difference, the middle of the
-    /// colour bar is 0.
+    /// covers all values, because the few points with damage are not outliers. For a difference, the middle
+    /// of the colour bar is 0.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
         let limits = match self.range {
             range if self.arguments.log => Limits::logarithmic(values, range),

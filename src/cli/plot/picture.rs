@@ -58,8 +58,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     pub(super) threshold: Option<String>,
 
-    /// Field whose values `--threshold` compares; a component or invariant may follow a colon, such as
-    /// stress:xx [default: the drawn field and component].
+    /// Field whose values `--threshold` compares with its range. A component or invariant may follow after a
+    /// colon, such as stress:xx [default: the drawn field and component].
     #[arg(long, value_name = "NAME[:COMPONENT]", requires = "threshold")]
     pub(super) threshold_field: Option<String>,
 
@@ -91,7 +91,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
-    /// Logarithmic scale of the colours. Points with values up to 0 are grey (pale blue in the map grey).
+    /// Logarithmic scale of the colours. Points with values of 0 or less are grey, or pale blue in the colour
+    /// map grey.
     #[arg(long)]
     pub(super) log: bool,
 
@@ -100,8 +101,8 @@ pub struct PictureArguments {
     pub(super) width: u32,
 }
 
-/// Draw one output of a result (the last output, or the output nearest to a time) or all outputs, each as one
-/// picture.
+/// Draw one output of a result (the last output, or the output nearest to a time), or draw all outputs, each
+/// as a separate picture.
 ///
 /// # Errors
 /// If the file is not a result, an argument is wrong, the field or component is missing, or a picture

@@ -60,7 +60,8 @@ impl Quantity {
         })
     }
 
-    /// Compute the quantity of each point from the stored values, [points, components] row-major.
+    /// Compute the quantity of each point from the stored values: an array of points × components, point by
+    /// point.
     pub fn of(&self, stored: Vec<f64>) -> Vec<f64> {
         if self.components == 1 {
             return stored;

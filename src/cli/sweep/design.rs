@@ -175,7 +175,7 @@ impl Design {
         axes.iter().map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// Return the folder name of each row: the label of the row, in which `_` replaces special characters.
+    /// Return the folder name of each row: the label of the row, with `_` instead of special characters.
     /// Return `row_1`, `row_2`, … if these names are not distinct, or if a name has more than
     /// [`LONGEST_NAME`] bytes.
     pub fn folders(&self) -> Vec<String> {

@@ -48,11 +48,11 @@ pub struct SweepArguments {
     /// Deck to run.
     deck: PathBuf,
 
-    /// Override keys of the deck with those of another deck; may be repeated.
+    /// Override keys of the deck with those of another deck. May be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Values of a parameter or key; give a key with its section; may be repeated.
+    /// Values of a parameter or key. Give a key with its section, such as time.safety. May be repeated.
     #[arg(long, required = true, value_name = "NAME=VALUE,…", value_parser = design::axis)]
     set: Vec<Axis>,
 
@@ -74,8 +74,8 @@ pub struct SweepArguments {
     #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
     reference: Vec<Reference>,
 
-    /// Parameter on the horizontal axis of pictures, over which rates are computed [default: the first one
-    /// with several values that are all numbers].
+    /// Parameter on the horizontal axis of pictures; rates are computed over this parameter [default: the
+    /// first parameter with several values that are all numbers].
     #[arg(long, value_name = "NAME")]
     x: Option<String>,
 
@@ -113,8 +113,8 @@ impl SweepArguments {
     }
 }
 
-/// Return the runs of all combinations. Validate their decks, and check that their histories have the columns
-/// of all values to pick.
+/// Return the runs of all combinations. Validate the deck of each run, and check that its history has the
+/// columns of all values to pick.
 ///
 /// # Errors
 /// If the deck is invalid with the values of a combination, or if a value has an unknown column. The message

@@ -43,7 +43,8 @@ pub struct Run {
     pub set: Vec<(String, String)>,
     /// The deck with all defaults.
     pub deck: String,
-    /// Horizons and spacings (m) and time steps (s, or fractions of the stable step), see [`resolution`].
+    /// Horizons and spacings (m), and time steps (s, or as a fraction of the stable step): see
+    /// [`resolution`].
     pub resolution: Vec<f64>,
 }
 
@@ -169,7 +170,7 @@ impl<'a> Program<'a> {
         let mut waiting = due.iter().copied();
         let mut processes: Vec<Process> = Vec::new();
         let (mut stopped, mut outcome) = (false, Ok(()));
-        // The runs have received a signal to stop.
+        // True if the runs have received a signal to stop.
         let mut asked = false;
         loop {
             while !stopped && outcome.is_ok() && processes.len() < usize::from(self.arguments.jobs)
@@ -234,8 +235,8 @@ impl<'a> Program<'a> {
         outcome.map(|()| stopped)
     }
 
-    /// Start a run; from a checkpoint if the folder has a checkpoint of this run and `--overwrite` is not
-    /// given.
+    /// Start a run. If the folder has a checkpoint of this run, continue from the checkpoint, unless
+    /// `--overwrite` is given.
     fn start(&self, run: &Run) -> Result<Child> {
         let folder = &run.folder;
         std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
@@ -281,8 +282,8 @@ impl<'a> Program<'a> {
             .stdin(Stdio::null())
             .stdout(log)
             .stderr(errors);
-        // In a separate process group, a run does not receive the signal of Ctrl-C. This process receives
-        // that signal, and sends SIGUSR1 to the run.
+        // In a separate process group, a run does not receive the SIGINT of Ctrl-C. Only this process
+        // receives SIGINT, and sends SIGUSR1 to the run.
         command.process_group(0);
         command.spawn().map_err(|error| {
             let program = command.get_program().to_string_lossy().into_owned();

@@ -26,12 +26,12 @@ pub struct Table<'a> {
     units: Vec<String>,
 }
 
-/// A column of the table, with separate texts for the printed table and for sweep.csv.
+/// A column of the table, with one text for the printed table and one text for sweep.csv in each row.
 struct Cells {
-    /// Heading in the printed table, and in sweep.csv.
+    /// Headings in the printed table, and in sweep.csv.
     heading: [String; 2],
     unit: String,
-    /// Text of each run in the printed table, and in sweep.csv.
+    /// Texts of each run in the printed table, and in sweep.csv.
     texts: Vec<[String; 2]>,
 }
 

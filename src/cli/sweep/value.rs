@@ -1,4 +1,4 @@
-//! Values picked from histories, and their references.
+//! Values picked from histories, and the expected numbers (references) for these values.
 
 use std::path::Path;
 
@@ -65,7 +65,7 @@ pub fn reference(text: &str) -> std::result::Result<Reference, String> {
     }
 }
 
-/// Return the expected number of each value; `None` for a value without a reference.
+/// Return the expected number for each value; `None` for a value without a reference.
 ///
 /// # Errors
 /// If a reference names an unknown value, if a value has two references, or if a reference names no value

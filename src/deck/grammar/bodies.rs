@@ -38,9 +38,9 @@ pub struct Body {
     pub horizon: Option<Number>,
 }
 
-/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are
-/// `x [y [z]] volume block`, separated by commas, semicolons or white space, unless `columns` or a header
-/// names other columns.
+/// Points from a file or from the elements of a mesh. Exactly one of `file` and `mesh` must be given. Rows of
+/// a file are `x [y [z]] volume block`, unless `columns` or a header names other columns. Entries are
+/// separated by commas, semicolons or white space.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {
@@ -51,11 +51,12 @@ pub struct Points {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Text>,
     /// Block number of the rows, or group of the elements, that the body uses. If not given, all rows or
-    /// elements that belong to no other body.
+    /// elements that belong to no other body. A body without `block` must come after the other bodies with
+    /// the same file or mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
-    /// Names of the columns of the file, which take precedence over a header of the file: coordinates,
-    /// `volume`, `block`, and any other names.
+    /// Names of the columns of the file: coordinates, `volume`, `block`, and any other names. These names
+    /// take precedence over a header of the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<Spanned<Vec<String>>>,
     /// Metres per unit of length of the mesh; 1 if not given.
@@ -130,10 +131,10 @@ pub struct Set {
     /// The points' global ids, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ids: Option<Spanned<Vec<Spanned<u64>>>>,
-    /// Path of a file with the numbers of the points, relative to the deck.
+    /// Path, relative to the deck, of a file with the ids of the points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Number that the file uses for the first point; 0 if not given.
+    /// Id that the file gives to the first point; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
     /// Name or number of a group in the meshes that define the points of bodies.
@@ -141,7 +142,8 @@ pub struct Set {
     pub mesh: Option<Spanned<GroupName>>,
 }
 
-/// A pre-crack: bonds that cross this surface (in plane problems, this line) start broken.
+/// A pre-crack: bonds that cross this surface (in plane problems, this line) start broken. With a `width`,
+/// the pre-crack is a slot: bonds that touch the slot start broken.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Crack {
@@ -171,7 +173,7 @@ pub enum Crack {
     Disc {
         /// Centre, m.
         centre: Vector,
-        /// Normal, of any length.
+        /// Normal of the disc; a vector of any length.
         normal: Vector,
         /// Radius, m.
         radius: Number,

@@ -26,8 +26,8 @@ pub struct Initial {
 }
 
 /// A condition on a set: a load, support or temperature. Each condition gives exactly one quantity, such as
-/// `displacement` or `pressure`: an expression of x, y, z and t for each component. A component of
-/// displacement or velocity with the string `"free"` is not prescribed.
+/// `displacement` or `pressure`, as an expression of x, y, z and t for each component. The string `"free"`
+/// leaves a component of displacement or velocity unprescribed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
@@ -55,7 +55,8 @@ pub struct Condition {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Number>,
     /// Thickness in m of the layer that carries a traction or pressure. If not given, the spacing of the body
-    /// to which a point belongs; required for bodies without a single spacing.
+    /// to which a point belongs. Required for points from a file or mesh, and for cells with edges of
+    /// different lengths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth: Option<Number>,
     /// Outward normal for a pressure, of any length.

@@ -22,9 +22,10 @@ pub struct Contact {
     /// times the smaller bulk modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Distance in m of two points at which contact begins. The default is the mean edge of the cells of the
-    /// two points, or 1.35 times this edge with `"short-range"`. Even if `radius` is larger, contact of two
-    /// points begins at most at their initial distance, or at 0.9 times this distance with `"short-range"`.
+    /// Distance in m between two points at which contact begins. The default is the mean edge of the cells of
+    /// the two points, or 1.35 times this edge with `"short-range"`. This distance is at most the initial
+    /// distance of the two points, or 0.9 times the initial distance with `"short-range"`, even if `radius`
+    /// is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.

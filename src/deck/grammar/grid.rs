@@ -14,30 +14,30 @@ pub struct Grid {
     /// Edge of a lattice cell in m, or a list with one edge for each dimension; for bodies given as shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
-    /// Horizon δ in m: points up to this distance are bonded; with the volume corrections `"exact"` and
-    /// `"linear"`, also points that are slightly farther apart. In an expression such as `"3.015 * spacing"`,
-    /// `spacing` is the mean spacing of the points of a body; the expression is evaluated for each body
-    /// without its own horizon.
+    /// Horizon δ in m: points up to this distance are bonded. With the volume corrections `"exact"` and
+    /// `"linear"`, points that are slightly farther apart are bonded too. In an expression, for example
+    /// `"3.015 * spacing"`, `spacing` is the mean spacing of the points of a body. The expression is
+    /// evaluated separately for each body without its own horizon.
     pub horizon: Number,
-    /// Position in m of a corner of a lattice cell. The default is chosen separately for each
-    /// spacing. In each direction it follows from the first body with this spacing that is a whole
-    /// number of cells long between flat faces: 0 if a grid with this origin fills the body exactly,
-    /// otherwise the lower face of the body. Without such a body, the default is 0.
+    /// Position in m of a corner of a lattice cell. The default is chosen separately for each spacing and
+    /// each direction. The default depends on the first body with this spacing that is a whole number of
+    /// cells long between flat faces. It is 0 if a grid with the origin 0 fills this body exactly, otherwise
+    /// the lower face of the body. Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
-    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"`,
-    /// `"linear-inside"` or `"none"`. The default is `"exact"` if all points are centres of square
-    /// or cubic cells, otherwise `"none"`.
+    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"`, `"linear-inside"` or
+    /// `"none"`. The default is `"exact"` if all points are centres of square or cubic cells, otherwise
+    /// `"none"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_correction: Option<Spanned<VolumeCorrection>>,
     /// Positions of the points in a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
-    /// Largest random displacement of the points of shapes from their cell centres in each direction, in
-    /// spacings; below 0.5. Points are not displaced if this is not given.
+    /// Largest random shift of the points of shapes from the centres of their cells in each direction, in
+    /// spacings; below 0.5. If not given, points are not shifted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter: Option<Number>,
-    /// Seed of the random displacements of `jitter`; 0 if not given.
+    /// Seed of the random shifts of `jitter`; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
     /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid; points
@@ -74,7 +74,7 @@ pub enum VolumeCorrection {
     /// Ha & Bobaru 2010; PA-HHB in Seleson 2014). δ is the horizon, dx the spacing, and |ξ| the length of the
     /// bond.
     Linear,
-    /// As `linear`, without points beyond the horizon (LAMMPS; Dipasquale et al. 2014, eq. 1 with eq. 10).
+    /// As `linear`, without points beyond the horizon (as in LAMMPS).
     LinearInside,
     /// The factor on the volume is the fraction of the cell that lies within the horizon.
     Exact,
@@ -117,11 +117,11 @@ pub struct Pair {
     pub rule: Option<Spanned<Rule>>,
     /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
     /// these bonds never break. If neither `damage` nor `strength` is given, the bonds break by the damage
-    /// laws of the two bodies; if the horizons are equal, at the smaller of the two thresholds.
+    /// laws of the two bodies. If the horizons are equal, the smaller of the two thresholds applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
-    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical
-    /// stretch of the bonds follows from this stress.
+    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch of
+    /// the bonds follows from this stress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strength: Option<Number>,
 }

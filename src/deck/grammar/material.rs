@@ -37,8 +37,7 @@ pub const DAMPING: &str = "damping";
 /// Key of the coefficient of thermal expansion α in 1/K; 0 if not given.
 pub const THERMAL_EXPANSION: &str = "thermal_expansion";
 
-/// Key of the temperature without thermal strain, in the unit of prescribed temperatures; 0 if not
-/// given.
+/// Key of the temperature without thermal strain, in the unit of prescribed temperatures; 0 if not given.
 pub const REFERENCE_TEMPERATURE: &str = "reference_temperature";
 
 /// Keys of the elastic constants: moduli in Pa, and Poisson's ratio.
@@ -230,11 +229,11 @@ pub struct BondEnergy {
     /// Direction of the fibres, or the normal of the layers, in the undeformed body; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
-    /// How the critical work follows from the toughness. "energy": breaking all bonds across an
-    /// area dissipates the fracture energy. "opening": separating a block of the body costs the
-    /// fracture energy; the energy of this separation is computed before the run. "willberg2022":
-    /// eq. 16 and 18 of Willberg et al. (2022). "perilab": as PeriLab computes it; 2-D and 3-D.
-    /// "peridigm2021": as Peridigm computed it in 2021; 2-D.
+    /// How the critical work follows from the toughness. `"energy"`: breaking all bonds across an area
+    /// dissipates the fracture energy. `"opening"`: separating a block of the body costs the fracture energy.
+    /// The energy of this separation is computed before the run. `"willberg2022"`: eq. 16 and 18 of Willberg
+    /// et al. (2022). `"perilab"`: as in PeriLab, for 2-D and 3-D. `"peridigm2021"`: as in Peridigm in 2021,
+    /// for 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
     /// Whether only bonds that are longer than initially can break; true if not given. If false, compressed
@@ -244,11 +243,12 @@ pub struct BondEnergy {
     /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
     /// surfaces have fewer bonds, so each bond stores more energy at the same strain. Without the correction,
     /// the body therefore breaks at its surfaces first. With 1, the critical work of a bond is larger by the
-    /// same factor as its energy.
+    /// same factor as the stored energy.
     #[serde(default = "zero")]
     pub family_correction: Number,
-    /// α: the threshold is computed for the stretch s0 − α s_min instead of s0, where s_min is the smallest
-    /// stretch of the intact bonds of a point; 0 if not given.
+    /// α: the critical work is computed for the stretch s0 − α s_min instead of the critical stretch s0.
+    /// s_min is the smallest stretch of the intact bonds of a point. The default 0 gives a constant critical
+    /// work.
     #[serde(default = "zero")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
@@ -267,7 +267,7 @@ pub struct BondEnergy {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stress {
-    /// The measure: "principal" is the largest principal stress, "von_mises" the von Mises stress.
+    /// The measure: `"principal"` is the largest principal stress, `"von_mises"` is the von Mises stress.
     pub measure: StressMeasure,
     /// Stress at which bonds break, in Pa.
     pub strength: Number,

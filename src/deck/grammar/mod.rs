@@ -1,6 +1,6 @@
 //! Grammar of the deck: the keys and values of each section of the TOML file.
 //!
-//! A number may be a string with an expression of the `[parameters]`, except counts, levels, ids and seeds.
+//! Any number except counts, levels, ids and seeds may be a string with an expression of the `[parameters]`.
 //! All values are in SI units. Unknown keys are errors. A choice, such as the law of a material, is a table
 //! with the name of the chosen variant (`[material.glass.pmb]`). With a key for the variant instead, the
 //! deserializer would lose the locations of the values for error messages.
@@ -58,8 +58,8 @@ pub struct Deck {
     /// Cross-section of a 1-D body in m²; 1 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_section: Option<Number>,
-    /// Whether a 1-D body is free of lateral stress, `"uniaxial-stress"` (if not given), or of lateral
-    /// strain, `"uniaxial-strain"`.
+    /// Lateral condition of a 1-D body: no lateral stress (`"uniaxial-stress"`, the default) or no lateral
+    /// strain (`"uniaxial-strain"`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub constraint: Option<Spanned<ConstraintName>>,
     /// Named numbers for use in expressions; a parameter may refer to other parameters.
@@ -137,7 +137,7 @@ pub enum DimensionName {
     Space,
 }
 
-/// Which lateral condition a bar (1-D) has: no lateral stress or no lateral strain.
+/// Lateral condition of a bar (1-D): no lateral stress or no lateral strain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum ConstraintName {
     /// No lateral stress: the sides of the bar are free.

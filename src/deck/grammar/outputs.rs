@@ -104,7 +104,8 @@ impl JsonSchema for Outputs {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Simulated time between outputs in s; 1/50 of the run if neither `every_steps` nor `times` is given.
+    /// Simulated time between outputs in s. The default is 1/50 of the run, unless `every_steps` or `times`
+    /// is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between outputs.
@@ -139,8 +140,8 @@ pub enum Precision {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct History {
-    /// Simulated time between rows in s. If neither `every` nor `every_steps` is given, rows are 1/500 of the
-    /// run apart, and at least 20 steps if the whole run is explicit.
+    /// Simulated time between rows in s. The default is 1/500 of the run, unless `every_steps` is given. If
+    /// the whole run is explicit, default rows are only written at multiples of 20 steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between rows. Together with `every`, rows are only written at multiples of this number of steps.
@@ -173,8 +174,8 @@ pub struct History {
     /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks by name. In plane problems, the path and the length of each crack are computed; in 3-D, the
-    /// area and the front.
+    /// Cracks by name. In plane problems, the path and the length of each crack are computed. In 3-D, the
+    /// area and the front are computed.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
     /// Crack tips that are tracked, by name.
@@ -234,8 +235,8 @@ pub struct SupportForce {
     pub direction: Vector,
 }
 
-/// A crack path: the centre lines of the damaged region that is connected to a start position, one
-/// line for each branch. In 3-D, the area and the front of this region are computed.
+/// A crack path: the centre lines of the damaged region that is connected to a start position, one line for
+/// each branch. In 3-D, the area and the front of this region are computed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
@@ -323,8 +324,8 @@ pub struct Front {
     pub threshold: Number,
 }
 
-/// A crack tip: the farthest point in one direction among those points of a set that have a damage above a
-/// threshold. The position is then interpolated as for a [`Front`].
+/// A crack tip: of the points of a set with a damage above a threshold, the farthest point in one direction.
+/// The position of the tip is interpolated as for a [`Front`].
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {
@@ -341,8 +342,8 @@ pub struct Tip {
     pub threshold: Option<Number>,
 }
 
-/// The nonlocal J integral over a box around a crack tip, in 3-D around a piece of a crack front: the energy
-/// that the crack releases per area of its growth.
+/// The nonlocal J integral over a box around a crack tip, or around a piece of a crack front in 3-D. The
+/// integral is the energy that the crack releases per area of its growth.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JIntegral {
@@ -353,8 +354,8 @@ pub struct JIntegral {
     /// Direction in which the crack grows, a vector of any length; along x if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
-    /// Direction of the crack front, a vector of any length that is perpendicular to `direction`; required in
-    /// 3-D only.
+    /// Direction of the crack front, a vector of any length that is perpendicular to `direction`. Required in
+    /// 3-D, not allowed in plane problems.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front: Option<Vector>,
 }

@@ -18,11 +18,13 @@ pub struct Refinement {
     /// rises with the level.
     #[serde(default)]
     pub rule: HorizonRule,
-    /// With `"delta-m"`: m of each level from 1 on. If not given, m rises by 1 from level to level.
+    /// With `"delta-m"`: m = δ/dx of each level, from level 1 on. If not given, m rises by 1 from level to
+    /// level.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
-    /// Factor on the horizon of points that have points of a coarser level inside their horizon. Without
-    /// this factor, their families may lose volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
+    /// Factor on the horizon of points that have points of a coarser level inside their horizon. Without this
+    /// factor, the families of these points may lose volume. The default is √2 with `"delta"` and 1 with
+    /// `"delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
     /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with
@@ -38,8 +40,8 @@ pub struct Refinement {
 }
 
 /// Triggers of refinement: all points within the horizon of a trigger point are refined, one level at a time.
-/// A point is a trigger if it fulfils any of the given `energy`, `damage` and `where`; at least one must be
-/// given.
+/// A point is a trigger if the point fulfils `energy`, `damage` or `where`. At least one of these keys must
+/// be given.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trigger {

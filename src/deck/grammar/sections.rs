@@ -41,7 +41,7 @@ pub enum Form {
 pub enum Restart {
     /// No changes.
     Fixed,
-    /// No changes, and no other order of the tables. Later bodies, initial values and conditions take
+    /// No changes, and no other order of the tables, because later bodies, initial values and conditions take
     /// precedence over earlier ones.
     FixedOrder,
     /// Tables may be added or removed. A table that both decks have must not change.
@@ -86,7 +86,8 @@ pub const SECTIONS: [Section; 39] = [
     Section::new("time.static", Table, Fixed),
     Section::new("stage", Array, Fixed),
     Section::new("output", TableAndNamed, Free),
-    // `history_differences` compares the definitions of the columns; the interval of the rows is free.
+    // `history_differences` compares the definitions of the columns. The interval of the rows may change
+    // freely.
     Section::new("history", Table, Free),
     Section::new("history.force", Named, Fixed),
     Section::new("history.field", Named, Fixed),
@@ -121,14 +122,14 @@ impl Section {
         SECTIONS.iter().find(|section| section.path == path)
     }
 
-    /// Find the innermost section that a path leads into.
+    /// Find the innermost section that contains the key or table with this path.
     pub fn containing(path: &[String]) -> Option<&'static Self> {
         (1..=path.len().min(2))
             .rev()
             .find_map(|depth| Self::find(&path[..depth].join(".")))
     }
 
-    /// Return the number of leading parts of `path` that the header of the section contains.
+    /// Return how many leading parts of `path` belong to the header of the section.
     pub fn header_length(&self, path: &[String]) -> usize {
         let parts = self.path.split('.').count();
         let is_key = |name: &String| OUTPUT_KEYS.contains(&name.as_str());

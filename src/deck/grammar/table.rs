@@ -1,4 +1,4 @@
-//! Tables of values by time.
+//! Tables of values over time.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,12 +15,11 @@ pub struct Table {
     /// Path, relative to the deck, of a text file whose first row names the columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Name of the column of values. If not given and the file has two columns, the column that is not the
-    /// column of times.
+    /// Name of the column of values. May be left out if the file has only two columns, times and values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<Text>,
-    /// Name of the column of times in s. If not given, the column `t` or `time`, or the first
-    /// column if the file has neither.
+    /// Name of the column of times in s. If not given, the column `t` or `time`, or the first column if the
+    /// file has neither.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Text>,
     /// Strictly increasing times in s, instead of a file.

@@ -210,7 +210,7 @@ pub struct Static {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
     /// Largest residual: norm of the unbalanced force, divided by the sum of the norms of loads and
-    /// reactions; `tolerance` of the relaxation if not given.
+    /// reactions. If not given, `tolerance` of the relaxation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Number>,
     /// Largest number of iterations in a load step; the count restarts whenever bonds break.

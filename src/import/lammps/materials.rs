@@ -16,7 +16,7 @@ pub(super) struct Coefficients {
     pub(super) node: Node,
 }
 
-/// Return the last coefficients that the script gives for bonds between atoms of a type.
+/// Return the last coefficients that the script gives for bonds between atoms of the type `kind`.
 fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
     let fits = |of: u32| of == 0 || of == kind;
     let found = model.coefficients.iter().rev();

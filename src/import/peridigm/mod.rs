@@ -75,8 +75,8 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Return the `dimension` of the new deck: `"3d"`, or plane stress or plane strain if a material requires
-/// this. For a plane problem, also write the thickness.
+/// Return the `dimension` of the new deck: `"3d"`, or plane stress or plane strain if a material requires one
+/// of these. For a plane problem, also write the thickness.
 fn setting(translation: &mut Translation, materials: &Node) -> Result<&'static str> {
     let mut setting = "3d";
     for (_, material) in materials.tables() {

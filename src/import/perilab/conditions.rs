@@ -7,8 +7,8 @@ use crate::import::solver;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write the initial values, loads, supports and temperatures, then the stages. `expands` is whether a block
-/// has a thermal expansion. Return whether temperatures are prescribed.
+/// Write the initial values, loads, supports and temperatures, then the stages. `expands` says whether a
+/// block has a thermal expansion. Return whether temperatures are prescribed.
 pub(super) fn conditions(
     translation: &mut Translation,
     root: &Node,

@@ -253,7 +253,7 @@ fn anisotropic(
     Ok(found)
 }
 
-/// Read the thermal models with expansion. `acts` is whether the solver enables thermal models.
+/// Read the thermal models with expansion. `acts` says whether the solver enables thermal models.
 pub(super) fn expansions(
     translation: &Translation,
     models: &Node,
@@ -308,7 +308,7 @@ pub(super) fn expansions(
     Ok(expansions)
 }
 
-/// Read the damage models. `breaks` is whether the solver enables damage.
+/// Read the damage models. `breaks` says whether the solver enables damage.
 pub(super) fn damages(
     translation: &mut Translation,
     models: &Node,

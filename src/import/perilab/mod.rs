@@ -139,7 +139,8 @@ fn note_influence(
     Ok(())
 }
 
-/// Return the solver, or the solvers of all steps in the order of their `Step ID`, as PeriLab does.
+/// Return the solver. In a deck with several steps, return the solvers of all steps. Their order is that of
+/// `Step ID`, as in PeriLab.
 ///
 /// # Errors
 /// If a step has no `Step ID`, or one that is not a whole number.

@@ -82,7 +82,7 @@ fn blocks_of_abaqus(
     Some(names)
 }
 
-/// Columns of a point file from which PeriLab takes the constants of each point, in place of those of the
+/// Columns of a point file with constants of each point, which PeriLab uses instead of the constants of the
 /// deck.
 const POINTWISE_CONSTANTS: [&str; 5] = [
     "Bulk_Modulus",
@@ -99,9 +99,9 @@ const MOST_IDS: usize = 1_000_000;
 /// Return the node sets of an Exodus mesh with the ids of their points, by name. PeriLab gives the name
 /// `Set-N` to the N-th set if this set has no name.
 ///
-/// In PeriLab, an element belongs to a node set if all nodes of the element do. (In Peridigm and Fissure, one
-/// node is enough.) The result is empty if the mesh cannot be read, or if some of its elements are in no
-/// block of the deck.
+/// In PeriLab, an element belongs to a node set if all nodes of the element are in the set. (In Peridigm and
+/// Fissure, one node is enough.) The result is empty if the mesh cannot be read, or if some of its elements
+/// are in no block of the deck.
 pub(super) fn sets_with_all_nodes(
     translation: &Translation,
     discretization: &Node,

@@ -22,11 +22,10 @@ pub enum Control {
     /// untruncated family. Long shear waves then have no dispersion.
     ///
     /// Derivation: consider a wave along the axis x with the amplitude u, the wavenumber κ and the modulus M,
-    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ.
-    /// H is too small by the fraction κ²q/(6k), so the wave stores ½ M κ² (1 − κ²q/(3k)) |u|² per volume.
-    /// z is −½ (κ ξ_x)² u, so a control (b/k) I stores ½ b κ⁴q/(4k) |u|² per volume.
-    /// The sum of both is independent of q for b = (4/3) M, for every dimension, influence function and
-    /// lattice.
+    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. H is too small by the fraction κ²q/(6k), so the wave
+    /// stores ½ M κ² (1 − κ²q/(3k)) |u|² per volume. z is −½ (κ ξ_x)² u, so a control B = (b/k) I with a
+    /// modulus b stores ½ b κ⁴q/(4k) |u|² per volume. The sum of both is independent of q for b = (4/3) M,
+    /// for every dimension, influence function and lattice.
     Dispersion {
         /// Product (4/3) G/k, N/m⁷.
         strength: f64,

@@ -13,8 +13,8 @@ const SINGULAR: f64 = 1e-2;
 /// Limit of the stiffness of a family's intact part, relative to the initial family. A point whose intact
 /// part is stiffer carries no force.
 ///
-/// The time step is stable for initial families only. Without a limit, points of torn plates moved without
-/// bound. A limit of 16 was already enough to prevent such motions.
+/// The stable step is computed for initial families only. In tests without a limit, points of torn plates
+/// moved without bound. A limit of 16 already prevented this.
 const STIFFEST: f64 = 8.0;
 
 /// Contribution of a bond to the shape tensor (diagonal and mixed entries) and to Σ ω η⊗ξ Ṽ (row by row). The

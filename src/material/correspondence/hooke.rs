@@ -23,10 +23,10 @@ const PLANE: [usize; 3] = [0, 1, 5];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hooke {
     matrix: Matrix6<f64>,
-    /// Row for the direction across the plane: factors of the strains xx, yy and 2 xy.
+    /// Factors of the in-plane strains xx, yy and 2 xy.
     ///
     /// The sum of factors times strains is the stress zz (Pa) in plane strain, and the strain zz in plane
-    /// stress. `None` in 3-D and 1-D, and if the constants of the deck do not determine this row.
+    /// stress. `None` in 3-D and 1-D, and if the constants of the deck do not determine these factors.
     across: Option<[f64; 3]>,
 }
 
@@ -301,7 +301,7 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     let young = ["x", "y", "z"].map(|axis| of("youngs_modulus", axis));
     let mut compliance = Matrix6::zeros();
     for (k, young) in young.into_iter().enumerate() {
-        // The stiffness across a sheet may have any value, because the matrix of a sheet does not couple this
+        // The out-of-plane stiffness of a sheet may have any value, because the matrix does not couple this
         // stiffness to the plane.
         compliance[(k, k)] = if sheet && k == 2 { 1.0 } else { 1.0 / young };
     }
@@ -461,7 +461,7 @@ fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }
 
-/// Return the row `across` of [`Hooke`] for plane strain; `None` in other dimensions.
+/// Return the factors `across` of [`Hooke`] for plane strain; `None` in other dimensions.
 fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
     let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
     is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))

@@ -12,13 +12,13 @@
 //! of the step.
 //!
 //! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of
-//! time uses this stored factor. Therefore a stress that has been returned to the yield surface does not flow
-//! again.
+//! time uses this stored factor. Therefore a stress that was returned to the yield surface does not cause
+//! flow again.
 //!
 //! The increment of plastic strain is ΔE_p = x S_d with the deviator S_d of the final stress, and Δε̄ = ⅔ x q
-//! with the equivalent stress q of the final stress. The factor x follows from the trial stress: each part of
-//! the equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part ([`Modes`]), not
-//! the heat capacity. The equation
+//! with the equivalent stress q of the final stress. q follows from the trial stress and x: each part of the
+//! equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part ([`Modes`]), not the
+//! heat capacity. The equation for x,
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!

@@ -93,8 +93,8 @@ pub fn at<const D: usize>(
     Some((piola, 0.5 * stress.dot(&strains)))
 }
 
-/// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if det F ≤ 0 or b_e is not
-/// positive definite.
+/// Return the out-of-plane Kirchhoff stress in plane strain, Pa; `None` if det F ≤ 0 or b_e is not positive
+/// definite.
 pub fn across<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
@@ -105,7 +105,7 @@ pub fn across<const D: usize>(
     Some(trial.tensor(&stress.diagonal())[(2, 2)])
 }
 
-/// Add a symmetric tensor to another one that is stored as the entries xx, yy, zz, yz, xz, xy.
+/// Add a symmetric tensor to the entries xx, yy, zz, yz, xz, xy of another tensor.
 pub fn add(entries: &mut [f64; 6], change: &Matrix3<f64>) {
     let places = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
     for (entry, place) in entries.iter_mut().zip(places) {

@@ -7,16 +7,15 @@
 //!
 //! T⟨ξ⟩ = ω P K⁻¹ ξ + ω B z, z = η − H ξ.
 //!
-//! z is the part of the motion that does not change F (a zero-energy mode). ω B z is the force state of the
-//! zero-energy control, with the matrix B of the point ([`Control`]).
-//! The loops use T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H.
-//! The strain energy density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, because Σ ω z⊗ξ Ṽ = 0.
+//! z is the part of η that does not change F (a zero-energy mode). ω B z is the force state of the
+//! zero-energy control, with the matrix B of the point ([`Control`]). The loops use T⟨ξ⟩ = ω (A ξ + B η) with
+//! A = P K⁻¹ − B H. The strain energy density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, because
+//! Σ ω z⊗ξ Ṽ = 0.
 //!
-//! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point.
-//! B is then multiplied by a factor s that falls with the flow ([`Plastic::control_left`]). An elastic
-//! control would carry load that the solid cannot carry.
-//! When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the control is dissipated, with B before this
-//! multiplication.
+//! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point. B is then multiplied
+//! by a factor s that falls with the flow ([`Plastic::control_left`]), because an elastic control would carry
+//! load that the solid cannot carry. When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the control is
+//! dissipated, with B before the multiplication by s.
 
 mod bond_associated;
 mod control;
@@ -191,7 +190,7 @@ const CONSTANTS: usize = 2;
 /// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is s at the start of the step.
 const OWN: usize = 4;
 
-/// Count of the own numbers of points without a control that decreases with plastic flow.
+/// Count of the own numbers of a point if no control decreases with plastic flow.
 const OWN_OF_ELASTIC: usize = 2;
 
 /// A, and the diagonal and mixed entries of B, N/m⁷.

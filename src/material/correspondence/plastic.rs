@@ -9,11 +9,10 @@
 //! any size.
 //!
 //! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²), the equivalent plastic strain ε̄ and
-//! the hardening modulus H, the yield surface is q = σ_y + H ε̄.
-//! A trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3):
-//! Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q.
-//! In plane stress the stress across the sheet stays 0. Then ΔE_p = x S_d with the deviator of the final
-//! stress, where x solves a scalar equation (§3.4).
+//! the hardening modulus H, the yield surface is q = σ_y + H ε̄. A trial stress outside the surface returns
+//! along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In plane
+//! stress, the out-of-plane stress stays 0. Then ΔE_p = x S_d with the deviator of the final stress, where x
+//! solves a scalar equation (§3.4).
 //!
 //! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain and by the strain
 //! rate, and softening by heat.
@@ -42,7 +41,7 @@ pub struct Plastic {
     lambda: f64,
     /// Shear modulus G, Pa.
     shear: f64,
-    /// Whether the problem is plane stress, so that the stress across the plane is 0.
+    /// Whether the problem is plane stress, so that the out-of-plane stress is 0.
     is_sheet: bool,
     /// Whether the elastic strain is logarithmic.
     is_logarithmic: bool,
@@ -88,9 +87,9 @@ pub const STRAIN_MEASURE: Key = Key {
 const SURFACE: f64 = 1e-12;
 
 /// Tolerance of the yield surface for logarithmic strains, and for hardening that is not linear. With
-/// logarithmic strains, the round-off of a stress on the yield surface is larger than at small strains: it
-/// follows from b_e, whose round-off scales with the square of the stretches. With Johnson–Cook hardening,
-/// heating can make the yield stress small compared with the round-off of the stress.
+/// logarithmic strains, the round-off of a stress on the yield surface is larger than at small strains. The
+/// reason is that the stress follows from b_e, whose round-off scales with the square of the stretches. With
+/// Johnson–Cook hardening, heating can make the yield stress small compared with the round-off of the stress.
 const WIDE_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys; `None` if there is no error.
@@ -202,8 +201,8 @@ impl Plastic {
         Some((second + gradient * second, 0.5 * stress.dot(&elastic)))
     }
 
-    /// Return the Kirchhoff stress across the plane in plane strain, Pa; `None` if the logarithmic strain
-    /// does not exist.
+    /// Return the out-of-plane Kirchhoff stress in plane strain, Pa; `None` if the logarithmic strain does
+    /// not exist.
     pub fn across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -218,7 +217,7 @@ impl Plastic {
         Some(self.stress(&elastic)[(2, 2)])
     }
 
-    /// Return the stretch F_zz across the plane in plane stress; `None` if its square would not be positive.
+    /// Return the out-of-plane stretch F_zz in plane stress; `None` if F_zz² would not be positive.
     pub fn stretch_across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
@@ -535,8 +534,7 @@ mod tests {
             let (stress, energy) = sheet.at(&gradient, &mut of_sheet, step).unwrap();
             let mut whole = Matrix3::zeros();
             whole.fixed_view_mut::<2, 2>(0, 0).copy_from(&gradient);
-            // Find by bisection the displacement gradient across the sheet at which the stress across the
-            // sheet is 0.
+            // Find by bisection the out-of-plane displacement gradient at which the out-of-plane stress is 0.
             let [mut low, mut high] = [-0.3, 0.3];
             for _ in 0..80 {
                 whole[(2, 2)] = 0.5 * (low + high);

@@ -14,12 +14,12 @@ use crate::lanes::{Lanes, WIDTH};
 pub enum Stress {
     /// P = F S, S = C : E with E = ½ (FᵀF − I). This stress derives from an energy and is objective.
     StVenantKirchhoff(Hooke),
-    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E and J = det F (Willberg et al. 2022, eq. 9, printed with
-    /// F⁻¹). This stress equals that of St. Venant–Kirchhoff at small strains without rotation. It is not
+    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E and J = det F (Willberg et al. 2022, eq. 9, where F⁻¹ is
+    /// printed). This stress equals that of St. Venant–Kirchhoff at small strains without rotation. It is not
     /// objective.
     Willberg2022(Hooke),
-    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress, the stretch across the
-    /// plane is the one for which the stress across the plane is 0.
+    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress, the out-of-plane
+    /// stretch makes the out-of-plane stress 0.
     NeoHooke(NeoHooke),
 }
 
@@ -47,7 +47,7 @@ pub struct OfBonds<const D: usize> {
 }
 
 impl Stress {
-    /// Create the stress law of this name in decks.
+    /// Create the stress law with this name in decks.
     pub fn of(name: &str, given: &Given, hooke: Hooke) -> Self {
         match name {
             "willberg2022" => Self::Willberg2022(hooke),
@@ -61,7 +61,7 @@ impl Stress {
         }
     }
 
-    /// Name for display of the stress of bodies that yield.
+    /// Displayed name of the stress law of bodies that yield.
     pub const OF_PLASTIC: &'static str = "St. Venant–Kirchhoff";
 
     /// Return the name for display.
@@ -115,8 +115,8 @@ impl Stress {
         }
     }
 
-    /// Return the Kirchhoff stress across the plane (Pa) in plane strain; `None` if the elastic constants of
-    /// the deck do not determine this stress.
+    /// Return the out-of-plane Kirchhoff stress (Pa) in plane strain; `None` if the elastic constants of the
+    /// deck do not determine this stress.
     pub fn across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         let volume = determinant(&(SMatrix::identity() + gradient));
@@ -141,13 +141,13 @@ impl Stress {
         }))
     }
 
-    /// Return the stretch F_zz across the plane in plane stress. `None` if the elastic constants of the deck
-    /// do not determine F_zz, or if no positive F_zz exists.
+    /// Return the out-of-plane stretch F_zz in plane stress. `None` if the elastic constants of the deck do
+    /// not determine F_zz, or if no positive F_zz exists.
     pub fn stretch_across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         match self {
             Self::StVenantKirchhoff(hooke) => stretch_of(hooke.across(&strain)?),
-            // J of this law is the determinant of F in the plane; the law has no stretch across the plane.
+            // J of this law is the determinant of the in-plane F, so F_zz is 1.
             Self::Willberg2022(_) => Some(1.0),
             Self::NeoHooke(law) => {
                 let growth = growth(&(matrix(&strain) * 2.0));
@@ -156,8 +156,8 @@ impl Stress {
         }
     }
 
-    /// Same as [`Self::at`] for eight bonds. Not inlined, so that the code is compiled once and not into
-    /// every loop over bonds.
+    /// Same as [`Self::at`] for eight bonds. The function is not inlined, so that its code is compiled once
+    /// and not in every loop over bonds.
     #[inline(never)]
     pub fn of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
         let none = Lanes::splat(0.0);
@@ -229,10 +229,10 @@ fn st_venant_kirchhoff<T: Number, const D: usize>(
 
 impl NeoHooke {
     /// Return ln det FᵀF and W (J/m³), from FᵀF − I of the plane or of space. The returned ln det FᵀF
-    /// includes the stretch across the plane.
+    /// includes the out-of-plane stretch.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
         let own = libm::log1p(growth(doubled));
-        // `across` is the logarithm of the squared stretch across the plane.
+        // `across` is the logarithm of the squared out-of-plane stretch.
         let across = if self.plane_stress && D == 2 {
             self.across(own)
         } else {
@@ -244,8 +244,8 @@ impl NeoHooke {
         (log, energy)
     }
 
-    /// Return the logarithm q of the squared stretch across the plane in plane stress. `own` is ln det FᵀF of
-    /// the plane. q solves μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
+    /// Return the logarithm q of the squared out-of-plane stretch in plane stress. `own` is ln det FᵀF of the
+    /// in-plane F. q solves μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
     fn across(&self, own: f64) -> f64 {
         let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
         for _ in 0..20 {

@@ -1,4 +1,4 @@
-//! Tensors of one point or of eight bonds, for formulas that are computed for a point and for eight bonds.
+//! Tensors of one point or of eight bonds, so that a formula is written only once for both.
 
 use std::ops::{Add, Mul};
 

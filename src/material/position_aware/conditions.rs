@@ -1,5 +1,5 @@
 //! Conditions on the functions ω and σ of a point. n is the direction of a bond, and N has the components
-//! N_a = n_a². A sum over the family has the weight |ξ|² Ṽ per bond, unless a formula gives the terms.
+//! N_a = n_a². Unless a formula gives the terms, each bond has the weight |ξ|² Ṽ in a sum over the family.
 
 use crate::material::monomials::index_of;
 use crate::material::symmetric::mixed;
@@ -31,8 +31,8 @@ pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
     exponents
 }
 
-/// The conditions on a function g of the bond direction. For each condition k, wanted_k is the value that the
-/// sum of p_k g over the family has in the solid.
+/// The conditions on a function g of the bond direction. Condition k says that the sum of p_k g over the
+/// family is wanted_k, the value of this sum in the solid.
 pub struct Conditions<const D: usize> {
     /// The value c of g in an untruncated family of the continuum.
     pub(super) constant: f64,
@@ -95,12 +95,12 @@ impl<const D: usize> Conditions<D> {
     }
 }
 
-/// Return the polynomial n·n = 1. The matrix of c n·n is Λ = c I.
+/// Return the polynomial n·n, which equals 1.
 pub(super) fn one_in_directions<const D: usize>() -> Vec<Monomial> {
     (0..D).map(|a| (of_product(a, a), 1.0)).collect()
 }
 
-/// Return the polynomial (Σ N_a)² = 1. The matrix of c (Σ N_a)² is S with S_ab = c.
+/// Return the polynomial (Σ N_a)², which equals 1.
 pub(super) fn one_in_squares<const D: usize>() -> Vec<Monomial> {
     let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
     pairs.map(|(a, b)| (of_product(a, b), 1.0)).collect()

@@ -1,6 +1,6 @@
-//! Functions ω and σ that are radii of ellipsoids. The semi-axis a of ω/ω₀ is the dilatation of the solid
-//! divided by that with ω₀, for a unit strain along axis a. The semi-axis of σ/σ₀ is the same ratio of the
-//! deviatoric energies.
+//! Functions ω and σ that are radii of ellipsoids. At a unit strain along axis a, semi-axis a of ω/ω₀ is the
+//! dilatation of the solid, divided by the dilatation of the family with ω₀. Semi-axis a of σ/σ₀ is the same
+//! ratio of deviatoric energies.
 
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use super::{Fit, Form};
@@ -41,7 +41,7 @@ impl Form for Directional {
     }
 }
 
-/// Return the semi-axes from the conditions of the axes.
+/// Return the semi-axes from the conditions for unit strains along the axes.
 fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; D] {
     std::array::from_fn(|a| {
         let (polynomial, wanted) = &conditions.each[a];
@@ -50,8 +50,8 @@ fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; 
 }
 
 /// Return bounds for [`super::largest_ratio`]: upper bounds of R and Q, and a lower bound of τ. `omega` and
-/// `sigma` are the semi-axes of ω/ω₀ and σ/σ₀, and `sums` are the sums of
-/// |ξ|² Ṽ times the monomials of n. `reference` is σ₀, N/m⁷.
+/// `sigma` are the semi-axes of ω/ω₀ and σ/σ₀. `sums` are the sums of |ξ|² Ṽ times the monomials of n.
+/// `reference` is σ₀, N/m⁷.
 ///
 /// A radius g and its square are convex functions of the numbers n_a², whose sum is 1. Therefore
 /// g ≤ Σ g_a n_a² and g² ≤ Σ g_a² n_a² for each bond. With M_a = Σ |ξ|² n_a² Ṽ, Jensen's inequality for the

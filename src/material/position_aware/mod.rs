@@ -9,9 +9,9 @@
 //!
 //! with the number of dimensions d, the force state along the bond t, and k′, A and m of [`Ordinary`].
 //!
-//! At a small homogeneous strain H, a bond of direction n has e = |ξ| n·H n.
-//! In an untruncated family of the continuum, ω and σ satisfy, for probe strains H along the axes and in
-//! shear between the axes,
+//! At a small homogeneous strain H, a bond of direction n has e = |ξ| n·H n. The probe strains H are unit
+//! extensions along the axes and shears between the axes. In an untruncated family of the continuum, ω and σ
+//! satisfy for each H
 //!
 //! Σ ω|ξ| e Ṽ = tr H, Σ σ ε² Ṽ = 2G dev H : dev H.
 //!
@@ -20,7 +20,7 @@
 //! family is broken. The loops multiply ω and σ by the influence function of the deck, as in all sums.
 //!
 //! A critical stretch that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)), with σ_w of
-//! an untruncated family. This keeps the energy of breaking the bond.
+//! an untruncated family. Breaking the bond then takes the same energy as in an untruncated family.
 
 mod conditions;
 mod directional;
@@ -65,11 +65,11 @@ pub struct Fit<const D: usize> {
 
 /// Form of the functions ω and σ.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Diagonal entries of the tensors of a point without bonds of its own, for which ω and σ are nearly 0.
+    /// Diagonal entries of the tensors of a point without bonds of its own. They make ω and σ nearly 0.
     const WITHOUT_BONDS: f64;
 
-    /// Fit ω and σ to the conditions on both. `sums` are the sums of |ξ|² Ṽ times the monomials of degree 4
-    /// of n and of N, and `reference` is σ₀, N/m⁷.
+    /// Fit ω and σ to `conditions`, the conditions on ω and on σ. `sums` are the sums of |ξ|² Ṽ times the
+    /// monomials of degree 4 of n, and of N with N_a = n_a². `reference` is σ₀, N/m⁷.
     fn fit<const D: usize>(
         sums: [&[f64]; 2],
         conditions: [&Conditions<D>; 2],
@@ -153,11 +153,11 @@ type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 /// Return an upper bound of the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ for all extensions e, in `d`
 /// dimensions.
 ///
-/// In the scalar product ⟨a, b⟩ = Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|.
-/// The inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. With equality, they give the
-/// components of ε along r and normal to r.
-/// Then λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². It grows
-/// with R and Q and decreases with τ, because λ ≥ 1.
+/// In the scalar product ⟨a, b⟩ = Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|. The inputs are
+/// R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. If all three are equalities, they give the
+/// components of ε along r and normal to r. Then λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g],
+/// [−g, 1]] with g² = (RQ − τ²)/d². Because λ ≥ 1, this eigenvalue grows with R and Q and decreases with τ.
+/// It is therefore an upper bound if the inputs are bounds.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
     let determinant = bulk_modulus * r + (1.0 - tau / d).powi(2);
@@ -170,7 +170,7 @@ fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
 fn squares<const D: usize>(bond: &Bond<D>) -> [Lanes; D] {
     let inverse = bond.inverse * bond.inverse;
     let mut squares = [Lanes::splat(0.0); D];
-    // Not `bond.reference.map(…)`: see the rules for loops in docs/src/developers/performance.md.
+    // `bond.reference.map(…)` would be slower: see the rules for loops in docs/src/developers/performance.md.
     for (square, xi) in squares.iter_mut().zip(&bond.reference) {
         *square = *xi * *xi * inverse;
     }
@@ -449,8 +449,8 @@ mod tests {
         }
     }
 
-    /// A bond from a point with a larger horizon must keep its critical stretch, up to the factor √2 that the
-    /// missing share of this end gives.
+    /// The point contributes nothing to a bond from a point with a larger horizon. The critical stretch of
+    /// this bond therefore changes only by the factor √2.
     #[test]
     fn points_without_bonds_have_no_share() {
         for functions in [
@@ -489,8 +489,8 @@ mod tests {
         assert!(bound <= most * largest, "{case}");
     }
 
-    /// λ uses the smallest σ over all directions. Without volume correction, σ of PALS varies by a factor of
-    /// two even in an untruncated family.
+    /// The bounds of PALS are loose, because λ uses the smallest σ over all directions. Without volume
+    /// correction, σ of PALS varies by a factor of two even in an untruncated family.
     #[test]
     fn the_spring_constants_bound_the_energy() {
         for (name, family, pals, directional) in [

@@ -1,6 +1,6 @@
-//! The functions ω and σ nearest to ω₀ and σ₀ that satisfy all [`Conditions`]: ω = n·Λ n and σ = N·S N.
-//! Because ω is quadratic in n, the dilatation is exact for every homogeneous strain, not only for the probe
-//! strains.
+//! The functions ω and σ nearest to ω₀ and σ₀ that satisfy all [`Conditions`]: ω = n·Λ n and σ = N·S N. The
+//! dilatation is linear in the strain. It is therefore exact for every homogeneous strain, not only for the
+//! probe strains.
 //!
 //! The distance of ω from ω₀ is Σ |ξ|² (ω − ω₀)² Ṽ, and that of σ from σ₀ is Σ |ξ|² (σ − σ₀)² Ṽ.
 
@@ -13,8 +13,8 @@ use crate::material::Bond;
 use crate::material::monomials::{least_squares, multiplicity};
 use crate::material::symmetric::{Symmetric, mixed, quadratic_form, quadratic_form_of};
 
-/// Smallest allowed σ/σ₀; bonds with σ ≤ 0 would repel when stretched. For a horizon of 3 spacings, the
-/// smallest σ/σ₀ at a corner of a cuboid is about 0.4.
+/// Smallest allowed σ/σ₀; stretched bonds with σ < 0 would repel. For a horizon of 3 spacings, the smallest
+/// σ/σ₀ at a corner of a cuboid is about 0.4.
 const SMALLEST: f64 = 0.1;
 
 /// Largest allowed σ/σ₀. Without a limit and for a horizon of 3 spacings, σ/σ₀ reaches 1.8 at edges of a
@@ -137,7 +137,7 @@ fn extremes<const D: usize>(tensor: &SMatrix<f64, D, D>) -> [f64; 2] {
     )
 }
 
-/// Limit σ/σ₀ to the range from [`SMALLEST`] to [`LARGEST`], by a factor on its difference from 1.
+/// Limit σ/σ₀ to the range from [`SMALLEST`] to [`LARGEST`], by scaling its difference from 1.
 fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let [least, most] = extremes(&tensor);
     let share = |value: f64, limit: f64| {

@@ -1,19 +1,19 @@
 //! Elastic–perfectly plastic solid with the influence functions of [`PositionAware`].
 //!
 //! Each bond has a plastic extension e_p per end. Energy and force are those of [`PositionAware`] at the
-//! elastic extensions e − e_p. Let ε_d be e − e_p minus its mean over the intact bonds, such that Σ ω|ξ| ε_d
-//! Ṽ = 0:
+//! elastic extensions e − e_p. Let ε_d be the elastic extension without the mean elastic stretch of the
+//! intact bonds, so that Σ ω|ξ| ε_d Ṽ = 0:
 //!
 //! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G). This limit is twice the deviatoric energy density at which the
 //! equivalent stress of von Mises is the yield stress σ_y. Without surfaces, this is the yield condition of
-//! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with
-//! r² Σ σ ε_d² Ṽ = σ_y²/(3G). Plastic flow therefore does not change θ.
+//! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with r² Σ σ ε_d² Ṽ =
+//! σ_y²/(3G). Because Σ ω|ξ| ε_d Ṽ = 0, plastic flow does not change θ.
 //!
 //! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a
-//! number c of the point. Flow then reduces the energy only if 1 − r is at most Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ.
-//! Therefore 1 − r is limited to this value.
+//! number c of the point. The energy then has its minimum at 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, and flow beyond
+//! this minimum would add energy. Therefore 1 − r is limited to this value.
 
 use super::directional::Directional;
 use super::nearest::Nearest;
@@ -73,8 +73,8 @@ fn elastic<const D: usize>(bond: &Bond<D>, plastic: Lanes) -> Bond<D> {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
-    /// The numbers of [`PositionAware`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 −
-    /// r.
+    /// The numbers of [`PositionAware`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and
+    /// 1 − r.
     type Point = (Functions<D>, [Lanes; OTHERS + 4]);
     /// e_p/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 2];

@@ -54,8 +54,8 @@ impl<F: Form> Described for PositionAwareViscoelastic<F> {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
-    /// The numbers of [`PositionAware`], with k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) instead of k′θ − (1/d) Σ
-    /// σ|ξ| ε Ṽ.
+    /// The numbers of [`PositionAware`], but k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) replaces
+    /// k′θ − (1/d) Σ σ|ξ| ε Ṽ.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     /// e_b/|ξ|, ε/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];

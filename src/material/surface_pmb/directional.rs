@@ -1,5 +1,5 @@
-//! The function h that is the radius of an ellipsoid. Its semi-axes are fitted to the energy densities at
-//! unit extension along each axis, which are half of the components aaaa of the elastic tensor.
+//! The function h as the radius of an ellipsoid. The semi-axes are fitted to the energy densities at unit
+//! extension along each axis a. These energy densities are half of the components aaaa of the elastic tensor.
 
 use nalgebra::SMatrix;
 

@@ -1,14 +1,15 @@
 //! Prototype microelastic material with a surface correction: the micromodulus of each point depends on the
 //! direction of the bond, and is fitted to the point's own family.
 //!
-//! The micromodulus of an end is c h(n): c is that of an untruncated family, and n the direction of the bond.
-//! A [`Form`] defines the function h. The elastic tensor of a family is ½ c Σ |ξ| h(n) n⊗n⊗n⊗n Ṽ. The elastic
-//! tensor of a bond-based solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the
-//! number of dimensions d and the energy density W₁ at unit isotropic stretch.
+//! The micromodulus of an end is c h(n), with the micromodulus c of an untruncated family and the direction n
+//! of the bond. A [`Form`] defines the function h, and fits the elastic tensor of the family to that of the
+//! solid. The elastic tensor of a family is ½ c Σ |ξ| h(n) n⊗n⊗n⊗n Ṽ. The elastic tensor of a bond-based
+//! solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the number of dimensions d
+//! and the energy density W₁ at unit isotropic stretch.
 //!
 //! A bond has the mean of the micromoduli of points i and j, c_ij(n). A critical stretch s_c that follows
-//! from a fracture energy is scaled to s_c √(c/c_ij). This keeps the energy of breaking the bond. Le & Bobaru
-//! (2018) compare other corrections.
+//! from a fracture energy is scaled to s_c √(c/c_ij). Breaking the bond then takes the same energy as in an
+//! untruncated family. Le & Bobaru (2018) compare other corrections.
 //!
 //! In 1-D, where all bonds have the same direction, [`Normalised`](super::Normalised) replaces this law.
 
@@ -32,8 +33,8 @@ const MONOMIALS: usize = 28;
 
 /// Form of the function h.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Return the tensor of a point that determines ½ h, from the sums of |ξ| Ṽ times the monomials of degree
-    /// 6 of n, c and μ.
+    /// Return the tensor of a point that determines ½ h, from c, μ and `sums`: the sums of |ξ| Ṽ times the
+    /// monomials of degree 6 of n.
     fn fit<const D: usize>(
         sums: &[f64],
         micromodulus: f64,

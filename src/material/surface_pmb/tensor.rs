@@ -1,6 +1,6 @@
-//! The function h = n·H n with a symmetric tensor H, the least-squares fit over all components of the elastic
-//! tensor. This fit is independent of the axes. In an untruncated family H is nearly I. Near a surface H is
-//! larger normal to the surface than along it.
+//! The function h = n·H n with a symmetric tensor H. H is a least-squares fit to all components of the
+//! elastic tensor, so it does not depend on the coordinate axes. In an untruncated family H is nearly I. Near
+//! a surface H is larger normal to the surface than along it.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
@@ -10,8 +10,8 @@ use crate::material::Bond;
 use crate::material::monomials::{exponents, index_of, least_squares, multiplicity};
 use crate::material::symmetric::{Symmetric, quadratic_form};
 
-/// Smallest allowed eigenvalue of H. Without this limit, bonds would repel when stretched in bodies that are
-/// two or three points thick.
+/// Smallest allowed eigenvalue of H. Without this limit, stretched bonds would repel in bodies that are two
+/// or three points thick.
 const SMALLEST: f64 = 0.2;
 
 /// Largest allowed eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly

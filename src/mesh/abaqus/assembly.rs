@@ -59,7 +59,7 @@ pub(super) struct Placed {
 
 /// Position of an instance in the assembly: a translation, then a rotation.
 pub(super) struct Instance {
-    /// If the file does not define the part of the instance: the name of this part.
+    /// Name of the instance's part if the file does not define this part.
     pub(super) missing_part: Option<String>,
     pub(super) place: Place,
     pub(super) translation: Vector3<f64>,

@@ -7,7 +7,7 @@ pub(super) const GENERATORS: [&str; 8] = [
     "NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM", "SUBMODEL",
 ];
 
-/// Return the type with a name such as `C3D8R`; `None` for an unsupported type.
+/// Return the element type with a name such as `C3D8R`; `None` for an unsupported type.
 pub(super) fn kind(name: &str) -> Option<Kind> {
     const SOLIDS: [&str; 6] = ["C3D", "AC3D", "DC3D", "DCC3D", "Q3D", "SC"];
     const FACES: [&str; 12] = [

@@ -14,9 +14,9 @@
 //! With adaptive refinement, each step is a separate VTK part. The points and static fields of all steps are
 //! then concatenated.
 //!
-//! On any number of ranks, a step is one part with points in the order of [`IdOrder`](crate::comm::IdOrder).
-//! The data of a step is flushed before the step's row in the tables, so the file of a killed run has all
-//! complete steps.
+//! On any number of ranks, a step is one VTK part. Its points are in the order of
+//! [`IdOrder`](crate::comm::IdOrder). The data of a step are flushed before the step's row in the tables, so
+//! the file of a killed run contains all complete steps.
 
 mod resume;
 

@@ -31,10 +31,10 @@ impl<'a> ResultFile<'a> {
     /// Resume a result after its first steps and history rows, and drop later steps and rows. Return the
     /// retained history rows.
     ///
-    /// A file is continued in place if the points never change, if deck and version are the same, if the file
-    /// has space for all expected steps, and if dropping the later rows frees no chunk. No retained row then
-    /// moves, so a kill loses no row. Otherwise, or if the file is not writable, the retained part is copied
-    /// to a new file, which then replaces the old file.
+    /// A file is continued in place if the points never change, the deck and the version are the same, and
+    /// the file has space for all expected steps. Dropping the later rows must also free no chunk. No
+    /// retained row then moves, so a kill loses no row. Otherwise, or if the file is not writable, the
+    /// retained part is copied to a new file, which then replaces the old file.
     ///
     /// # Errors
     /// If the old file cannot be read, or has fewer steps, or other points or fields. If a write fails, for
@@ -264,9 +264,8 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     Ok(true)
 }
 
-/// Test whether a file can be continued in place. The conditions are: the points never change; the number of
-/// points, the deck and the version are the same; the file has space for all expected steps; the truncation
-/// frees no chunk.
+/// Test whether a file can be continued in place, under the conditions of [`ResultFile::resume`]. The number
+/// of points must also be the same.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,

@@ -250,8 +250,8 @@ fn damage_law(
     }
 }
 
-/// Failure criterion of the bonds between two bodies that have a separate damage law for these bonds. Each
-/// end has the damage law for its constants; `stiffness` is the bond stiffness of each end.
+/// Failure criterion of the bonds between two bodies that have a separate damage law for these bonds. `laws`
+/// and `stiffness` are the damage law and the bond stiffness of each end.
 fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     use DamageLaw::{BondEnergy, CriticalStretch, Stress};
     match laws {

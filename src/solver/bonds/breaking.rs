@@ -92,7 +92,7 @@ impl<const D: usize> Kernel<D> for BreakingBonds {
     }
 }
 
-/// Sums of a point over those of its bonds that break in a sweep.
+/// Sums over the bonds of a point that break in a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct BrokenSums {
     /// Local index of the point.
@@ -104,8 +104,8 @@ pub struct BrokenSums {
 /// Number of sums of [`BreakingBonds`] in three dimensions.
 pub const MAX_BROKEN_SUMS: usize = 6;
 
-/// The groups of eight bonds in which bonds break, of one row or lane group: index of the group, and bits of
-/// these bonds.
+/// The groups of eight bonds in which bonds break, of one row or lane group. An entry has the index of the
+/// group and the bits of the bonds that break.
 pub type BreakingBits = Vec<(usize, u8)>;
 
 /// Note the breaking bonds of a group. Out of line to save registers.

@@ -1,9 +1,9 @@
 //! Consequences of broken bonds.
 //!
 //! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends evaluate the
-//! criterion with the same operations. The force sums exclude the bonds that break. Point numbers that follow
-//! from sums over bonds, and the forces that depend on these point numbers, are then recomputed. They are
-//! recomputed only at the points that a broken bond affects.
+//! criterion with the same operations, so they get the same result. The force sums exclude the bonds that
+//! break. Then point numbers and the forces that depend on them are recomputed, but only at the points that a
+//! broken bond affects.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -228,7 +228,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Merge points to ascending ranges of whole lane groups. A range may also contain other points, see
+    /// Merge points into ascending ranges of whole lane groups. A range may also contain other points, see
     /// [`GAP`].
     fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
         let mut ranges: Vec<Range<usize>> = points.map(|point| self.lane_group(point)).collect();

@@ -42,7 +42,7 @@ type HaloColumns<'a> = ([&'a mut [f64]; MAX_HALO_COLUMNS], usize);
 pub(super) enum HaloContent {
     /// Displacements, and thermal stretches if the run has temperatures.
     Motion,
-    /// Failure thresholds that follow the smallest stretches.
+    /// Failure thresholds, which depend on the smallest stretches.
     Thresholds,
     /// Point numbers, rotations and stress measures that change before each force sum.
     PointNumbers,

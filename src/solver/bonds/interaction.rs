@@ -26,15 +26,14 @@ pub struct BlockLaws {
     pub law: AnyLaw,
     /// Damage law of the block; `None` for a block without damage.
     pub damage: Option<DamageLaw>,
-    /// Whether the material law breaks bonds by their history.
+    /// Whether the material law breaks bonds because of their history.
     pub wears_out: bool,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
     /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
     /// all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Which data of the block's points are read by the criteria of bonds to other bodies. Only pairs of
-    /// bodies with a separate damage law count.
+    /// Point data of this block that are read by the criteria of pairs of bodies with a separate damage law.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
@@ -42,8 +41,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Which point data are read by the failure criteria of bonds between two bodies. Only pairs of bodies with a
-/// separate damage law count.
+/// Point data that are read by the failure criteria of bonds between two bodies, for pairs of bodies with a
+/// separate damage law.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.

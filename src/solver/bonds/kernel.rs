@@ -16,8 +16,8 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub own_volume: Lanes,
     /// Volumes of points j, m³.
     pub volume: Lanes,
-    /// Factor from force states to the force density: V_j/(1 + a), m³, where a is the thermal stretch of
-    /// the bond.
+    /// Factor from force states to the force density: V_j/(1 + a), m³, where a is the thermal stretch of the
+    /// bond.
     pub force_volume: Lanes,
     /// Weights of the bonds at each end: influence function times volume correction.
     pub weights: Weights,
@@ -56,7 +56,8 @@ where
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     /// Weights of the force states in the work of a bond: the influence function, without volume correction.
-    /// `influence` says whether [`Self::weights`] contain no volume correction.
+    /// `influence` says whether [`Self::weights`] contain no volume correction. With a volume correction,
+    /// criteria that read the work require the influence function 1.
     #[inline(always)]
     pub fn weights_of_work<S: Simd>(&self, simd: S, influence: bool) -> Weights {
         if influence {
@@ -67,7 +68,7 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 
     /// Return the work of the force states of both ends, J/m⁶: the sum of [`Law::end_work`] over the ends,
-    /// multiplied by these weights.
+    /// each multiplied by its weight in `weights`.
     #[inline(always)]
     pub fn work_of_ends<S: Simd, L: Law<D>>(
         &self,
@@ -141,8 +142,8 @@ impl Combine {
 
 /// A sum over the bonds of points.
 pub trait Kernel<const D: usize>: Copy + Sync {
-    /// Sums, eight lanes per quantity. Each quantity has one column over the points, with which its sums are
-    /// combined; see [`Self::COMBINE`].
+    /// Sums, eight lanes per quantity. Each quantity has a column over the points. [`Self::COMBINE`] combines
+    /// the sums with this column.
     type Sums: LaneTuple;
 
     /// Point numbers of points i that the kernel reads.
@@ -154,7 +155,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Bond history that the kernel reads.
     type BondHistory: LaneTuple;
 
-    /// Rotations of the families of points i and j; empty if the kernel's criterion cannot read rotations.
+    /// Rotations of the families of points i and j, as quaternions; empty if the kernel's criterion cannot
+    /// read rotations.
     type Rotation: LaneTuple;
 
     /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.

@@ -102,7 +102,7 @@ pub struct ReadLimits<'a> {
 }
 
 impl<'a> ReadLimits<'a> {
-    /// Prepare the columns for a criterion.
+    /// Prepare the columns for a criterion. Bonds read the entries below `reach`.
     ///
     /// # Panics
     /// If a column that the criterion reads has fewer entries than `reach`.
@@ -159,7 +159,7 @@ pub struct ReadRotations<'a, R: LaneTuple> {
 }
 
 impl<'a, R: LaneTuple> ReadRotations<'a, R> {
-    /// Prepare the rotations for a criterion, in `D` dimensions.
+    /// Prepare the rotations for a criterion, in `D` dimensions. Bonds read the entries below `reach`.
     ///
     /// # Panics
     /// If a column that the criterion reads has fewer entries than `reach`.

@@ -307,9 +307,10 @@ impl<const D: usize> Forces<D> {
             if let Some(volume) = of_law {
                 weighted_volume[point] = volume;
             }
-            // If the law stores its weighted volume, θ is divided by this volume, which includes broken
-            // bonds. Otherwise it is divided by the sum over the intact bonds. θ is the elastic dilatation plus
-            // the thermal strain, and `growth` contains the thermal strain of the intact bonds only.
+            // If the law stores its weighted volume, the sum for θ is divided by this volume, which includes
+            // broken bonds. Otherwise the sum is divided by the weighted volume of the intact bonds. `growth`
+            // contains the thermal strain of the intact bonds only, so the thermal strain of the broken bonds
+            // is added.
             let volume = of_law.unwrap_or(intact[point]);
             let thermal = D as f64 * thermal_stretch.map_or(0.0, |stretch| stretch[point]);
             *growth = match Law::<D>::dilatation(law, &numbers) {

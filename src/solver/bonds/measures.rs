@@ -138,8 +138,8 @@ fn add_tensor<S: Simd, const D: usize>(
 
 /// Kernel that sums D = Σ V_j C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
 /// zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both ends. An end whose law
-/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times the
-/// identity I instead of n⊗n.
+/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times the identity
+/// I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -192,9 +192,9 @@ impl<const D: usize> Kernel<D> for Stiffness {
 /// Kernel that sums the Kirchhoff stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz. T is
 /// the force state of point i, and Y = ξ + η.
 ///
-/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ. Times Fᵀ,
-/// this stress is the Kirchhoff stress Σ T⊗Y Ṽ, which is symmetric and rotates with the body. Linear laws use
-/// ξ in place of Y.
+/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ. Its
+/// product with Fᵀ is the Kirchhoff stress Σ T⊗Y Ṽ, which is symmetric and rotates with the body. Linear laws
+/// use ξ in place of Y.
 #[derive(Clone, Copy)]
 pub struct Stress {
     /// Law of point i.
@@ -323,7 +323,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
 /// bond, or ξ·η/|ξ| for linear laws. The sums, in m⁵, are:
 ///
 /// 0. the weighted volume m = Σ ω|ξ|²Ṽ of the whole family;
-/// 1. the same over the intact bonds;
+/// 1. Σ ω|ξ|²Ṽ over the intact bonds;
 /// 2. Σ ω|ξ|eṼ over the intact bonds.
 #[derive(Clone, Copy)]
 pub struct Dilatation {

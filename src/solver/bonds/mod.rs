@@ -1,11 +1,11 @@
 //! Internal forces: sums over bonds in passes, with halo exchanges between them.
 //!
-//! A force evaluation is a list of passes, created once from the laws in use. Each pass is a sum over the
-//! bonds of every point. Later passes read the results of a pass at point i, or at both i and j. A pass
-//! begins with a halo exchange if it reads values that other ranks have changed: first displacements and
-//! thermal stretches, later thresholds and point numbers. Point numbers are values of a point, such as the
-//! dilatation, that the law of the point computes from sums over the bonds of the point. Interior points are
-//! processed while messages are in flight.
+//! A force evaluation runs a list of passes, which is created once from the laws in use. Each pass is a sum
+//! over the bonds of every point. Later passes read the results of a pass at point i, or at both i and j. A
+//! pass begins with a halo exchange if it reads values that other ranks have changed. The first exchange
+//! sends displacements and thermal stretches. Later exchanges send thresholds and point numbers. Point
+//! numbers are values of a point, such as the dilatation, that the law of the point computes from sums over
+//! the bonds of the point. Interior points are processed while messages are in flight.
 //!
 //! Bonds that meet their criterion break in the pass that sums the forces. Point numbers and forces that
 //! depend on broken bonds are then recomputed, see `broken.rs`.
@@ -70,7 +70,8 @@ enum Pass {
     /// Smallest stretch of the intact bonds of each point; the threshold of the point follows from this
     /// stretch.
     SmallestStretch,
-    /// The point sum with this index, for the laws with such a point sum.
+    /// The sums from which laws compute point numbers, by index of the pass, see [`Law::PASSES`]. Laws with
+    /// fewer passes are skipped.
     PointSum(usize),
     /// The forces.
     Force,
@@ -139,13 +140,13 @@ pub struct Forces<const D: usize> {
     breaks: bool,
     /// Whether points have thermal stretches; the same on all ranks.
     is_thermal: bool,
-    /// Changes by the bonds that broke in the last evaluation.
+    /// Changes that broken bonds caused in the last evaluation, by point.
     broken: Vec<Broken<D>>,
 }
 
 impl<const D: usize> Forces<D> {
-    /// Create the forces from the bonds, the halo plan and the blocks' laws. `is_thermal` says whether
-    /// points have thermal stretches. [`Self::find_constants`] must be called afterwards. Collective.
+    /// Create the forces from the bonds, the halo plan and the blocks' laws. `is_thermal` says whether points
+    /// have thermal stretches. [`Self::find_constants`] must be called afterwards. Collective.
     ///
     /// # Errors
     /// If no instruction set has the [requested name](Instructions::of_all), or if the processor of a rank
@@ -201,9 +202,9 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Compute the constants of the points ([`Law::CONSTANTS`]) from sums over their initial families. Also
-    /// set the truncation factors and the thresholds that criteria read. Thresholds are not set here if any
-    /// threshold follows the smallest stretch. Call after pre-cracks are cut and before other bonds break.
-    /// Collective.
+    /// set the [truncation factors](Law::truncation_factor) and the thresholds that criteria read. If any
+    /// threshold depends on the smallest stretch, force evaluations set all thresholds instead. Call after
+    /// pre-cracks are cut and before other bonds break. Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
         if read.thresholds && !self.passes.contains(&Pass::SmallestStretch) {
@@ -262,9 +263,8 @@ impl<const D: usize> Forces<D> {
         (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
     }
 
-    /// Set the thresholds of the points. Called only if no threshold depends on the smallest stretch
-    /// of a family (α = 0 in all damage laws).
-    /// Collective.
+    /// Set the thresholds of the points. Called only if no threshold depends on the smallest stretch of a
+    /// family (α = 0 in all damage laws). Collective.
     fn set_thresholds(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let Self {
             limits,
@@ -421,8 +421,8 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Make a bond unbreakable if `between` is true for its two blocks and `protected` is 1 at one of its
-    /// ends. The ghosts' entries of `protected` are exchanged first. `block` gives the blocks of the owned
-    /// points. Collective.
+    /// ends. `protected` has 1 or 0 for each local point; its ghost entries are exchanged first. `block` has
+    /// the block of each owned point. Collective.
     pub fn protect(
         &mut self,
         comm: &dyn Communicator,

@@ -14,8 +14,8 @@ use super::members;
 /// Subjects of the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
-/// Check that every condition that acts at a time (s) is finite at all of its points. At time 0, also check
-/// every initial value. Also check that thermal stretches are above −1. Collective.
+/// Check that the values of all conditions that act at `time` (s) are finite at all of their points, and that
+/// thermal stretches are above −1. At time 0, also check that all initial values are finite. Collective.
 ///
 /// # Errors
 /// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
@@ -82,7 +82,7 @@ pub fn are_finite<const D: usize>(
     Ok(())
 }
 
-/// A check of the conditions and initial values, one entry of the deck after the other.
+/// Data for the checks of the conditions and initial values. Each call checks one entry of the deck.
 struct FiniteCheck<'a, const D: usize> {
     problem: &'a Problem,
     comm: &'a dyn Communicator,

@@ -1,6 +1,6 @@
 //! Factors on loads, which an observer may change during a run.
 
-/// An odd number with random bits: 2⁶⁴ divided by the golden ratio.
+/// Multiplier of the hash, an odd number with random bits: 2⁶⁴ divided by the golden ratio.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only factors of
@@ -77,8 +77,8 @@ impl LoadFactors {
         self.record_equilibrium();
     }
 
-    /// A whole number below 2⁵² that differs for different sequences of requests, up to rare coincidences of
-    /// the hash.
+    /// A whole number below 2⁵² that differs for different sequences of requests, except for rare hash
+    /// collisions.
     pub fn fingerprint(&self) -> f64 {
         (self.requests >> 12) as f64
     }

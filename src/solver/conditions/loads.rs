@@ -29,7 +29,7 @@ pub struct Loaded<const D: usize> {
     positions: Vec<[f64; 3]>,
     /// Fraction of each point on which the load acts; `None` if the fraction is 1 for all points.
     fractions: Option<Vec<f64>>,
-    /// Force density in the current step, N/m³.
+    /// Force density at the present time, N/m³.
     force: Vec<[f64; D]>,
     /// Force density before the step, N/m³.
     before: Vec<[f64; D]>,

@@ -36,7 +36,8 @@ pub struct Conditions<const D: usize> {
     on_parts: Vec<OnPart<D>>,
 }
 
-/// Points of a [`Part`] on which conditions act. Conditions are in the order of the deck.
+/// The points of a [`Part`] on which conditions act. The entries of each list are in the order of the
+/// conditions in the deck.
 #[derive(Default)]
 pub struct OnPart<const D: usize> {
     loads: Vec<Loaded<D>>,
@@ -44,10 +45,11 @@ pub struct OnPart<const D: usize> {
     heated: Vec<Heated>,
 }
 
-/// Work of loads and supports from a stored state 0 to the present state.
+/// Formula of the work of loads and supports from a stored state 0 to the present state.
 ///
-/// f is the force density of a load or a reaction, and V is the volume of a point. A load step in which bonds
-/// break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work is
+/// f is the force density of a load or a reaction, u is the displacement, and V is the volume of a point. A
+/// load step in which bonds break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work
+/// is
 /// ½ (f₀ + f₁)·(u₁ − u₀) V.
 /// From 1 to 2, supports do not move, and the force density of loads remains f₁. Only u₀ is stored, so the
 /// work of loads is computed as
@@ -103,8 +105,8 @@ fn loaded<const D: usize>(
         return (members(problem, model, set), None);
     }
     let mut fractions = SetFractions::new(grids);
-    // Sets of loads in runs with refinement never contain ids, so the id 0 that is passed here is not read;
-    // see `refinement::trigger::is_possible`.
+    // In runs with refinement, the sets of loads are never given by ids. The id 0 that is passed here is
+    // therefore not read; see `refinement::trigger::is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
         set::contains(&problem.sets[set], problem.horizon, 0, position, body)
     };
@@ -122,8 +124,8 @@ fn body_of<'p, const D: usize>(problem: &'p Problem, model: &Model<D>, point: u3
     problem.block(usize::from(model.block[point as usize])).body
 }
 
-/// Check a load that acts on a layer whose thickness is the spacing: return an input error if a loaded point
-/// on any rank belongs to a body without a single spacing. Collective.
+/// For a load on a layer whose thickness is the spacing, return an input error if a loaded point on any rank
+/// belongs to a body without a [single spacing](Body::single_spacing). Collective.
 fn have_depths<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -330,8 +332,8 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Prepare the loads at `time` (s), with `factors` by condition. With `all`, loads that have not changed
-    /// are also applied again.
+    /// Prepare the loads at `time` (s). `factors` has a factor per condition. If `all` is true, loads that
+    /// have not changed are applied again, too.
     pub fn set_loads(&mut self, time: f64, factors: &[f64], all: bool) {
         for load in &mut self.loads {
             load.set_time(time, factors, all);
@@ -430,14 +432,14 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step (s)
-    /// without being counted as work. The work is integrated by the trapezoidal rule, which misses this
-    /// energy. A load contributes the energy that it gives to points at rest in one step. A supported
-    /// component contributes the energy of its velocity, and the energy that its prescribed acceleration
-    /// gives to a point at rest in one step.
+    /// in addition to the counted work. The trapezoidal rule, which integrates the work, misses this energy.
+    /// A load contributes the energy that it gives to points at rest in one step. A supported component
+    /// contributes the energy of its velocity, and the energy that its prescribed acceleration gives to a
+    /// point at rest in one step.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density on a point jumps
-    /// from 0 to f, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without
-    /// bound in an unstable run.
+    /// from 0 to f, the energy ½ ρ u̇² jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow
+    /// without bound in an unstable run.
     pub fn step_energy(&self, model: &Model<D>, fields: &Fields<D>, step: f64) -> ExactSum {
         let mut sum = ExactSum::ZERO;
         let kinetic = |point: usize, velocity: f64| {

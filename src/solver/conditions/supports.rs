@@ -100,9 +100,9 @@ impl Support {
     /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. The point is at a position
     /// (m), and the step (s) begins at a time (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
-        // Before the support begins, a displacement continues linearly, and a velocity is constant. If the
-        // expression has no finite value in the next step, such as √(1 − t), the change of the last step is
-        // repeated.
+        // For times before the support begins, a displacement is extrapolated linearly, and a velocity is
+        // constant. If the change in the next step is not finite, as for √(1 − t) at t = 1, the change of the
+        // last step is repeated.
         let has_past = time - self.begin >= 0.5 * step;
         let change = |step: f64| self.values.expression.increment(position, time, step);
         let to_come = match change(step) {

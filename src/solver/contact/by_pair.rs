@@ -125,7 +125,7 @@ pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Contac
     }
 }
 
-/// The bodies of each pair that has a separate contact rule.
+/// Indices of the two bodies of each pair with a separate contact rule.
 fn bodies_of_pairs(problem: &Problem) -> Vec<[usize; 2]> {
     let index = |name: &String| problem.bodies.iter().position(|body| body.name == *name);
     let pairs = problem.contact.iter().flat_map(|contact| &contact.pairs);

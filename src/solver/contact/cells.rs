@@ -1,4 +1,5 @@
-//! Cells of present positions, for the contact search. Cells are hashed, so positions may be anywhere.
+//! Cells of present positions, for the contact search. Points are sorted by the hashes of their cells, so the
+//! memory does not depend on the extent of the positions.
 
 /// Integer coordinates of a cell; 0 beyond the dimension.
 pub(super) type Cell = [i64; 3];

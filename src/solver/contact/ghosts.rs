@@ -16,8 +16,8 @@ use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
 
-/// Edge of a cell divided by the search radius. In large cells, a smaller fraction of the points lies near
-/// the borders of the cell.
+/// Edge of a cell divided by the search radius. With larger cells, home ranks receive fewer messages, but
+/// more points are sent between ranks.
 const CELL: f64 = 4.0;
 
 /// A point in messages to other ranks.
@@ -43,7 +43,7 @@ pub(super) struct Ghost {
 pub(super) struct Ghosts<const D: usize> {
     /// The points, sorted by owner and then by id.
     pub points: Vec<Ghost>,
-    /// Edge of a cell with the volume of each point, m.
+    /// Edge of a square or cube with the volume of each point, m.
     pub edges: Vec<f64>,
     /// Displacements by component, m.
     pub displacement: Vec<Vec<f64>>,

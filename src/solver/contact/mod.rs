@@ -1,11 +1,11 @@
 //! Contact: repulsion, friction and damping between points that no intact bond joins.
 //!
 //! Every owned point has a list of the points that it may touch before the next search. The list is in
-//! ascending order of ids, so the order of the force sum does not depend on the ranks. The lists are rebuilt
-//! when a point has moved by more than half the skin since the last search. The skin is the distance by which
-//! two points may approach between searches. A pair touches if its distance is below its contact distance.
-//! The contact distance never exceeds the reference distance, so an undeformed body has no contact forces.
-//! Crack faces consist of points whose bonds have broken.
+//! ascending order of ids, so the order of the force sum does not depend on the ranks. A pair touches if its
+//! distance is below its contact distance. The lists contain the pairs whose gap (present distance minus
+//! contact distance) is at most the skin. The lists are rebuilt when a point has moved so far that other
+//! pairs may soon touch. The contact distance never exceeds the reference distance, so an undeformed body has
+//! no contact forces. Crack faces consist of points whose bonds have broken.
 //!
 //! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so the states of
 //! the bodies are the same on all ranks.
@@ -65,7 +65,7 @@ pub struct Contact<const D: usize> {
     blocks: usize,
     /// Largest contact distance of any two points, m.
     largest: f64,
-    /// Edge of a cell that has the volume of the point, for each owned point, m.
+    /// Edge of a square or cube with the volume of the point, for each owned point, m.
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
@@ -388,7 +388,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Return block and data of a point by its index: owned points first, then ghosts.
+    /// Return the block and the data of a point, given its index: owned points first, then ghosts.
     fn point(
         &self,
         model: &Model<D>,

@@ -17,7 +17,7 @@ const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
 /// Silling 2007).
 const SHORT_RANGE_STIFFNESS: f64 = 15.0;
 
-/// Damping ratio of a contact that sticks by friction.
+/// Damping ratio of the tangential motion of a contact that sticks by friction.
 const STICKING: f64 = 0.5;
 
 /// Contact rule for the points of two blocks.
@@ -64,7 +64,7 @@ pub(super) struct ContactPoint<const D: usize> {
     pub velocity: [f64; D],
     /// Volume, m³.
     pub volume: f64,
-    /// Edge of a cell that has the volume of the point, m.
+    /// Edge of a square or cube with the volume of the point, m.
     pub edge: f64,
     /// Mass, kg.
     pub mass: f64,
@@ -180,8 +180,9 @@ impl PairRule {
         }
     }
 
-    /// Contribution of a pair to the step limits; `None` if the pair does not touch and will not touch within
-    /// a time (s) at its present approach speed, or if its gap exceeds `most_gap` (m).
+    /// Contribution of a pair to the step limits. The result is `None` if the pair does not touch and will
+    /// not touch within a time (s) at its present approach speed. The result is also `None` if the gap
+    /// (present distance minus contact distance) exceeds `most_gap` (m).
     pub fn demand<const D: usize>(
         &self,
         first: &ContactPoint<D>,

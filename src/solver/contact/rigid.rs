@@ -35,7 +35,8 @@ pub struct RigidState {
     friction: Wrench,
     /// Part of `contact` that is contact damping.
     damping: Wrench,
-    /// Displacement of a driven body in the present load step until its first equilibrium, m; otherwise 0.
+    /// Displacement of a driven body in the present load step, m; 0 after the first equilibrium of the load
+    /// step, and in explicit stages.
     advance: [f64; 3],
     /// Prescribed force, N.
     load: [f64; 3],
@@ -112,7 +113,7 @@ impl RigidBody {
         let moments = mass.max(f64::MIN_POSITIVE) * inertia(&problem.shape, dimension.count());
         let inverse = moments.try_inverse().unwrap_or_else(Matrix3::identity);
         let layer = |block: &Block<'_>| {
-            // The contact layer is half a horizon of the points' material thick.
+            // The thickness of the contact layer is half the horizon of the points.
             let modulus = problem
                 .rule
                 .stiffness
@@ -265,8 +266,8 @@ impl RigidBody {
 
     /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
     /// The overlap is contact distance minus present distance. The contact distance is half the edge of the
-    /// point's cell, or the distance at the start if that is smaller. The overlap is set to 0 if the point is
-    /// farther from the surface than half the edge.
+    /// point's cell, or the distance at the start if this distance is smaller. The overlap is set to 0 if the
+    /// point is farther from the surface than half the edge.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.place());
         let half = 0.5 * point.edge;
@@ -333,10 +334,10 @@ impl RigidBody {
         }
     }
 
-    /// Contribution of a point to the step limits; `None` if the point does not touch the body and will not
-    /// touch the body within a time (s) at its present approach speed. The gap is the distance of the point
-    /// from the surface minus half the edge of the point's cell. If the gap exceeds the edge, the result is
-    /// `None` at any velocity.
+    /// Contribution of a point to the step limits. The result is `None` if the point does not touch the body
+    /// and will not touch the body within a time (s) at its present approach speed. The gap is the distance
+    /// of the point from the surface minus half the edge of the point's cell. If the gap exceeds the edge,
+    /// the result is `None` at any velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,

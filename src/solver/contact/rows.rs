@@ -64,15 +64,14 @@ impl Rows {
         rows
     }
 
-    /// Indices of the points that may touch an owned point, without points to which an intact bond joins the
-    /// owned point.
+    /// Indices of the points that may touch an owned point and that no intact bond joins to the owned point.
     pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
         let row = self.starts[point]..self.starts[point + 1];
         row.filter(|pair| !self.is_bonded[*pair])
             .map(|pair| self.others[pair] as usize)
     }
 
-    /// Whether [`Self::touching`] of an owned point is not empty.
+    /// Whether [`Self::touching`] returns any index for an owned point.
     pub fn is_open(&self, point: usize) -> bool {
         let row = self.starts[point]..self.starts[point + 1];
         self.is_bonded[row].contains(&false)

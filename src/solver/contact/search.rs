@@ -12,8 +12,9 @@ use super::ghosts::{Ghost, Ghosts};
 use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
-/// Skin as a fraction of the largest contact distance. A search finds the pairs whose gap is at most the
-/// skin. With this skin and penalty contact, the rows of a lattice at rest contain only nearest neighbours.
+/// Skin as a fraction of the largest contact distance. A search finds the pairs whose gap (present distance
+/// minus contact distance) is at most the skin. With this skin and penalty contact, the rows of a lattice at
+/// rest contain only nearest neighbours.
 const SKIN: f64 = 0.4;
 
 /// Largest gap of a pair that the look-ahead considers, as a fraction of the largest contact distance. The

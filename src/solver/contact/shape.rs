@@ -70,7 +70,7 @@ fn direction(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     }
 }
 
-/// Inertia tensor (m²) of a shape with mass 1 in this dimension. In 2-D, only the moment about z is used.
+/// Inertia tensor of a shape, divided by the mass, m². In 2-D, only the moment about z is used.
 pub(super) fn inertia(shape: &RigidShape, dimension: usize) -> Matrix3<f64> {
     match shape {
         RigidShape::Ball { radius } => {

@@ -45,7 +45,8 @@ pub(super) fn check_outside<const D: usize>(
     Ok(())
 }
 
-/// Pairs of points of different bodies that start at the same position and therefore never touch.
+/// Pairs of points of different bodies that start at the same position. Their contact distance is 0, so they
+/// never touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coincident {
     /// Number of pairs of points over all ranks.

@@ -8,7 +8,7 @@ use crate::solver::model::Model;
 use super::Contact;
 use super::rigid::RigidState;
 
-/// The step is lengthened after this number of consecutive steps that could have been longer.
+/// The step may be lengthened after this number of consecutive steps that contact did not limit.
 const CALM: u64 = 100;
 
 /// Limits that contact sets for the time step, over all ranks. The limits include contacts that will begin
@@ -23,8 +23,8 @@ pub(super) struct StepDemand {
     pub stiffness: f64,
     /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
-    /// Number of consecutive steps that could have been longer. With an adaptive step: number of consecutive
-    /// steps that contact did not limit. Large at the start, when contact has limited no step.
+    /// Number of consecutive steps that contact did not limit. The count restarts when a step that is not
+    /// adaptive is lengthened. The count is large at the start, when contact has limited no step.
     calm: u64,
 }
 
@@ -97,18 +97,18 @@ impl<const D: usize> Contact<D> {
         self.at_rigid[0].clone_from(&state.at_rigid);
     }
 
-    /// Whether present contacts, or contacts that will begin within the look-ahead (`LOOK_AHEAD`), limit the
-    /// step.
+    /// Whether there are contacts now or within the look-ahead (`LOOK_AHEAD`), so that contact sets a limit
+    /// for the step.
     pub fn is_felt(&self) -> bool {
         self.demand.stiffness > 0.0
     }
 
-    /// Number of consecutive steps that could have been longer.
+    /// Number of consecutive steps that contact did not limit.
     pub fn calm(&self) -> u64 {
         self.demand.calm
     }
 
-    /// Whether enough consecutive steps could have been longer, so that the step may be lengthened.
+    /// Whether the step may be lengthened: contact did not limit the last `CALM` steps.
     pub fn is_calm(&self) -> bool {
         self.demand.calm >= CALM
     }
@@ -123,8 +123,8 @@ impl<const D: usize> Contact<D> {
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Count the consecutive steps that could have been longer. Reset the count if the present step could not
-    /// have been longer.
+    /// Count the consecutive steps that contact did not limit. `could_be_longer` says that contact did not
+    /// limit the present step; otherwise, reset the count.
     pub fn count_calm(&mut self, could_be_longer: bool) {
         self.demand.calm = if could_be_longer {
             self.demand.calm + 1

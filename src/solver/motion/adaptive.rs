@@ -1,8 +1,8 @@
-//! Adaptive time step: a step in which too many bonds of a point break is rolled back and repeated with a
-//! shorter step.
+//! Adaptive time step: if too many bonds of a point break in a step, the step is rolled back and repeated
+//! with a shorter length.
 //!
-//! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. With short steps,
-//! the load is redistributed before more bonds break:
+//! See Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. With short
+//! steps, the load is redistributed before more bonds break:
 //!
 //! ```text
 //! N_b > most_broken, Δt > smallest                    undo the step, Δt ← Δt · reduce

@@ -1,6 +1,6 @@
 //! Symmetric band matrices and their Cholesky factor.
 
-/// A pivot is round-off if it is below this fraction of the diagonal entry in its row.
+/// A pivot below this fraction of the diagonal entry in its row is round-off.
 const SINGULAR: f64 = 1e-10;
 
 /// A symmetric, positive semidefinite band matrix, or its Cholesky factor. The lower half of the band is

@@ -1,4 +1,4 @@
-//! The coarse grid of a preconditioner, for the long waves of the displacement of a body.
+//! The coarse grid of a preconditioner, for long waves in the displacement of a body.
 //!
 //! A grid of box cells covers all bodies. Each edge of a cell is at least one horizon long, except along an
 //! axis with a single cell. Displacements are defined at the nodes and are linear along each axis within a
@@ -33,7 +33,7 @@ const GROWTH: f64 = 1.1;
 /// evaluation needs for a point with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// Number of multiply-adds to solve with the factored matrix. This number is allowed even with few points.
+/// Number of multiply-adds to solve with the factored matrix that is allowed even with few points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.
@@ -330,7 +330,8 @@ impl<const D: usize> CoarseGrid<D> {
 }
 
 impl<const D: usize> CellPosition<D> {
-    /// Interpolation weight of a node of the cell at the position of the point.
+    /// Interpolation weight of a node of the cell at the position of the point. `corner` is the number of the
+    /// node, as in [`CoarseGrid::corner`].
     fn weight(&self, corner: usize) -> f64 {
         let along = self.along.iter().enumerate();
         along

@@ -20,10 +20,15 @@ const LONG_CALM: u64 = 400;
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a new step (s) if contact is too stiff for the present step, or if the step is shorter than that
-    /// of the stage and contact has not limited enough consecutive steps. The new step divides the rest of the stage evenly. Otherwise return `None`,
-    /// which means that the step does not change. The result is always `None` at the end of a stage, in a
-    /// quasi-static stage, and in runs without contact.
+    /// Return a new step (s); `None` if the step does not change. The step changes in two cases:
+    ///
+    /// - The present step exceeds the step that contact allows. The new step is shorter.
+    /// - The present step is shorter than the step of the stage, and [`Contact::is_calm`] is true. The new
+    ///   step is longer if contact allows this.
+    ///
+    /// The new step divides the rest of the stage evenly. At the end of the stage, the result is `None`. In a
+    /// stage with an adaptive step, only the first case applies, and the new step is the step that contact
+    /// allows. The result is always `None` in a quasi-static stage and in runs without contact.
     pub fn step_for_contact(&self) -> Option<f64> {
         if self.is_quasi_static() {
             return None;
@@ -44,8 +49,9 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// Length that the next step may have if contact does not limit it, s. This is the step of the present or
-    /// the next stage, or the step that the adaptive rule requests, but at least the present step.
+    /// Length that the next step may have if contact does not limit it, s: the longer one of the steps of the
+    /// present and the next stage. In an adaptive stage: the step that the rule requests. The result is at
+    /// least the present step.
     pub(in crate::solver) fn longest_next_step(&self) -> f64 {
         let stages = self.stages.steps.iter().skip(self.progress.stage).take(2);
         let of_stages = stages.map(|(step, _)| *step).fold(0.0, f64::max);
@@ -67,7 +73,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
-    /// Change the step. If the new step is longer, the count of steps that contact does not limit starts again.
+    /// Change the step. If the new step is longer, restart the count of steps that contact does not limit.
     pub(in crate::solver) fn set_step_for_contact(&mut self, step: f64) {
         if let Some(contact) = &mut self.contact
             && step > self.clock.step()
@@ -90,8 +96,9 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Upper bound of the next adaptive step, s. After a step that contact has limited, the step does not
-    /// grow for 100 steps that contact does not limit. Then it at most doubles with each step, and after 400
-    /// such steps there is no bound.
+    /// grow for 100 steps that contact does not limit. Then the step at most doubles with each step. After
+    /// 400 such steps, it may grow by any factor. If [`Contact::is_felt`] is true, `CONTACT_RESERVE` times
+    /// the step that contact allows is also a bound.
     pub(in crate::solver) fn adaptive_limit(&self) -> f64 {
         let Some(contact) = &self.contact else {
             return f64::INFINITY;

@@ -34,8 +34,8 @@ pub enum Birth {
     /// A new point gets the mean. A removed point returns its volume times the difference of its value from
     /// the mean of its parents. This conserves momentum, and fields that are linear in space.
     Conserved,
-    /// A new point gets the mean. The value of a removed point is mixed into the values of its parents by
-    /// volume, so that no value leaves the previous range.
+    /// A new point gets the mean. The value of a removed point is averaged with the values of its parents,
+    /// weighted by volume, so that no value leaves the previous range.
     Mixed,
     /// A new point gets a part of the values of its parents, in proportion to volume, so that the sum over
     /// all points is conserved. A removed point returns all of its value.
@@ -247,8 +247,8 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density of the zero-energy control (the forces that resist zero-energy modes) that the point
-    /// would have if plastic flow did not reduce the control, J/m³; none without plasticity.
+    /// Energy density of the zero-energy control (the forces that resist zero-energy modes), J/m³, as if
+    /// plastic flow did not reduce the control; none without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",

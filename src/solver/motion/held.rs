@@ -11,11 +11,11 @@ use super::Fields;
 use super::load_step::sums;
 use super::pieces::{Piece, Pieces};
 
-/// A sum of loads is round-off if it is below this fraction of the sum of their magnitudes.
+/// A sum of loads below this fraction of the sum of their magnitudes is round-off.
 const ROUND_OFF: f64 = 1e-9;
 
-/// Torques below this fraction of Σ |arm| |force| are ignored, because they rotate a piece by a small angle
-/// only. The arm of a point is its position relative to the centroid of the piece.
+/// Torques below this fraction of Σ |arm| |force| are ignored, because they rotate a piece only by a small
+/// angle. The arm of a point is its position relative to the centroid of the piece.
 const SMALL_TORQUE: f64 = 0.01;
 
 /// Loads on a piece along an axis in which no support holds the piece.
@@ -266,9 +266,9 @@ impl<const D: usize> Simulation<'_, D> {
         std::array::from_fn(|d| self.model.reference[d][point] + displacement[d][point])
     }
 
-    /// Return the index of the condition with the largest load on the points `points`, which are sorted.
-    /// Loads are compared by the magnitude of the sum of `weight` over the points. The arguments of `weight`
-    /// are a point and the force of the load on this point (N). Collective.
+    /// Return the index of the condition with the largest load on `points`, the ascending local indices of
+    /// points. Loads are compared by the magnitude of the sum of `weight` over the points. The arguments of
+    /// `weight` are a point and the force of the load on this point (N). Collective.
     fn largest_load(&self, points: &[usize], weight: impl Fn(usize, [f64; D]) -> f64) -> usize {
         let (conditions, mut sums) = self.conditions.load_sums(&self.model, points, weight);
         let sums = reduce(self.comm, &mut sums).into_iter();

@@ -6,7 +6,7 @@
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation per v
 //! u ← u + s x                              s = 1 if |x·f(u + x)| ≤ 0.9 x·f(u), otherwise by line search
-//! η ← | ‖f(u + s x)‖ − ‖f − K x‖ | / ‖f‖   at most 0.1: nonlinearity of the forces
+//! η ← | ‖f(u + s x)‖ − ‖f − K x‖ | / ‖f‖   at most 0.1; a measure of the nonlinearity of the forces
 //! ```
 //!
 //! η follows Eisenstat & Walker 1996, and the differences of f follow Knoll & Keyes 2004. f includes the
@@ -235,8 +235,8 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Predict the displacements of a load step by the problem that is linearized about the last equilibrium.
-    /// Collective.
+    /// Predict the displacements of a load step: solve the problem that is linearized about the last
+    /// equilibrium. Collective.
     fn predict(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let owned = simulation.model.owned();
         let fields = &mut simulation.fields;

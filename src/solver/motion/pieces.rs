@@ -95,8 +95,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Describe a piece in two texts: the name of a body to which the piece belongs; the size of the piece
-    /// and the position of one of its points. Collective.
+    /// Describe a piece in two texts. The first text is the name of a body to which the piece belongs. The
+    /// second text gives the size of the piece and the position of one of its points. Collective.
     pub(super) fn describe_piece(&self, piece: &Piece) -> [String; 2] {
         let ids = &self.model.ids;
         let named = piece.points.iter().find(|k| ids[**k] == piece.first);

@@ -1,4 +1,5 @@
-//! Velocity Verlet: half a kick, a drift, a force evaluation, half a kick.
+//! Velocity Verlet: half a kick, a drift, a force evaluation, half a kick. A kick changes the velocities, and
+//! a drift changes the displacements.
 //!
 //! See Silling & Askari 2005. The method is second order in the step and time-reversible, and velocities
 //! are known at full steps. With viscous damping at a rate r, the equation of motion is ρ ü = f − r ρ u̇
@@ -24,7 +25,7 @@ impl<const D: usize> Integrator<D> for Verlet {
     }
 }
 
-/// Density (kg/m³) and damping (1/s) of a point.
+/// Density (kg/m³) and damping rate (1/s) of a point.
 type Constants = (f64, f64);
 
 fn constants<const D: usize>(model: &Model<D>, block: u16) -> Constants {

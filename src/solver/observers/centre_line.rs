@@ -1,6 +1,6 @@
 //! Centre lines of connected damaged points: the path of a crack and its branches.
 //!
-//! Damage is spread over a band some spacings wide. Dijkstra's method finds the shortest path along the band
+//! Damage is spread over a band a few spacings wide. Dijkstra's method finds the shortest path along the band
 //! from the start of the crack to each point. The points are grouped into sections by their path length.
 //! Within a section, each set of connected points is a part; different parts lie on different branches. The
 //! centre lines join the centroids of successive parts (the level-set diagram of Lazarus & Verroust 1999). A
@@ -80,8 +80,8 @@ struct Ways {
     order: Vec<usize>,
 }
 
-/// A candidate for the next reached point. The order makes the candidate with the shortest path the greatest;
-/// among equal paths, the candidate with the lowest index is the greatest.
+/// A candidate for the next reached point. [`BinaryHeap`] pops the greatest candidate first, so a candidate
+/// with a shorter path is greater. Among equal paths, a candidate with a lower index is greater.
 #[derive(PartialEq)]
 struct Next {
     length: f64,

@@ -24,7 +24,8 @@ pub struct GlobalState {
     pub broken: u64,
     /// Number of cracked points: points whose damage exceeds the `damage_threshold` of the history.
     pub cracked_points: u64,
-    /// Corners of the bounding box of the cracked points, m; NaN if there are none.
+    /// Lower and upper corner of the bounding box of the cracked points, m; NaN if there are no cracked
+    /// points.
     pub cracked_extent: [[f64; 3]; 2],
     /// Number of singular points: points whose law gives no force.
     pub singular_points: u64,
@@ -97,7 +98,7 @@ impl Columns {
         self.values.push(Box::new(value));
     }
 
-    /// Add a column for each component.
+    /// Add a column for each component d, with the values `value(state, d)`.
     pub fn add_vector(
         &mut self,
         name: &str,

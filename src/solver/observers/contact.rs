@@ -1,6 +1,6 @@
-//! In runs without `[contact]`, bodies that no bond joins pass through each other. This module finds two
-//! points of such bodies that are nearer than their spacing, which is the mean edge of their cells. For
-//! bodies whose bonds have broken, it finds points that are nearer than half their spacing.
+//! Detection of bodies that pass through each other in runs without `[contact]`. This module finds two points
+//! of bodies without common bonds that are nearer than their spacing, the mean edge of their cells. For
+//! bodies whose common bonds have broken, the limit is half the spacing. [`Contact`] states the exact limits.
 //!
 //! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks
 //! by spatial cells, so that each rank compares a part of the points. A point of the second body is sent to
@@ -15,7 +15,8 @@ use crate::points::distance_squared;
 use crate::solver::Simulation;
 use crate::solver::model::Model;
 
-/// Edge of a cell divided by [`Meeting::radius`]. Large cells have fewer points near their borders.
+/// Edge of a cell divided by [`Meeting::radius`]. Large cells have fewer points near their borders, so fewer
+/// points are sent to several ranks.
 const CELL: f64 = 8.0;
 
 /// Two points of bodies that no bond joins are too near only if their distance is below this fraction of
@@ -75,7 +76,7 @@ struct Meeting {
     upper: [f64; 3],
 }
 
-/// A point in messages to the ranks that compare this point with points of the other body.
+/// A point, as sent to the ranks that compare this point with points of the other body.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Candidate {
@@ -156,7 +157,8 @@ impl ContactWatch {
         if self.pairs.is_empty() {
             return Vec::new();
         }
-        // Lower corners of the bounding boxes, and negative upper corners, so that one minimum gives both.
+        // Lower corners of the bounding boxes, and negative upper corners, so that one element-wise minimum
+        // gives both.
         let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
@@ -276,7 +278,7 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
 }
 
 /// Find the nearest pair among the given points of two bodies. Only pairs whose distance is below the limit
-/// for their spacing and their reference distance count; `None` if there is no such pair.
+/// count, see [`Contact`]; `None` if there is no such pair.
 fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
     if first.is_empty() || second.is_empty() {
         return None;

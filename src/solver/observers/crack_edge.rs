@@ -4,9 +4,10 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 type Vector = Vector3<f64>;
 
-/// A point can be on the front only if a distance exceeds this threshold, in horizons. The distance is
-/// measured in the plane of the crack, from the mean position of the damaged points around the point to the
-/// mean position of the point's family. It is 0.4 on a straight front, and 0.05 at an edge of the body.
+/// Threshold of a distance, in horizons. The distance is measured in the plane of the crack, from the mean
+/// position of the damaged points around a point to the mean position of the point's family. A point can be
+/// on the front only if its distance exceeds the threshold. The distance is 0.4 on a straight front, and 0.05
+/// at an edge of the body.
 const ONE_SIDED: f64 = 0.2;
 
 /// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged
@@ -32,8 +33,9 @@ impl Edge {
     ///
     /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
     /// ⊗ g over these points and the point itself, 1/m²; g is the result of
-    /// [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `mean` is the mean ξ̄ of the point's
-    /// family, m. `radius` is the radius of the family, m.
+    /// [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `mean` is the result of
+    /// [`Moments::mean`](crate::solver::bonds::Moments::mean) for the point, m. `radius` is the radius of the
+    /// family, m.
     ///
     /// At the edge, the damaged points lie on one side of the family, and no damaged point lies in the cone
     /// ahead.

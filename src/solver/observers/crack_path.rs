@@ -21,7 +21,7 @@ pub struct CrackPath {
     reach: Reach,
 }
 
-/// A point above the damage threshold, in messages to all ranks.
+/// A point whose damage exceeds the threshold, as sent to all ranks.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Found {

@@ -6,7 +6,7 @@ use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
 /// Distance, in horizons, up to which damaged points are connected. This distance is long enough to bridge a
-/// gap of one point, and short enough that the points of two branches are soon no longer connected.
+/// gap of one point, and short enough to separate two branches soon after their fork.
 const LINK: f64 = 2.0 / 3.0;
 
 /// Find the owned points of the set of a crack. Collective.

@@ -8,8 +8,8 @@
 //! g = C⁻¹ Σ_broken (ξ − ξ̄) ω Ṽ,   C = Σ (ξ − ξ̄) ⊗ (ξ − ξ̄) ω Ṽ over all bonds,   area = Σ |g| V.
 //!
 //! On a cubic lattice, C is isotropic, and the area of a plane crack is exact for any direction of its
-//! normal. Points without intact bonds have g = 0. Therefore a crack with crushed points, or with a width,
-//! counts once.
+//! normal. Points without intact bonds have g = 0. Therefore the area of a crack that contains such points,
+//! or that has a width, is counted once.
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Vector3};
@@ -49,7 +49,7 @@ pub struct CrackSurface {
     points: Vec<u32>,
     /// Distance up to which damaged points are connected, m.
     link: f64,
-    /// Distance up to which damaged points count as around a point, m; at most one horizon.
+    /// Radius of the surroundings of a point in which damaged points are considered, m; at most one horizon.
     radius: f64,
     /// Minimum distance between points of the front, m.
     front_spacing: f64,
@@ -68,7 +68,7 @@ pub struct Surface {
     pub front: Vec<[f64; 3]>,
 }
 
-/// A point of the front, in messages to all ranks.
+/// A point of the front, as sent to all ranks.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct FrontPoint {

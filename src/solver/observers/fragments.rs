@@ -22,7 +22,7 @@ pub struct Fragments {
     pub largest_momentum: Vec<f64>,
 }
 
-/// Number of points of a rank in a fragment.
+/// Id of a fragment, and number of points of a rank in this fragment.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Share {

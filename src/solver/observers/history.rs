@@ -29,7 +29,7 @@ use super::snapshot::Snapshot;
 use super::statistics::{self, FieldStatistics};
 use super::tip::Tip;
 
-/// Number of points that are summed one after the other, before sums are merged.
+/// Number of points that one task sums; the sums of all tasks are then merged.
 const CHUNK: usize = 4096;
 
 /// A point whose values the history contains.
@@ -56,7 +56,7 @@ pub struct HistoryObserver {
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     j_integrals: JIntegrals,
-    /// Sum of the energy balance in the first row (J), see [`Energies::error`], and number of bonds that were
+    /// Energies minus work in the first row (J), see [`Energies::error`], and number of bonds that were
     /// intact before any bond could break, counted at both ends. `None` before the first row.
     start: Option<(f64, u64)>,
 }
@@ -83,8 +83,8 @@ pub struct Energies {
     /// damping.
     pub dissipated: f64,
     /// Error of the energy balance: change of kinetic + rigid + strain + contact + fracture + dissipated −
-    /// work since the start, without the energy that refinements and changes of the density scale have added.
-    /// 0 for an exact integrator.
+    /// work since the first row, minus the energy that refinements and changes of the density scale have
+    /// added. An exact integrator has the error 0.
     pub error: f64,
 }
 
@@ -97,10 +97,10 @@ pub struct HistoryRow {
     pub number: u64,
     /// Energies of the row.
     pub energies: Energies,
-    /// Sum of the energy balance in the first row, J; see [`Energies::error`].
+    /// Energies minus work in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
-    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step without being
-    /// counted as work. The work is integrated by the trapezoidal rule, which misses this energy.
+    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step in addition
+    /// to the counted work. The trapezoidal rule, which integrates the work, misses this energy.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
@@ -155,7 +155,7 @@ impl HistoryObserver {
     /// - If no point lies along the line of a front.
     /// - If all points of the set of a crack tip lie behind the start of the line.
     /// - If the box of a J integral contains no point, or is too near to the end of the bodies.
-    /// - If no body lies on the line that stands for the crack front of a J integral.
+    /// - If no body lies on the line that approximates the crack front of a J integral.
     ///
     /// The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
@@ -233,9 +233,9 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Reference values for all rows: the sum of the energy balance in the first row (J), see
-    /// [`Energies::error`], and the number of bonds that were intact before any bond could break, counted at
-    /// both ends. `None` before the first row.
+    /// Reference values for all rows: energies minus work in the first row (J), see [`Energies::error`], and
+    /// the number of bonds that were intact before any bond could break, counted at both ends. `None` before
+    /// the first row.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
@@ -245,7 +245,8 @@ impl HistoryObserver {
         self.start = Some(start);
     }
 
-    /// Read the lengths of cracks with a tracked tip from earlier rows, for the speeds of the tips.
+    /// Read the crack length of each tracked tip from earlier rows. The next speeds of the tips depend on
+    /// these lengths.
     pub fn recall(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
@@ -285,8 +286,8 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// Compute the present row. Then reset the largest number of bonds broken in one step to 0, such that the
-    /// next row has the largest number since this row. Collective.
+    /// Compute the present row. Then reset the largest number of bonds broken in one step to 0, so that the
+    /// next row contains the largest number since this row. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -462,7 +463,7 @@ impl HistoryObserver {
             }
             counts.push(bits.len() - before);
         }
-        // Other ranks than the owner contribute 0, so the sum has the bits of the owner's value.
+        // All ranks except the owner contribute 0, so the sum has the bits of the owner's value.
         simulation.comm.sum(&mut bits);
         let mut values = bits.into_iter().map(f64::from_bits);
         let of_probe = |count: usize| values.by_ref().take(count).collect();

@@ -1,14 +1,15 @@
 //! Nonlocal J integrals over boxes around crack tips (in 3-D, around pieces of crack fronts): energy released
 //! per area of crack growth.
 //!
-//! A box has a weight q that is 1 inside and falls to 0 over a layer inside the faces. With the unit vector e
-//! in the direction of growth, the strain energy density W and the force states T, the integral is
+//! Each box has a weight q. Over a layer along the faces, inside the box, q rises from 0 at the faces to 1.
+//! Farther inside, q is 1. With the unit vector e in the direction of growth, the strain energy density W and
+//! the force states T, the integral is
 //!
 //! J = −(1/L) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
 //!
 //! L is the thickness in plane problems, and the integral of q along the crack front in 3-D. In an
-//! equilibrium without loads in the box, J is the mean of the integrals of Silling & Lehoucq (2010) over the
-//! boxes {q > s}, 0 < s < 1; see `docs/src/theory/j_integral.md`.
+//! equilibrium without loads in the box, J is the mean, over 0 < s < 1, of the integrals of Silling & Lehoucq
+//! (2010) for the boxes {q > s}; see `docs/src/theory/j_integral.md`.
 
 use crate::comm;
 use crate::comm::sum::{ExactSum, reduce};
@@ -22,20 +23,20 @@ use crate::solver::Simulation;
 use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
-/// Tolerance of the distance between the box and the ends of the bodies, in horizons, and of the components
-/// of the direction of growth.
+/// Tolerance of the components of the direction of growth, and, in horizons, of the distance between the box
+/// and the ends of the bodies.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.
 pub struct JIntegrals {
-    /// Directions of growth, each contained once.
+    /// Directions of growth (unit vectors), without duplicates.
     directions: Vec<[f64; 3]>,
     boxes: Vec<WeightedBox>,
 }
 
 /// The points of a box with their weights.
 struct WeightedBox {
-    /// Index of the direction of growth.
+    /// Index of the direction of growth in `JIntegrals::directions`.
     direction: usize,
     points: Vec<Weight>,
     /// Thickness in plane problems, integral of q along the crack front in 3-D, m.
@@ -46,8 +47,9 @@ impl JIntegrals {
     /// Find the points of the boxes. Collective.
     ///
     /// # Errors
-    /// If a box contains no point, if the bodies end near the box in the direction of growth, or if no body
-    /// lies on the line that stands for the crack front in 3-D. The error is the same on all ranks.
+    /// If a box contains no point, or if the bodies end near the box in the direction of growth. In 3-D, also
+    /// if no body lies on the line that approximates the crack front, see [`front_length`]. The error is the
+    /// same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let mut directions = Vec::new();
         let mut boxes = Vec::new();
@@ -110,8 +112,8 @@ impl JIntegrals {
     }
 }
 
-/// Check that the box contains points, and that the bodies reach at least one horizon beyond the box in the
-/// directions of the axes along which the crack grows. Collective.
+/// Check that the box contains points. Also check that the bodies reach at least one horizon beyond both
+/// sides of the box, along each axis along which the crack grows. Collective.
 fn is_in_the_bodies<const D: usize>(
     simulation: &Simulation<'_, D>,
     rule: &JIntegral,

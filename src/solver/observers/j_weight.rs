@@ -1,4 +1,4 @@
-//! Weight q of a J integral: 1 inside a box, falling to 0 over a layer inside the faces. As in
+//! Weight q of a J integral. Over a layer along the faces of the box, q rises from 0 at the faces to 1. As in
 //! `j_integral.rs`, e is the unit vector in the direction of crack growth.
 
 use std::ops::Range;
@@ -28,7 +28,7 @@ fn weight_at(rule: &JIntegral, position: [f64; 3], dimension: usize) -> f64 {
     (0..dimension).map(along).product()
 }
 
-/// Compute the weights of the owned points; points without weight and slope are left out.
+/// Compute the weights of the owned points; points whose weight and slope are both 0 are left out.
 pub fn weights<const D: usize>(simulation: &Simulation<'_, D>, rule: &JIntegral) -> Vec<Weight> {
     let model = &simulation.model;
     let of_point = |point: usize| {
@@ -56,8 +56,8 @@ pub fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f
     spacing.unwrap_or([problem.dimension.edge(model.volume[point]); 3])
 }
 
-/// Return √Σ(a n)² as the length of a cell with the edges a along the direction n, m. The component of n
-/// along an axis that the problem does not have is 0.
+/// Return the length √Σ(a n)² of a cell with the edges a along the direction n, m. The components of n beyond
+/// the dimension of the problem are 0.
 fn extent(edges: [f64; 3], direction: [f64; 3]) -> f64 {
     let squares = edges.iter().zip(direction);
     let squares = squares.map(|(edge, component)| (component * edge).powi(2));
@@ -116,8 +116,8 @@ fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (range.start < range.end).then_some(range)
 }
 
-/// Return the range of distances a (m) on the line {a · `direction`} that belongs to the point at `position`
-/// (m). `None` if the point is more than one edge away from the line.
+/// Return the range of distances a (m) on the line {a · `direction`} that the cell of the point at `position`
+/// (m) covers. `None` if the point is more than one edge away from the line.
 fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
     let across = (0..3).map(|d| (position[d] - along * direction[d]).powi(2));

@@ -8,8 +8,8 @@ use crate::problem::Line;
 
 use crate::solver::Simulation;
 
-/// Relative tolerance of distances, in horizons. Points whose distances differ less count as equally far, and
-/// a point at a limit counts as within the limit.
+/// Tolerance of distances, in horizons. Points whose distances differ by less count as equally far. A point
+/// at a limit counts as within the limit.
 const TOLERANCE: f64 = 1e-9;
 
 /// This rank's points along a line, and the coordinate of each point along the line (m).
@@ -24,13 +24,13 @@ pub struct Reached {
     /// Distance from the start of the line, m.
     pub along: f64,
     /// Position, m: the position of the farthest point above the threshold, moved in the direction of the
-    /// line to `along`.
+    /// line until its distance from the start is `along`.
     pub position: [f64; 3],
 }
 
 impl Course {
-    /// Find the points of `among` (local indices) between the start and the end (m along the line) and
-    /// within `radius` (m) of the line.
+    /// Find the points of `among` (local indices) that lie between the start of the line and `end` (m along
+    /// the line), and within `radius` (m) of the line.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         line: Line,

@@ -33,7 +33,7 @@ impl Snapshot {
     }
 
     /// Take a snapshot from which these fields can be computed. Energies are summed only if a field needs
-    /// them; rows of the history always need them, see [`Self::new`].
+    /// them. For a row of the history, use [`Self::new`], because rows always need energies.
     pub fn for_fields<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         fields: impl IntoIterator<Item = Field>,
@@ -140,8 +140,8 @@ impl Snapshot {
             }
             Field::Strain => strain(simulation),
             Field::Singular => simulation.forces.singular(model),
-            // Runs without prescribed temperatures do not store this field; all points have the reference
-            // temperature.
+            // Runs without prescribed temperatures do not store this field. All points then have the
+            // reference temperature of their material.
             Field::Temperature => {
                 let point = |point| model.expansion_of(point).reference_temperature;
                 (0..count).map(point).collect()
@@ -161,9 +161,10 @@ impl Snapshot {
 }
 
 /// Convert Kirchhoff stress to Cauchy stress, with six components per point. The stress is divided by J, the
-/// ratio of deformed to undeformed volume. J needs the out-of-plane stretch. In plane stress, the law
-/// computes this stretch. For a law that does not, the stretch follows from Hooke's law with logarithmic
-/// strains: ε_zz = −ν/(1 − ν) (ε_xx + ε_yy). Under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
+/// ratio of deformed to undeformed volume. J depends on the stretch perpendicular to the plane or bar. In
+/// plane stress, some laws compute this stretch. Otherwise, the stretch follows from Hooke's law with
+/// logarithmic strains: ε_zz = −ν/(1 − ν) (ε_xx + ε_yy) in plane stress, and ε_yy = ε_zz = −ν ε_xx under
+/// uniaxial stress.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
@@ -171,7 +172,8 @@ fn cauchy_stress<const D: usize>(
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        // Thermal expansion is isotropic, so F is divided by the thermal stretch.
+        // The formulas below hold without thermal expansion, so F is divided by the isotropic thermal
+        // stretch.
         let thermal = 1.0 + free_stretch(simulation, point);
         let gradient = gradient / thermal;
         let in_plane = determinant(&gradient);
@@ -198,7 +200,7 @@ fn cauchy_stress<const D: usize>(
     kirchhoff
 }
 
-/// Green–Lagrange strain ½(FᵀF − I) in 3-D, with the components xx, yy, zz, xy, yz, xz of each point.
+/// 3-D Green–Lagrange strain ½(FᵀF − I), with the components xx, yy, zz, xy, yz, xz for each point.
 fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     let mut rows = Vec::with_capacity(6 * gradients.len());
@@ -254,8 +256,9 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
     simulation.problem.block(block).body.material.elastic
 }
 
-/// Trace of the 3-D strain of an owned point, from the trace in the plane or along the bar. In plane stress,
-/// ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx. Thermal strain is added.
+/// Trace of the 3-D strain of an owned point, from `in_setting`, the trace in the plane or along the bar. In
+/// plane stress, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx. Thermal
+/// strain is added.
 fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_setting: f64) -> f64 {
     let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
@@ -308,9 +311,9 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
     }
 }
 
-/// Compute the stress perpendicular to the plane or bar, if the strain in this direction is 0. In plane
-/// strain, the law gives zz; the default is ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 − ν) xx.
-/// Temperature adds −E α ΔT in plane strain, and −E α ΔT/(1 − ν) under uniaxial strain.
+/// Set the stress perpendicular to the plane or bar, if the strain in this direction is 0. In plane strain,
+/// zz is the value of the law, or ν (xx + yy) if the law computes no value. Under uniaxial strain, yy = zz =
+/// ν/(1 − ν) xx. Temperature adds −E α ΔT in plane strain, and −E α ΔT/(1 − ν) under uniaxial strain.
 fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
     let by_law = match simulation.problem.dimension {

@@ -11,7 +11,7 @@ use crate::solver::conditions::{members, not_empty};
 
 use super::row_fields::RowFields;
 
-/// Number of points that are summed one after the other, before sums are merged.
+/// Number of points that one task sums; the sums of all tasks are then merged.
 const CHUNK: usize = 4096;
 
 /// The statistics of a field over a set.
@@ -141,7 +141,7 @@ impl FieldStatistics {
                 Statistic::Sum => sum,
                 Statistic::Integral => integral,
                 Statistic::Mean => integral / statistics.volume,
-                // The minimum of −0 and 0 depends on their order, so the sum with 0 replaces −0 by 0.
+                // The minimum of −0 and 0 depends on their order. Adding 0 turns −0 into 0.
                 Statistic::Minimum => smallest[k] + 0.0,
                 Statistic::Maximum => largest[k] + 0.0,
             };

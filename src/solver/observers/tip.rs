@@ -15,7 +15,8 @@ pub struct Tip {
     growth: Growth,
 }
 
-/// State of a crack tip at the time of a row; NaN if no damage exceeds the threshold of the tip.
+/// State of a crack tip at the time of a row. All values are NaN if no damage exceeds the threshold of the
+/// tip.
 #[derive(Debug, Clone, Copy)]
 pub struct TipNow {
     /// Position, m.
@@ -87,7 +88,7 @@ impl Tip {
         std::mem::swap(&mut self.growth, &mut earlier.growth);
     }
 
-    /// Record the length of the crack (m) in an earlier row at a time (s).
+    /// Record the length (m) of the crack in an earlier row, and the time (s) of this row.
     pub fn recall(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);
     }
@@ -97,11 +98,12 @@ impl Tip {
 ///
 /// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
 /// latest row in which the crack was at least one horizon shorter. If there is no such row, the interval
-/// begins at the latest row in which the crack was not longer than at first.
+/// begins at the latest row in which the crack was not longer than in the first row with a tip.
 ///
-/// Over a shorter distance, the steps of the lattice would be visible in the speed. Over a fixed time, the
-/// speed would depend on the interval of rows. A crack that has not grown has speed 0. If a crack stops, its
-/// speed is one horizon divided by the duration of the interval, which then grows from row to row.
+/// Over less growth than one horizon, the speed would show the jumps of the tip from point to point of the
+/// lattice. Over a fixed number of rows, the speed would depend on the time between rows. A crack that has
+/// not grown has speed 0. After a crack stops, its speed is about one horizon divided by the duration of the
+/// interval, which grows from row to row.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.

@@ -4,8 +4,8 @@
 //! at which a condition of the deck is true. All points within the horizon of such a point are refined
 //! (Dipasquale et al. 2014, §2.1). A new point gets the mean state of its parents. The new point takes its
 //! volume from the parents in equal parts, so mass and momentum are conserved. Bonds that exist before and
-//! after the refinement keep their state. A new bond starts broken if it crosses a pre-crack, or a face
-//! between points that a crack separates. No point is created between points that a crack separates.
+//! after the refinement keep their state. A new bond starts broken if it crosses a pre-crack, or a facet: a
+//! face between points that a crack separates. No point is created between points that a crack separates.
 
 use std::cell::OnceCell;
 use std::time::Instant;

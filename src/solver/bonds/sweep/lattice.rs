@@ -146,15 +146,15 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
 }
 
 /// Number of lane groups that skip the fast path after a failed attempt. The fast path is a loop without
-/// failure criterion. An attempt fails if |x| of a bond, with x of [`crate::material::bond`], exceeds
+/// failure criterion. An attempt fails if |x| of a bond (see [`crate::material::bond`]) exceeds
 /// [`Criterion::limit`](crate::damage::Criterion::limit). Large |x| occur in clusters, so further attempts
 /// would probably fail.
 const FAST_PATH_BACKOFF: usize = 7;
 
-/// Choice of the loop for the next lane group. Lists have no fast path, because loading points j takes most
-/// of the time.
+/// Choice between the fast path and the full loop for the next lane group. Lists have no fast path, because
+/// loading points j takes most of the time.
 struct FastPathGate {
-    /// Whether the kernel may skip its criterion, and does not remove thermal stretches.
+    /// Whether the kernel may skip its criterion, and removes no thermal stretches from bonds.
     is_allowed: bool,
     /// Number of lane groups that must still skip the fast path.
     skipped: usize,
@@ -206,9 +206,8 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sum over the bonds of a lane group; `None` if |x| of a bond, with x of [`crate::material::bond`],
-/// exceeds the limit of the kernel's criterion.
-/// The arguments are copied so that they stay in registers.
+/// Sum over the bonds of a lane group; `None` if |x| of a bond (see [`crate::material::bond`]) exceeds the
+/// limit of the kernel's criterion. The arguments are copied so that they stay in registers.
 ///
 /// # Safety
 /// The lane group must belong to the grid of `points`.

@@ -34,7 +34,8 @@ pub(super) struct OverRows<'a, K: Kernel<D>, const D: usize> {
 }
 
 impl<'a, K: Kernel<D>, const D: usize> OverRows<'a, K, D> {
-    /// Prepare the loop over a list with this reach. `breaking` is `None` for kernels that break no bonds.
+    /// Prepare the loop over a list whose local indices are below `reach`. `breaking` is `None` for kernels
+    /// that break no bonds.
     pub(super) fn new(
         kernel: &'a K,
         breaking: Option<&'a BreakingBonds>,

@@ -45,7 +45,7 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// The columns over the points, to which a kernel adds its sums.
+/// The columns over the points to which a kernel adds its sums.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// A part of the bonds of two blocks.
@@ -64,8 +64,8 @@ trait Part: Sized + Send {
 trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
-    /// Run the kernel over a part; `base` is the local index of the point of the first entry of the results.
-    /// Return the sums over breaking bonds, by ascending point.
+    /// Run the kernel over a part; `base` is the local index of the point to which the first entry of the
+    /// results belongs. Return the sums over breaking bonds, by ascending point.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -78,8 +78,8 @@ trait Runner<P: Part>: Sync {
     const ISA_SET: IsaSet;
 }
 
-/// Run a kernel over the bonds of the owned points in a range of local indices. The results are columns
-/// over all owned points.
+/// Run a kernel over the bonds of the owned points in a range of local indices. The results are columns over
+/// all owned points.
 ///
 /// # Panics
 /// If an array that the kernel reads is too short for the bonds, if the point data of a lattice belong to
@@ -120,8 +120,8 @@ pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
     sweep_if_exists(bonds, points, 0, results, (kernel, Some(breaking)), source)
 }
 
-/// Run a kernel that is implemented in `D` dimensions. Kernels that break bonds need the kernel of breaking
-/// bonds, too.
+/// Run a kernel that is implemented in `D` dimensions. `kernels` are this kernel and, if it breaks bonds, the
+/// kernel of breaking bonds.
 fn sweep_if_exists<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
@@ -182,7 +182,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
     }
 }
 
-/// Halve a part repeatedly until the tasks are small, and run the tasks.
+/// Halve a part repeatedly until each task has at most `leaf` rows or lane groups, and run the tasks.
 fn split<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
