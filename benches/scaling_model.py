@@ -1,9 +1,11 @@
 """Model of the time per step on many ranks, and of the resource limits that are reached first.
 
-The points of a rank are assumed to fill a cube. The rank exchanges a layer of points, one horizon thick, with its
-neighbours. The bonds of interior points are computed while the messages are under way, so the time per step is
+The points of a rank are assumed to fill a cube. The rank exchanges a layer of points, one horizon thick, with
+neighbouring ranks. The bonds of interior points are computed while the messages are under way, so the time per step is
 
     border bonds + packing + max(interior bonds, messages · latency + bytes / bandwidth)
+
+plus the time of the reductions for the history, per step.
 
 To check the assumption of cubes: METIS partitions of 64³ points have 1.04 times the ghosts of cubes on 8 ranks, and
 1.00 times on 27 ranks.
@@ -38,7 +40,7 @@ METIS_SECONDS = 0.24 / 216_000
 # Bytes per cell on every rank: occupation twice (the sum needs a copy), owner three times.
 CELL_BYTES = 2 * 8 + 3 * 4
 # Bytes per cell on rank 0: for each of 26 edges the index of the neighbour, the weight as an integer and the weight as
-# a real number; and METIS's copies.
+# a float; and METIS's copies.
 GRAPH_BYTES = 26 * (4 + 4 + 8) + 26 * 2 * 8
 # Largest number of cells: the graph may have 2³¹ edges, and each cell has 26 edges.
 GRAPH_CELLS = 2**31 / 26
@@ -50,8 +52,8 @@ def step(given, points):
     layers = given["layers"]
     ghosts = (edge + 2 * layers) ** 3 - points
     interior = max(0.0, edge - 2 * layers) ** 3 / points
-    # Number of ranks with points in the layer of ghosts. If the cubes of the ranks are thinner than the layer, the layer
-    # contains several cubes in each direction.
+    # Number of ranks with points in the layer of ghosts. If the cubes of the ranks are thinner than the layer, the
+    # layer contains several cubes in each direction.
     messages = (2 * math.ceil(layers / edge) + 1) ** 3 - 1
     bonds = given["imbalance"] * points * given["neighbours"] / (given["rate"] * given["cores"])
     size = 8 * given["values"] * ghosts
@@ -86,7 +88,7 @@ def predict(given, points_of):
 def limits(given, ranks, points):
     """Return the limits for these numbers of ranks and of points: (name, amount, limit) with the amount in the unit of
     the limit, the largest ratio of amount to limit first."""
-    # As in src/partition/cells.rs. The edges of a cell have at least the length of the horizon.
+    # Number of cells as in src/partition/cells.rs. The edges of a cell are at least as long as the horizon.
     cells = min(points / given["layers"] ** 3, max(1e5, 2000 * ranks), max(4e6, 64 * ranks))
     own = points / ranks
     found = [

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::Command;
 
-/// Set the environment variable `FISSURE_COMMIT` for the crate in release builds, from git or from the file
-/// of `cargo package`. Debug builds do not set this variable, because they would be rebuilt after each
-/// commit.
+/// In release builds, set the environment variable `FISSURE_COMMIT` of the crate. The commit comes from git,
+/// or from the file that `cargo package` writes. Debug builds do not set this variable, because they would be
+/// rebuilt after each commit.
 pub fn set_environment() {
     if std::env::var("PROFILE").as_deref() != Ok("release") {
         return;

@@ -52,8 +52,8 @@ pub fn check() -> Result<Mpi, String> {
     ))
 }
 
-/// Return a note with Debian's path of the HDF5 that was built with the linked MPI; empty if this folder does
-/// not exist.
+/// Return a note with Debian's folder of the HDF5 that was built with the linked MPI; empty if the folder
+/// does not exist.
 fn example(linked: &[String]) -> String {
     let family = if linked.iter().any(|name| name.starts_with("libmpich")) {
         "mpich"

@@ -11,8 +11,8 @@ use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
 use fissure::error::Result;
 use fissure::problem::{
-    Calibration, Damage, DamageRule, Law, Material, Problem, Sense, Shape, Toughness, WorkMeasure,
-    WorkRule,
+    BreakableBonds, Calibration, Damage, DamageRule, Law, Material, Problem, Shape, Toughness,
+    WorkMeasure, WorkRule,
 };
 use fissure::solver::calibration::separation_energy_ratio;
 
@@ -57,18 +57,18 @@ fn print_table() -> Result<()> {
 }
 
 fn rules() -> [(&'static str, DamageRule); 3] {
-    let work = |sense| DamageRule::Energy {
+    let work = |breakable| DamageRule::Energy {
         calibration: Calibration::Energy,
         work: WorkRule {
-            sense,
+            breakable,
             family_correction: 0.0,
             measure: WorkMeasure::Objective,
         },
     };
     [
         ("stretch", DamageRule::CriticalStretch),
-        ("work of pulled bonds", work(Sense::Pulled)),
-        ("work", work(Sense::Either)),
+        ("work of pulled bonds", work(BreakableBonds::Stretched)),
+        ("work", work(BreakableBonds::Any)),
     ]
 }
 

@@ -1,6 +1,6 @@
-//! Calls of fsync on a result: none at outputs with preallocated space. Calls occur at the creation and the
-//! end of the file, when it grows, and on request. A separate test program, because it replaces a function of
-//! MPI.
+//! Calls of fsync on a result. Outputs into preallocated space make no call. Calls occur when the file is
+//! created, grows or is closed, and on request. This is a separate test program, because it replaces a
+//! function of MPI.
 
 use std::os::raw::c_int;
 use std::path::PathBuf;

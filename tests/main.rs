@@ -1,5 +1,5 @@
-//! Nearly all tests in one program, because the generic code that they call would be compiled for each
-//! program. `tests/README.md` describes the folders.
+//! Nearly all tests are in this program. With several programs, the generic code that the tests call would be
+//! compiled once per program. `tests/README.md` describes the folders.
 
 mod support;
 

@@ -124,10 +124,10 @@ fn simulate(problem: &Problem, request: &Request) -> Result<String> {
         section::figures(&mut report, body, &survey.bodies[index], problem.dimension);
         section::interior(&mut report, problem, interiors[index].as_ref());
         if request.measure {
-            section::parting(&mut report, problem, index);
+            section::separation_energy(&mut report, problem, index);
         }
     }
-    section::joints(&mut report, problem, survey);
+    section::bonds_between_bodies(&mut report, problem, survey);
     section::contact(&mut report, problem);
     section::rigid(&mut report, problem);
     section::places(&mut report, problem, survey, dimension);

@@ -24,8 +24,8 @@ pub fn simulated(
         Value::Object(entry)
     });
     let name = |body: usize| problem.bodies[body].name.as_str();
-    let joints = survey
-        .joints
+    let bonds_between_bodies = survey
+        .bonds_between_bodies
         .iter()
         .map(|([a, b], bonds)| json!({ "bodies": [name(*a), name(*b)], "bonds": bonds }));
     let probes = problem.history.probes.iter().zip(&survey.probes).map(|(probe, found)| {
@@ -44,7 +44,7 @@ pub fn simulated(
     add("bonds", json!(run.bonds));
     add("lattice_bonds", json!(run.lattice_bonds));
     add("bodies", bodies.collect());
-    add("bonds_between_bodies", joints.collect());
+    add("bonds_between_bodies", bonds_between_bodies.collect());
     let cracks = problem.cracks.iter().map(|crack| &crack.name).collect();
     add("cut_bonds", Value::Object(counts(cracks, &survey.cuts)));
     add("probes", Value::Object(probes.collect()));

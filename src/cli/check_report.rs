@@ -9,8 +9,8 @@ use fissure::dimension::Dimension;
 use fissure::error::Warning;
 use fissure::problem::Problem;
 use fissure::problem::{
-    Block, Body, ContactModel, ContactRule, DamageRule, InterfaceDamage, PointSource, RigidMotion,
-    RigidShape, Sense, Time,
+    Block, Body, BreakableBonds, ContactModel, ContactRule, DamageRule, InterfaceDamage,
+    PointSource, RigidMotion, RigidShape, Time,
 };
 use fissure::solver::assign::{block_laws, pair_damage_laws};
 use fissure::solver::calibration::separation_energy_ratio;
@@ -108,7 +108,7 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
     report.line("points", count(figures.points));
     let of_shape = figures.shape_volume.map(|volume| {
         let share = 100.0 * figures.volume / volume;
-        format!(", {share:.2} % of its shape's")
+        format!(", {share:.2} % of the volume of its shape")
     });
     report.line(
         "volume",
@@ -156,7 +156,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
     report.line(
         name,
         format_args!(
-            "{}, wanted {} ({})",
+            "{}, material {} ({})",
             si(interior.bulk, "Pa"),
             si(bulk, "Pa"),
             deviation(interior.bulk, bulk)
@@ -166,7 +166,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
         report.line(
             "shear modulus inside",
             format_args!(
-                "{} along axes, {} along diagonals, wanted {} ({}, {})",
+                "{} along axes, {} along diagonals, material {} ({}, {})",
                 si(axes, "Pa"),
                 si(diagonals, "Pa"),
                 si(shear, "Pa"),
@@ -179,7 +179,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
 
 /// Append the separation energy ratios of a body with energy-based damage: for opening, and in 2-D and 3-D
 /// also for sliding if compressed bonds can break.
-pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
+pub fn separation_energy(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
     };
@@ -187,7 +187,7 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
         return;
     };
     let mut modes = vec![("cost of opening", 0.0)];
-    if work.sense == Sense::Either && problem.dimension.count() > 1 {
+    if work.breakable == BreakableBonds::Any && problem.dimension.count() > 1 {
         modes.push(("cost of sliding", FRAC_PI_2));
     }
     for (name, angle) in modes {
@@ -202,15 +202,15 @@ const MOST_PAIRS: usize = 6;
 
 /// Append the numbers of bonds between bodies, and the damage thresholds of the pairs of bodies for which the
 /// deck gives the damage.
-pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
+pub fn bonds_between_bodies(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;
     }
     report.heading("bonds between bodies");
-    if survey.joints.is_empty() {
+    if survey.bonds_between_bodies.is_empty() {
         report.line("none", "");
     }
-    for (pair, bonds) in &survey.joints {
+    for (pair, bonds) in &survey.bonds_between_bodies {
         let [a, b] = pair.map(|body| &problem.bodies[body].name);
         report.line(&format!("{a} and {b}"), count(*bonds));
     }
@@ -425,7 +425,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
                 "time step",
                 si(*step, "s") + &largest_step(&stage.time, *step),
             );
-            report.line("steps", steps + note_on_steps(&stage.time));
+            report.line("steps", steps + note_on_steps(problem, &stage.time));
         }
         return;
     }
@@ -437,7 +437,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
             let (step, largest) = (si(*step, "s"), largest_step(&stage.time, *step));
             format!(
                 "{steps} steps of {step}{largest}{}",
-                note_on_steps(&stage.time)
+                note_on_steps(problem, &stage.time)
             )
         };
         report.line(&format!("stage {number}"), words);
@@ -453,10 +453,12 @@ fn largest_step(time: &Time, first: f64) -> String {
     }
 }
 
-fn note_on_steps(time: &Time) -> &'static str {
-    match time.adaptive {
-        Some(_) => ", more if bonds break",
-        None => "",
+fn note_on_steps(problem: &Problem, time: &Time) -> &'static str {
+    match (time.adaptive.is_some(), problem.has_contact()) {
+        (true, true) => ", more if bonds break or contact is stiff",
+        (true, false) => ", more if bonds break",
+        (false, true) => ", more if contact is stiff",
+        (false, false) => "",
     }
 }
 

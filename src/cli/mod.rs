@@ -266,8 +266,8 @@ struct BenchArguments {
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Number of points of a cube, rounded to the nearest cube number, or numbers of points X,Y,Z along the
-    /// edges of a block.
+    /// Number of points of a cube, rounded to a cube number, or numbers of points X,Y,Z along the edges of a
+    /// block.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 

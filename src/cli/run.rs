@@ -121,7 +121,7 @@ impl Observer for Log {
         match message {
             Message::Started if self.prints => outln!("{}", self.title),
             Message::SetUp { survey, .. } if self.prints => {
-                for (pair, bonds) in &survey.joints {
+                for (pair, bonds) in &survey.bonds_between_bodies {
                     let [a, b] = pair.map(|body| &self.bodies[body]);
                     outln!("{} bonds join {a} and {b}", count(*bonds));
                 }
@@ -164,17 +164,17 @@ impl Observer for Log {
             }
             Message::Refined {
                 number,
-                regridded: Regridded { born, left },
+                regridded: Regridded { created, removed },
                 points,
             } if self.prints && self.verbose => {
-                let (born, points) = (count(*born), count(*points));
-                let left = if *left > 0 {
-                    format!(", {} removed", count(*left))
+                let (created, points) = (count(*created), count(*points));
+                let removed = if *removed > 0 {
+                    format!(", {} removed", count(*removed))
                 } else {
                     String::new()
                 };
                 self.progress.aside(|| {
-                    outln!("after step {number}: {born} new points{left}, {points} in all");
+                    outln!("after step {number}: {created} new points{removed}, {points} in all");
                 });
             }
             Message::Repartitioned {

@@ -20,7 +20,7 @@ pub struct IdOrder {
     owned: Vec<Vec<u32>>,
     /// For each rank q: the positions, within this rank's range of ids, of the points that q owns, in the
     /// order in which q lists these points.
-    rows: Vec<Vec<u32>>,
+    rows_in_range: Vec<Vec<u32>>,
 }
 
 impl IdOrder {
@@ -47,24 +47,24 @@ impl IdOrder {
         }
         let incoming = comm.all_to_all(outgoing);
         let mut sorted = Vec::new();
-        let mut rows = Vec::with_capacity(incoming.len());
+        let mut rows_in_range = Vec::with_capacity(incoming.len());
         for (bytes, rank) in incoming.iter().zip(0_u32..) {
             let ids = bytemuck::pod_collect_to_vec::<u8, u64>(bytes);
             let numbered = ids.iter().zip(0_u32..);
             sorted.extend(numbered.map(|(id, k)| (id % coarsest, id / coarsest, rank, k)));
-            rows.push(vec![0; ids.len()]);
+            rows_in_range.push(vec![0; ids.len()]);
         }
         drop(incoming);
         sorted.par_sort_unstable();
         for ((_, _, rank, k), row) in sorted.iter().zip(0..) {
-            rows[*rank as usize][*k as usize] = row;
+            rows_in_range[*rank as usize][*k as usize] = row;
         }
         let (first, _) = super::scan(comm, sorted.len() as u64);
         Self {
             first,
             count: sorted.len(),
             owned,
-            rows,
+            rows_in_range,
         }
     }
 
@@ -82,13 +82,17 @@ impl IdOrder {
     pub fn collect<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
         let row = |row: usize| row * width..(row + 1) * width;
         let from = (&self.owned[..], values, row);
-        transfer(comm, from, (&self.rows[..], self.count * width, row))
+        transfer(
+            comm,
+            from,
+            (&self.rows_in_range[..], self.count * width, row),
+        )
     }
 
     /// Redistribute values, `width` per point, from this rank's range of ids to the owned points. Collective.
     pub fn spread<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
         let row = |row: usize| row * width..(row + 1) * width;
-        let from = (&self.rows[..], values, row);
+        let from = (&self.rows_in_range[..], values, row);
         let owned = self.owned.iter().map(Vec::len).sum::<usize>();
         transfer(comm, from, (&self.owned[..], owned * width, row))
     }
@@ -109,7 +113,7 @@ impl IdOrder {
         transfer(
             comm,
             (&self.owned[..], values, from_row),
-            (&self.rows[..], size, to_row),
+            (&self.rows_in_range[..], size, to_row),
         )
     }
 
@@ -127,7 +131,7 @@ impl IdOrder {
         let size = to[owned.len()];
         transfer(
             comm,
-            (&self.rows[..], values, from_row),
+            (&self.rows_in_range[..], values, from_row),
             (&self.owned[..], size, to_row),
         )
     }

@@ -20,8 +20,8 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Return a unit for which the sum of `terms` terms does not overflow. `magnitude` is the largest
-    /// absolute value of a term. The unit is a power of 2 close to the smallest possible one, and at least
+    /// Return a unit for which the sum of `terms` terms does not overflow. The absolute value of a term must
+    /// not exceed `magnitude`. The unit is a power of 2 close to the smallest possible one, and at least
     /// 2⁻¹⁰⁰⁰. `None` if the magnitude is 0 or not finite.
     pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
         if magnitude == 0.0 || !magnitude.is_finite() {

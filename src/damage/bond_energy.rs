@@ -56,7 +56,7 @@ impl Calibration {
 
     /// Return the energy that breaking all bonds across a unit area dissipates, divided by the fracture
     /// energy.
-    pub fn share(self, dimension: Dimension) -> f64 {
+    pub fn energy_ratio(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         match (self, dimension) {
             (Self::Energy | Self::Opening(None), _) => 1.0,
@@ -88,8 +88,8 @@ impl BondEnergy {
     /// Return the threshold (J/m⁶) of a point with strength f and the smallest stretch s_min of its intact
     /// bonds. The threshold is w_c ((f s0 − α s_min)/s0)², or 0 if f s0 < α s_min. Without scatter f = 1.
     #[inline(always)]
-    pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
-        let share = (strength - self.alpha * smallest / self.stretch).max(0.0);
+    pub fn threshold(&self, strength_factor: f64, smallest: f64) -> f64 {
+        let share = (strength_factor - self.alpha * smallest / self.stretch).max(0.0);
         self.critical * share * share
     }
 }
@@ -97,7 +97,7 @@ impl BondEnergy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::damage::{Sense, WorkMeasure};
+    use crate::damage::{BreakableBonds, WorkMeasure};
     use crate::dimension::Constraint;
 
     /// Return the energy of breaking all bonds across a unit area, by the midpoint rule, divided by the
@@ -147,8 +147,8 @@ mod tests {
         let (energy, horizon, thickness) = (135.0, 3e-3, 0.01);
         let printed = 3.0 * energy / (PI * horizon * horizon * horizon * thickness);
         let plane = Dimension::PlaneStress { thickness };
-        let share = Calibration::Willberg2022.share(plane);
-        let critical = BondEnergy::from_energy(plane, share * energy, horizon);
+        let ratio = Calibration::Willberg2022.energy_ratio(plane);
+        let critical = BondEnergy::from_energy(plane, ratio * energy, horizon);
         assert!((critical / (0.5 * printed) - 1.0).abs() < 1e-15);
     }
 
@@ -159,7 +159,7 @@ mod tests {
             alpha: 0.5,
             stretch: 0.02,
             rule: WorkRule {
-                sense: Sense::Pulled,
+                breakable: BreakableBonds::Stretched,
                 family_correction: 0.0,
                 measure: WorkMeasure::Objective,
             },

@@ -96,7 +96,7 @@ impl StretchConversion {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
     /// Bonds that can break: stretched bonds only, or compressed bonds too.
-    pub sense: Sense,
+    pub breakable: BreakableBonds,
     /// Factor c from 0 to 1: work thresholds are multiplied by 1 + c (f − 1), with the
     /// [truncation factor](Law::truncation_factor) f.
     pub family_correction: f64,
@@ -116,20 +116,20 @@ pub enum WorkMeasure {
 
 /// Bonds that the energy and stress criteria can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sense {
+pub enum BreakableBonds {
     /// Only bonds that are longer than in the undeformed body.
-    Pulled,
+    Stretched,
     /// Stretched bonds and compressed bonds.
-    Either,
+    Any,
 }
 
-impl Sense {
+impl BreakableBonds {
     /// Combine the settings of two blocks for the bonds between them. Compressed bonds break only if both
     /// settings allow it.
     pub fn of_both(self, other: Self) -> Self {
         match self {
-            Self::Either => other,
-            Self::Pulled => self,
+            Self::Any => other,
+            Self::Stretched => self,
         }
     }
 
@@ -137,8 +137,8 @@ impl Sense {
     #[inline(always)]
     fn select<const D: usize>(self, bits: u8, bond: &Bond<D>) -> u8 {
         match self {
-            Self::Pulled => bits & bond.relative_square_extension.above(0.0),
-            Self::Either => bits,
+            Self::Stretched => bits & bond.relative_square_extension.above(0.0),
+            Self::Any => bits,
         }
     }
 }
@@ -274,7 +274,7 @@ impl Criterion {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule, _) => {
                 let [i, j] = ends.weights.acting();
                 let spent = simd.at_least(work, self.threshold(simd, bond, ends, None)) & (i | j);
-                rule.sense.select(spent, bond)
+                rule.breakable.select(spent, bond)
             }
             // The points of laws with forces along the bonds have no stress.
             Self::Stress(..) | Self::StressThresholds(_) if L::Force::CENTRAL => 0,
@@ -287,7 +287,7 @@ impl Criterion {
                 ));
                 let reached =
                     simd.at_least(stress, self.threshold(simd, bond, ends, None)) & acting;
-                rule.sense.select(reached, bond)
+                rule.breakable.select(reached, bond)
             }
             Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(_)
@@ -337,23 +337,24 @@ impl Criterion {
             }
             Self::Thresholds(critical, ref directions)
             | Self::ThresholdsBetween(critical, _, ref directions) => {
-                let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
+                let (mut threshold_i, mut threshold_j) =
+                    (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if let Some(scale) = scale {
                     let growth = scale - Lanes::splat(1.0);
-                    here += growth * critical[0];
-                    there += growth * critical[1];
+                    threshold_i += growth * critical[0];
+                    threshold_j += growth * critical[1];
                 }
                 if let Some(directions) = directions {
                     let [factor_i, factor_j] =
                         simd.aside(DirectionFactors::new(simd, directions, bond));
-                    here = here * factor_i.sqrt();
-                    there = there * factor_j.sqrt();
+                    threshold_i = threshold_i * factor_i.sqrt();
+                    threshold_j = threshold_j * factor_j.sqrt();
                 }
                 match *self {
                     Self::ThresholdsBetween(_, conversion, _) => {
-                        conversion.convert(simd, [here, there], ends.weights.acting())
+                        conversion.convert(simd, [threshold_i, threshold_j], ends.weights.acting())
                     }
-                    _ => here.min(there),
+                    _ => threshold_i.min(threshold_j),
                 }
             }
             Self::WorkThresholds([[ii, ij], [ji, jj]], rule, ref directions) => {
@@ -410,7 +411,7 @@ impl WorkRule {
     /// it.
     pub fn of_both(self, other: Self) -> Self {
         Self {
-            sense: self.sense.of_both(other.sense),
+            breakable: self.breakable.of_both(other.breakable),
             family_correction: self.family_correction.min(other.family_correction),
             measure: if self.measure == WorkMeasure::Objective {
                 self.measure
@@ -455,14 +456,14 @@ mod tests {
 
     #[test]
     fn between_two_bodies_the_smaller_correction_counts() {
-        let rule = |sense, family_correction| WorkRule {
-            sense,
+        let rule = |breakable, family_correction| WorkRule {
+            breakable,
             family_correction,
             measure: WorkMeasure::Objective,
         };
-        let both = rule(Sense::Either, 1.0).of_both(rule(Sense::Pulled, 0.5));
-        assert_eq!(both, rule(Sense::Pulled, 0.5));
-        let both = rule(Sense::Either, 0.0).of_both(rule(Sense::Either, 1.0));
-        assert_eq!(both, rule(Sense::Either, 0.0));
+        let both = rule(BreakableBonds::Any, 1.0).of_both(rule(BreakableBonds::Stretched, 0.5));
+        assert_eq!(both, rule(BreakableBonds::Stretched, 0.5));
+        let both = rule(BreakableBonds::Any, 0.0).of_both(rule(BreakableBonds::Any, 1.0));
+        assert_eq!(both, rule(BreakableBonds::Any, 0.0));
     }
 }

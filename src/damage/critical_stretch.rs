@@ -112,8 +112,8 @@ impl CriticalStretch {
     /// Return the threshold f s0 − α s_min of a point, from its strength f and the smallest stretch s_min of
     /// its intact bonds. Without scatter f = 1.
     #[inline(always)]
-    pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
-        strength * self.critical - self.alpha * smallest
+    pub fn threshold(&self, strength_factor: f64, smallest: f64) -> f64 {
+        strength_factor * self.critical - self.alpha * smallest
     }
 }
 

@@ -35,9 +35,9 @@ use crate::material::Bond;
 const MOST_SQUARINGS: u32 = 1;
 
 /// Minimum of p.
-const LEAST_BASE: f64 = 0.1;
+const LEAST_CONSTANT_PART: f64 = 0.1;
 
-/// Tolerance of [`LEAST_BASE`] for the round-off of p.
+/// Tolerance of [`LEAST_CONSTANT_PART`] for the round-off of p.
 const ROUNDING: f64 = 1e-12;
 
 /// Number of directions per quarter of a circle, in sums over all directions. In 3-D, also the number of
@@ -50,9 +50,9 @@ pub struct ToughnessByDirection {
     /// Unit vector a.
     axis: [f64; 3],
     /// Constant part p of w_c/w.
-    base: f64,
+    constant_part: f64,
     /// Factor q of c^k in w_c/w.
-    share: f64,
+    power_factor: f64,
     /// Binary logarithm of k.
     squarings: u32,
     /// Whether c is (n·a)². Otherwise, c is 1 − (n·a)².
@@ -63,8 +63,8 @@ impl ToughnessByDirection {
     /// The same fracture energy in all directions: w_c/w = 1.
     pub const NONE: Self = Self {
         axis: [0.0; 3],
-        base: 1.0,
-        share: 0.0,
+        constant_part: 1.0,
+        power_factor: 0.0,
         squarings: 0,
         is_tough_across: true,
     };
@@ -76,12 +76,12 @@ impl ToughnessByDirection {
         let is_tough_across = ratio >= 1.0;
         (0..=MOST_SQUARINGS).find_map(|squarings| {
             let [across, along] = means(dimension, is_tough_across, squarings);
-            let share = (ratio - 1.0) / (across - along);
-            let base = 1.0 - share * along;
-            (base >= LEAST_BASE - ROUNDING).then_some(Self {
+            let power_factor = (ratio - 1.0) / (across - along);
+            let constant_part = 1.0 - power_factor * along;
+            (constant_part >= LEAST_CONSTANT_PART - ROUNDING).then_some(Self {
                 axis,
-                base,
-                share,
+                constant_part,
+                power_factor,
                 squarings,
                 is_tough_across,
             })
@@ -92,7 +92,7 @@ impl ToughnessByDirection {
     pub fn limits(dimension: usize) -> [f64; 2] {
         [false, true].map(|is_tough_across| {
             let [across, along] = means(dimension, is_tough_across, MOST_SQUARINGS);
-            LEAST_BASE + (1.0 - LEAST_BASE) * across / along
+            LEAST_CONSTANT_PART + (1.0 - LEAST_CONSTANT_PART) * across / along
         })
     }
 
@@ -113,18 +113,18 @@ impl ToughnessByDirection {
         for _ in 0..self.squarings {
             power = power * power;
         }
-        power * self.share + Lanes::splat(self.base)
+        power * self.power_factor + Lanes::splat(self.constant_part)
     }
 
     /// Fracture energy of cracks across a, divided by the fracture energy of cracks along a.
     pub fn ratio(&self, dimension: usize) -> f64 {
         let [across, _] = means(dimension, self.is_tough_across, self.squarings);
-        self.base + self.share * across
+        self.constant_part + self.power_factor * across
     }
 
     /// Fracture energy of cracks with this unit normal, divided by the fracture energy of cracks along a. The
     /// quotient is computed as a sum over bond directions.
-    pub fn cost(&self, dimension: usize, normal: [f64; 3]) -> f64 {
+    pub fn relative_fracture_energy(&self, dimension: usize, normal: [f64; 3]) -> f64 {
         let quarter = f64::from(DIRECTIONS);
         let mut sums = [0.0; 2];
         let mut add = |n: [f64; 3], solid_angle: f64| {
@@ -136,7 +136,8 @@ impl ToughnessByDirection {
             } else {
                 1.0 - square
             };
-            sums[0] += weight * (self.base + self.share * c.powi(1 << self.squarings));
+            sums[0] +=
+                weight * (self.constant_part + self.power_factor * c.powi(1 << self.squarings));
             sums[1] += weight;
         };
         for k in 0..2 * DIRECTIONS {
@@ -193,8 +194,8 @@ impl<'a, const D: usize> DirectionFactors<'a, D> {
     ) -> Self {
         Self {
             directions,
-            xi: LaneTuple::each(|d| simd.whole(bond.reference[d])),
-            inverse: simd.whole(bond.inverse),
+            xi: LaneTuple::each(|d| simd.opaque(bond.reference[d])),
+            inverse: simd.opaque(bond.inverse),
         }
     }
 }
@@ -224,16 +225,16 @@ mod tests {
             let [least, most] = ToughnessByDirection::limits(dimension);
             for ratio in [least, 0.5 * (1.0 + least), 1.0, 1.4, 2.4, most] {
                 let toughness = ToughnessByDirection::new(dimension, axis, ratio).unwrap();
-                let across = toughness.cost(dimension, axis);
+                let across = toughness.relative_fracture_energy(dimension, axis);
                 assert!(
                     (across / ratio - 1.0).abs() < 1e-4,
                     "{dimension} {ratio}: {across}"
                 );
                 for normal in &normals_along[..dimension - 1] {
-                    let along = toughness.cost(dimension, *normal);
+                    let along = toughness.relative_fracture_energy(dimension, *normal);
                     assert!((along - 1.0).abs() < 1e-4, "{dimension} {ratio}: {along}");
                 }
-                assert!(toughness.base > 0.099 && toughness.share >= 0.0);
+                assert!(toughness.constant_part > 0.099 && toughness.power_factor >= 0.0);
                 assert!((toughness.ratio(dimension) / ratio - 1.0).abs() < 1e-12);
             }
             for beyond in [0.999 * least, 1.001 * most] {

@@ -9,8 +9,8 @@ mod stress;
 
 pub use bond_energy::{BondEnergy, Calibration};
 pub use criterion::{
-    Criterion, Directions, Ends, HorizonRatios, Limits, Sense, StretchConversion, WorkMeasure,
-    WorkRule,
+    BreakableBonds, Criterion, Directions, Ends, HorizonRatios, Limits, StretchConversion,
+    WorkMeasure, WorkRule,
 };
 pub use critical_stretch::CriticalStretch;
 pub use direction::ToughnessByDirection;
@@ -72,14 +72,15 @@ impl DamageLaw {
         }
     }
 
-    /// Return the threshold of a point: a stretch, a work (J/m⁶) or a stress (Pa). `strength` is the random
-    /// factor of the point, 1 without scatter, and `smallest` is the smallest stretch of its intact bonds.
+    /// Return the threshold of a point: a stretch, a work (J/m⁶) or a stress (Pa). `strength_factor` is the
+    /// random factor of the point, 1 without scatter, and `smallest` is the smallest stretch of its intact
+    /// bonds.
     #[inline(always)]
-    pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
+    pub fn threshold(&self, strength_factor: f64, smallest: f64) -> f64 {
         match self {
-            Self::CriticalStretch(law) => law.threshold(strength, smallest),
-            Self::BondEnergy(law) => law.threshold(strength, smallest),
-            Self::Stress(law) => strength * law.strength,
+            Self::CriticalStretch(law) => law.threshold(strength_factor, smallest),
+            Self::BondEnergy(law) => law.threshold(strength_factor, smallest),
+            Self::Stress(law) => strength_factor * law.strength,
         }
     }
 }

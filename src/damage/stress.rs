@@ -8,7 +8,7 @@
 
 use nalgebra::Matrix3;
 
-use super::Sense;
+use super::BreakableBonds;
 use crate::component::Component;
 use crate::lanes::simd::Task;
 use crate::lanes::{Lanes, Simd};
@@ -62,7 +62,7 @@ pub struct StressRule {
     /// Measure of the stress that is compared with the strength.
     pub measure: StressMeasure,
     /// Bonds that can break: stretched bonds only, or compressed bonds too.
-    pub sense: Sense,
+    pub breakable: BreakableBonds,
 }
 
 impl StressRule {
@@ -70,7 +70,7 @@ impl StressRule {
     /// break only if both rules allow it.
     pub fn of_both(self, other: Self) -> Self {
         Self {
-            sense: self.sense.of_both(other.sense),
+            breakable: self.breakable.of_both(other.breakable),
             ..self
         }
     }
@@ -99,7 +99,7 @@ impl MeanStress {
     #[inline(always)]
     pub(super) fn new<S: Simd>(simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Self {
         Self {
-            stresses: [simd.whole(i), simd.whole(j)],
+            stresses: [simd.opaque(i), simd.opaque(j)],
             acting,
         }
     }

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_that_are_none_are_rejected() {
+    fn assignments_to_sections_lists_and_invalid_keys_are_rejected() {
         let deck = "a = 1\n[[stage]]\nend = 1\n[e]\nf = 4\n";
         for (key, message) in [
             ("a.b", "--set a.b=1: `a` is a value, not a section"),

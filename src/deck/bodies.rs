@@ -54,7 +54,7 @@ pub fn bodies(
                 Ok(damages[index].clone())
             })
             .transpose()?;
-        let (horizon, horizon_place) = match &body.horizon {
+        let (horizon, horizon_span) = match &body.horizon {
             None => {
                 let number = &deck.grid.get_ref().horizon;
                 (scope.length(number, "[grid] horizon")?, number.span())
@@ -78,7 +78,7 @@ pub fn bodies(
             material: materials[material].clone(),
             damage,
             horizon,
-            horizon_place,
+            horizon_span,
         })
     })
     .map(|bodies| bodies.into_values().collect())

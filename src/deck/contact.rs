@@ -49,7 +49,7 @@ pub fn contact(
         restitution: table.restitution.as_ref(),
     };
     let mut contact = problem::Contact {
-        rule: rule(scope, "[contact]", all, relaxes(deck))?,
+        rule: rule(scope, "[contact]", all, has_relaxation(deck))?,
         pairs: Vec::new(),
     };
     for (name, table) in &table.pair {
@@ -95,7 +95,7 @@ pub fn contact(
         contact.pairs.push(problem::ContactPair {
             name: name.clone(),
             bodies: names,
-            rule: rule(scope, &key, own, relaxes(deck))?,
+            rule: rule(scope, &key, own, has_relaxation(deck))?,
         });
     }
     Ok(Some(contact))
@@ -121,18 +121,18 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
 }
 
 /// Return whether any stage of the run is a relaxation.
-pub(super) fn relaxes(deck: &Deck) -> bool {
+pub(super) fn has_relaxation(deck: &Deck) -> bool {
     let mut all = methods(deck).into_iter();
     all.any(|(_, method)| *method.get_ref() == grammar::Method::Relaxation)
 }
 
-/// Validate a contact rule; `relaxes` is true if any stage of the run is a relaxation. Return `None` for the
-/// model `"none"`.
+/// Validate a contact rule; `has_relaxation` is true if any stage of the run is a relaxation. Return `None`
+/// for the model `"none"`.
 pub(super) fn rule(
     scope: &Scope,
     section: &str,
     keys: Keys<'_>,
-    relaxes: bool,
+    has_relaxation: bool,
 ) -> Result<Option<ContactRule>> {
     let positive = |number: Option<&Number>, key: &str| {
         let number = number.map(|number| scope.positive(number, &format!("{section} {key}")));
@@ -166,9 +166,9 @@ pub(super) fn rule(
         ("static_friction", keys.static_friction, static_friction),
     ];
     for (key, number, value) in frictions {
-        if let (Some(number), true) = (number, relaxes && value > 0.0) {
+        if let (Some(number), true) = (number, has_relaxation && value > 0.0) {
             let message = format!(
-                "{section} {key}: friction is not available in a relaxation, in which nothing has a velocity; leave it \
+                "{section} {key}: friction depends on velocities, and a relaxation has none; leave it \
                  out, or load slowly with \"explicit\""
             );
             return Err(scope.error(number.span(), message));

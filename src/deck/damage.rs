@@ -8,7 +8,7 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{
-    self, Calibration, DamageRule, Sense, StressMeasure, StressRule, Toughness,
+    self, BreakableBonds, Calibration, DamageRule, StressMeasure, StressRule, Toughness,
     ToughnessByDirection, WorkMeasure, WorkRule,
 };
 use crate::scatter::Weibull;
@@ -81,7 +81,7 @@ pub fn damage(
                 return Err(scope.error(law.calibration.span(), message));
             }
             let work = WorkRule {
-                sense: sense(law.tension_only),
+                breakable: breakable(law.tension_only),
                 family_correction: family_correction(scope, &law.family_correction, &key)?,
                 measure: match calibration {
                     Calibration::Willberg2022
@@ -107,7 +107,7 @@ pub fn damage(
                     grammar::StressMeasure::VonMises => StressMeasure::VonMises,
                     grammar::StressMeasure::Principal => StressMeasure::Principal,
                 },
-                sense: sense(law.tension_only),
+                breakable: breakable(law.tension_only),
             };
             let strength = scope.positive(&law.strength, &format!("{key} strength"))?;
             Ok(problem::Damage {
@@ -122,11 +122,11 @@ pub fn damage(
     }
 }
 
-fn sense(tension_only: bool) -> Sense {
+fn breakable(tension_only: bool) -> BreakableBonds {
     if tension_only {
-        Sense::Pulled
+        BreakableBonds::Stretched
     } else {
-        Sense::Either
+        BreakableBonds::Any
     }
 }
 

@@ -15,7 +15,7 @@ use crate::expression::{Expression, POSITION_AND_TIME};
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
 /// Keys of `[history]` that set the interval of rows.
-const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
+const INTERVAL_KEYS: [&str; 2] = ["every", "every_steps"];
 
 /// Return the differences in the physics of two decks: one line per key with its old and new value, and one
 /// line per section whose tables have another order. A key that only one deck has is compared with the
@@ -43,7 +43,7 @@ pub fn history_differences(old: &Source, new: &Source) -> Result<Vec<String>> {
         let (old, new) = (keys(old), keys(new));
         let added = new.keys().filter(|key| !old.contains_key(*key));
         for key in old.keys().chain(added) {
-            if !HOW_OFTEN.contains(&key.as_str()) {
+            if !INTERVAL_KEYS.contains(&key.as_str()) {
                 comparison.compare(&format!("history.{key}"), old.get(key), new.get(key));
             }
         }
@@ -154,8 +154,8 @@ impl Comparison<'_> {
                     _ => old == new,
                 };
                 if !same {
-                    let old = shown(old, values[0].as_ref());
-                    let new = shown(new, values[1].as_ref());
+                    let old = formatted(old, values[0].as_ref());
+                    let new = formatted(new, values[1].as_ref());
                     self.lines.push(format!("{key}: was {old}, is {new}"));
                 }
             }
@@ -187,7 +187,7 @@ fn counts_where_used(key: &str) -> bool {
 
 /// Format a value for messages: the text in the deck, followed by the number if the text is a constant
 /// expression.
-fn shown(value: Option<&Value>, expression: Option<&Expression>) -> String {
+fn formatted(value: Option<&Value>, expression: Option<&Expression>) -> String {
     let Some(value) = value else {
         return "not there".to_owned();
     };
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn what_it_must_not() {
+    fn changes_of_the_physics_are_differences() {
         let lines = against("load = 3", "load = 4");
         assert_eq!(
             lines,

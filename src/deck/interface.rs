@@ -61,7 +61,7 @@ pub fn interface(
             return Err(scope.error(table.bodies.span(), message));
         }
         let own_rule = table.rule.as_ref().unwrap_or(all);
-        let of_pair = Damages {
+        let of_pair = PairContext {
             scope,
             key: &key,
             dimension,
@@ -95,7 +95,7 @@ pub fn interface(
 }
 
 /// Context for the validation of `damage` and `strength` of a pair of bodies.
-struct Damages<'a> {
+struct PairContext<'a> {
     scope: &'a Scope<'a>,
     key: &'a str,
     dimension: Dimension,
@@ -103,7 +103,7 @@ struct Damages<'a> {
     has_bonds: bool,
 }
 
-impl Damages<'_> {
+impl PairContext<'_> {
     /// Return how the bonds break, and the byte range of the value of `damage` or `strength`; the byte
     /// range is `0..0` if the pair gives neither.
     fn damage(

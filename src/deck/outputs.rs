@@ -153,7 +153,10 @@ fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Re
     }
     // A time may exceed the end by round-off.
     let range = 0.0..end * (1.0 + 1e-9);
-    let words = format!("between 0 and the end of the run, {} s", format_number(end));
+    let words = format!(
+        "between 0 and {} s (the end of the run)",
+        format_number(end)
+    );
     let time = |time| scope.within(time, key, range.clone(), &words);
     let mut times = written
         .get_ref()

@@ -19,7 +19,7 @@ use crate::problem::{self, RigidMotion, RigidShape, Shape};
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies
-        .map(|(name, table)| body(scope, name, table, contact::relaxes(deck)))
+        .map(|(name, table)| body(scope, name, table, contact::has_relaxation(deck)))
         .collect()
 }
 
@@ -27,7 +27,7 @@ fn body(
     scope: &Scope,
     name: &str,
     table: &Spanned<grammar::Rigid>,
-    relaxes: bool,
+    has_relaxation: bool,
 ) -> Result<problem::Rigid> {
     let key = format!("[rigid.{name}]");
     let (span, table) = (table.span(), table.get_ref());
@@ -56,8 +56,8 @@ fn body(
         static_friction: table.static_friction.as_ref(),
         restitution: table.restitution.as_ref(),
     };
-    let rule = contact::rule(scope, &key, keys, relaxes)?;
-    if let (Some(mass), true) = (&table.mass, relaxes) {
+    let rule = contact::rule(scope, &key, keys, has_relaxation)?;
+    if let (Some(mass), true) = (&table.mass, has_relaxation) {
         let message = format!(
             "{key} mass: a free body is not available in a relaxation; drive it by `motion`, or use \"explicit\""
         );

@@ -6,21 +6,21 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::origins::Origins;
+use super::source_map::SourceMap;
 use crate::error::{Error, Result, Warning};
 
 /// Largest size of a deck, bytes.
 const LONGEST: u64 = 1 << 28;
 
 /// Approximate largest number of characters of an error, unless the path is very long.
-const MOST_SHOWN: usize = 790;
+const LONGEST_ERROR: usize = 790;
 
 /// Largest number of characters of the message of an error or warning, without location and excerpt.
-const MOST_SAID: usize = 600;
+const LONGEST_MESSAGE: usize = 600;
 
 /// Smallest and largest width of the excerpt of a line, in characters. The width depends on the length of the
 /// message. A line that fits in this width is shown whole.
-const SHOWN_OF_LINE: [usize; 2] = [24, 160];
+const EXCERPT_WIDTHS: [usize; 2] = [24, 160];
 
 /// The path and the text of a deck.
 #[derive(Debug, Clone)]
@@ -30,7 +30,7 @@ pub struct Source {
     /// The whole text.
     pub text: String,
     /// The files that the text was merged from; `None` if the text is the content of the file at `path`.
-    origins: Option<Arc<Origins>>,
+    source_map: Option<Arc<SourceMap>>,
 }
 
 /// Note for an error whose line is in the merged deck but in no file.
@@ -42,7 +42,7 @@ impl Source {
         Self {
             path: path.into(),
             text: text.into(),
-            origins: None,
+            source_map: None,
         }
     }
 
@@ -53,7 +53,7 @@ impl Source {
             .map(|file| (file.path, file.text))
             .collect();
         let mut source = Self::new(files[0].0.clone(), text);
-        source.origins = Some(Arc::new(Origins::new(&source.text, files)));
+        source.source_map = Some(Arc::new(SourceMap::new(&source.text, files)));
         source
     }
 
@@ -61,10 +61,10 @@ impl Source {
     /// For a span that comes from no file, return the path of the deck, the merged text, the unchanged span
     /// and the note [`CHANGED`].
     fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
-        let Some(origins) = &self.origins else {
+        let Some(source_map) = &self.source_map else {
             return (&self.path, &self.text, span, "");
         };
-        match origins.find(&span, self.text.len()) {
+        match source_map.find(&span, self.text.len()) {
             Some((path, text, span)) => (path, text, span, ""),
             None => (&self.path, &self.text, span, CHANGED),
         }
@@ -105,7 +105,7 @@ impl Source {
         let Some(span) = warning.span else {
             return warning;
         };
-        let message = shortened(&warning.message, MOST_SAID);
+        let message = shortened(&warning.message, LONGEST_MESSAGE);
         let (path, text, span, _) = self.place(span);
         let start = text.floor_char_boundary(span.start);
         let line = text[..start].matches('\n').count() + 1;
@@ -127,7 +127,7 @@ impl Source {
     /// Format file, line, column and message, then the line with carets below the bytes of `span`. The result
     /// has at most about 800 characters, unless the path is very long.
     fn marked(&self, span: Range<usize>, message: &str) -> String {
-        let message = shortened(message, MOST_SAID);
+        let message = shortened(message, LONGEST_MESSAGE);
         let (path, text, span, note) = self.place(span);
         let start = text.floor_char_boundary(span.start);
         let before = &text[..start];
@@ -137,14 +137,14 @@ impl Source {
         let column = text[line_start..start].chars().count();
         let marked = text
             .get(start..span.end)
-            .map_or(1, |text| text.chars().take(MOST_SHOWN).count());
+            .map_or(1, |text| text.chars().take(LONGEST_ERROR).count());
         let heading = format!("{}:{line_number}:{}: {message}", path.display(), column + 1);
-        let room = MOST_SHOWN.saturating_sub(heading.chars().count()) / 2;
+        let room = LONGEST_ERROR.saturating_sub(heading.chars().count()) / 2;
         let window = Window::new(
             line,
             column,
             room.saturating_sub(12)
-                .clamp(SHOWN_OF_LINE[0], SHOWN_OF_LINE[1]),
+                .clamp(EXCERPT_WIDTHS[0], EXCERPT_WIDTHS[1]),
         );
         let carets = "^".repeat(marked.clamp(1, window.rest().max(1)));
         let gutter = " ".repeat(line_number.to_string().len());

@@ -165,10 +165,10 @@ fn stage_end(
         )
     } else if is_last && !about(whole) {
         let whole = format_number(whole);
-        format!("must be left out in the last stage, or be the end of the run, {whole} s")
+        format!("must be left out in the last stage, or be {whole} s (the end of the run)")
     } else if !is_last && (end >= whole || about(whole)) {
         format!(
-            "must be before the end of the run, {} s",
+            "must be before {} s (the end of the run)",
             format_number(whole)
         )
     } else {

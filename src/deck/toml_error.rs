@@ -48,6 +48,9 @@ fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String 
             ""
         };
         format!("only a comment may follow a value on its line{advice}")
+    } else if let Some((found, expected)) = message.split_once(", expected ") {
+        let expected = expected.replace(", ", " or ").replace("value", "a value");
+        format!("{found}; expected {expected}")
     } else {
         message.to_owned()
     }

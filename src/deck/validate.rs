@@ -46,7 +46,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let problem = Problem {
         warnings: Vec::new(),
         title: deck.title.get_ref().clone(),
-        places: places(deck),
+        spans: spans(deck),
         dimension,
         horizon,
         volume_correction,
@@ -73,11 +73,11 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     Ok(problem)
 }
 
-fn places(deck: &Deck) -> problem::Places {
+fn spans(deck: &Deck) -> problem::Spans {
     let time = deck.time.get_ref();
     let of_stages = deck.stage.iter().map(|stage| &stage.get_ref().adaptive);
     let mut adaptive = std::iter::once(&time.adaptive).chain(of_stages).flatten();
-    problem::Places {
+    problem::Spans {
         horizon: deck.grid.get_ref().horizon.span(),
         end: time.end.span(),
         step: time.step.as_ref().unwrap_or(&time.end).span(),
@@ -196,13 +196,14 @@ fn volume_correction(
 /// Validate the random displacement of points.
 fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option<problem::Jitter>> {
     let grid = deck.grid.get_ref();
-    let Some(share) = &grid.jitter else {
+    let Some(largest_shift) = &grid.jitter else {
         return match &grid.seed {
             None => Ok(None),
             Some(seed) => Err(scope.error(seed.span(), "[grid] seed: `seed` needs `jitter`")),
         };
     };
-    let error = |message: &str| Err(scope.error(share.span(), format!("[grid] jitter: {message}")));
+    let error =
+        |message: &str| Err(scope.error(largest_shift.span(), format!("[grid] jitter: {message}")));
     if bodies.iter().any(problem::Body::has_gauss_points) {
         return error("needs `quadrature = \"midpoint\"`, one point per cell");
     }
@@ -212,7 +213,7 @@ fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option
     // Below 0.5, the points of adjacent cells cannot coincide.
     let words = "at least 0 and below 0.5";
     Ok(Some(problem::Jitter {
-        share: scope.within(share, "[grid] jitter", 0.0..0.5, words)?,
+        largest_shift: scope.within(largest_shift, "[grid] jitter", 0.0..0.5, words)?,
         seed: match &grid.seed {
             Some(seed) => scope.whole(seed, "[grid] seed")?,
             None => 0,

@@ -89,7 +89,7 @@ fn rounded(value: f64) -> String {
 
 /// The deck key that sets the horizon of a body.
 fn horizon_key(problem: &Problem, body: &Body) -> String {
-    if body.horizon_place == problem.places.horizon {
+    if body.horizon_span == problem.spans.horizon {
         "[grid] horizon".to_owned()
     } else {
         format!("[body.{}] horizon", body.name)
@@ -117,7 +117,7 @@ fn too_little_memory(problem: &Problem, blocks: [usize; 2], shortage: Shortage) 
         horizon_key(problem, body),
         format_number(near.horizon),
     );
-    Error::input(message).at(&body.horizon_place)
+    Error::input(message).at(&body.horizon_span)
 }
 
 fn too_many_neighbours(
@@ -150,5 +150,5 @@ fn too_many_neighbours(
         body.name,
         other.name
     );
-    Error::input(message).at(&body.horizon_place)
+    Error::input(message).at(&body.horizon_span)
 }

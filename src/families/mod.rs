@@ -31,7 +31,7 @@ pub use search::cutoff;
 use search::search;
 pub use store::{Groups, Store};
 pub use vectors::{VectorBonds, Vectors};
-pub use volume::CellShare;
+pub use volume::VolumeFactors;
 
 /// The bonds from points i of one block to points j of one block.
 #[derive(Debug, Clone)]

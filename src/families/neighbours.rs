@@ -39,7 +39,7 @@ pub struct NeighbourGroups<'a> {
 
 /// The neighbour indices of a group.
 #[derive(Debug, Clone, Copy)]
-pub enum Group<'a> {
+pub enum NeighbourGroup<'a> {
     /// The smallest index, and the differences from the smallest index.
     Compact(u32, &'a [u16; WIDTH]),
     /// The indices.
@@ -162,17 +162,17 @@ impl<'a> NeighbourGroups<'a> {
 
     /// Return the group with index `group`.
     #[inline(always)]
-    pub fn group(self, group: usize) -> Group<'a> {
+    pub fn group(self, group: usize) -> NeighbourGroup<'a> {
         let compact = &self.compact[group];
         if compact.first & IN_FULL != 0 {
-            Group::Full(&self.full[(compact.first & !IN_FULL) as usize])
+            NeighbourGroup::Full(&self.full[(compact.first & !IN_FULL) as usize])
         } else {
-            Group::Compact(compact.first, &compact.differences)
+            NeighbourGroup::Compact(compact.first, &compact.differences)
         }
     }
 }
 
-impl Group<'_> {
+impl NeighbourGroup<'_> {
     /// The indices.
     #[inline(always)]
     pub fn indices(self) -> [u32; WIDTH] {

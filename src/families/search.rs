@@ -125,7 +125,7 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
             append(&mut lists, domain, blocks, chunk);
         }
         let done = (first + WAVE * CHUNK).min(domain.owned);
-        fits(&lists, done as f64 / domain.owned as f64)?;
+        check_memory(&lists, done as f64 / domain.owned as f64)?;
     }
     lists.retain(|list| !list.is_empty());
     for list in &mut lists {
@@ -141,7 +141,7 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
 
 /// Return an error if the lists will not fit in memory. The memory of the complete lists is extrapolated from
 /// the fraction `done` of the points.
-fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
+fn check_memory(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
     let remaining = bytes as f64 * (1.0 / done - 1.0);
     check_room(remaining as u64).map_err(|shortage| {
@@ -316,8 +316,8 @@ mod tests {
             .collect();
         let domain = distribute(&threads::alone(), points, 9, 2.0).unwrap();
         let lists = search(&domain, 1, &[2.0]).unwrap();
-        assert_eq!(fits(&lists, 1e-3), Ok(()));
-        let fault = fits(&lists, 1e-18).unwrap_err();
+        assert_eq!(check_memory(&lists, 1e-3), Ok(()));
+        let fault = check_memory(&lists, 1e-18).unwrap_err();
         assert!(
             matches!(fault, Fault::TooLittleMemory { blocks: [0, 0], .. }),
             "{fault:?}"

@@ -40,8 +40,8 @@ fn inside(length: f64) -> f64 {
 }
 
 /// The volume correction factors for one horizon and one cell size. Several threads can use the same
-/// `CellShare` at once.
-pub struct CellShare {
+/// `VolumeFactors` at once.
+pub struct VolumeFactors {
     correction: VolumeCorrection,
     horizon: f64,
     edge: f64,
@@ -58,10 +58,10 @@ pub struct CellShare {
     cache: Mutex<FxHashMap<[i64; 3], f64>>,
 }
 
-impl CellShare {
+impl VolumeFactors {
     /// Create the factors for a horizon (m) and cells with this edge (m).
     pub fn new(correction: VolumeCorrection, horizon: f64, edge: f64, dimension: usize) -> Self {
-        let mut share = Self {
+        let mut factors = Self {
             correction,
             horizon,
             edge,
@@ -72,12 +72,12 @@ impl CellShare {
             table: OnceLock::default(),
             cache: Mutex::default(),
         };
-        share.reach_squared = share.cutoff().powi(2);
-        let multiples = 4.0 * share.cutoff() / edge + 1.0;
+        factors.reach_squared = factors.cutoff().powi(2);
+        let multiples = 4.0 * factors.cutoff() / edge + 1.0;
         if multiples.powi(dimension as i32) <= MOST_MULTIPLES as f64 {
-            share.multiples = multiples as usize;
+            factors.multiples = multiples as usize;
         }
-        share
+        factors
     }
 
     /// The upper limit (m) of the length of bonds with a positive factor. For `exact`, a cell whose centre
@@ -110,19 +110,19 @@ impl CellShare {
                     if bits != UNKNOWN {
                         return f64::from_bits(bits);
                     }
-                    let share = self.overlap(steps.map(|k| k * QUARTER));
-                    known.store(share.to_bits(), Ordering::Relaxed);
-                    share
+                    let factor = self.overlap(steps.map(|k| k * QUARTER));
+                    known.store(factor.to_bits(), Ordering::Relaxed);
+                    factor
                 }
                 None => {
                     let steps =
                         ordered(offset.map(|x| (x.abs() * self.per_resolution + 0.5) as i64));
-                    let shares = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-                    let known = shares().get(&steps).copied();
+                    let cached = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+                    let known = cached().get(&steps).copied();
                     known.unwrap_or_else(|| {
-                        let share = self.overlap(steps);
-                        shares().insert(steps, share);
-                        share
+                        let factor = self.overlap(steps);
+                        cached().insert(steps, factor);
+                        factor
                     })
                 }
             },
@@ -220,14 +220,14 @@ mod tests {
 
     /// Sum of the factors at all offsets of a lattice, including ξ = 0.
     fn whole(correction: VolumeCorrection, dimension: usize, horizon: f64) -> f64 {
-        let share = CellShare::new(correction, horizon, 1.0, dimension);
+        let factors = VolumeFactors::new(correction, horizon, 1.0, dimension);
         let reach = horizon.ceil() as i32 + 1;
         let range = |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
         let mut sum = 0.0;
         for z in range(2) {
             for y in range(1) {
                 for x in range(0) {
-                    sum += share.at([x, y, z].map(f64::from));
+                    sum += factors.at([x, y, z].map(f64::from));
                 }
             }
         }
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_shares_fill_the_ball() {
+    fn exact_factors_fill_the_ball() {
         for horizon in [1.3, 2.0, 3.0, 3.7] {
             let exact = |dimension| whole(VolumeCorrection::Exact, dimension, horizon);
             assert!((exact(1) / (2.0 * horizon) - 1.0).abs() < 1e-12);
@@ -250,8 +250,8 @@ mod tests {
     }
 
     #[test]
-    fn an_exact_share_by_counting() {
-        let share = CellShare::new(VolumeCorrection::Exact, 0.003, 0.001, 3);
+    fn an_exact_factor_by_counting() {
+        let factors = VolumeFactors::new(VolumeCorrection::Exact, 0.003, 0.001, 3);
         let cells = 100;
         let at = |k: i32| (f64::from(k) + 0.5) / f64::from(cells) - 0.5;
         let mut within = 0;
@@ -264,14 +264,14 @@ mod tests {
             }
         }
         let counted = f64::from(within) / f64::from(cells).powi(3);
-        let found = share.at([0.002, -0.001, -0.002]);
+        let found = factors.at([0.002, -0.001, -0.002]);
         assert!((found - counted).abs() < 1e-3, "{found} {counted}");
     }
 
     #[test]
     fn cached_factors_are_those_of_their_offsets() {
         for horizon in [1.5, 3.0] {
-            let share = CellShare::new(VolumeCorrection::Exact, horizon, 1.0, 3);
+            let factors = VolumeFactors::new(VolumeCorrection::Exact, horizon, 1.0, 3);
             // Offsets at multiples of a quarter of the edge, other offsets, and offsets beyond the cutoff.
             // The second pass over the same offsets reads the table or the cache.
             for step in [0.25, 0.3, 0.25, 0.3] {
@@ -282,7 +282,7 @@ mod tests {
                     let expected = overlap(ordered, horizon, 3);
                     // The table or cache has an entry for each of these offsets, so the differences are only
                     // round-off.
-                    assert!((share.at(offset) - expected).abs() < 1e-12, "{offset:?}");
+                    assert!((factors.at(offset) - expected).abs() < 1e-12, "{offset:?}");
                 }
             }
         }
@@ -290,14 +290,14 @@ mod tests {
 
     #[test]
     fn a_cell_on_the_horizon_counts_half_with_the_linear_taper() {
-        let share = CellShare::new(VolumeCorrection::Linear, 3.0, 1.0, 2);
-        assert_eq!(share.at([3.0, 0.0, 0.0]), 0.5);
-        assert_eq!(share.at([0.0, -2.0, 0.0]), 1.0);
-        assert_eq!(share.at([2.0, 3.0, 0.0]), 0.0);
-        assert!(share.at([3.1, 0.0, 0.0]) > 0.0);
-        let inside = CellShare::new(VolumeCorrection::LinearInside, 3.0, 1.0, 2);
+        let factors = VolumeFactors::new(VolumeCorrection::Linear, 3.0, 1.0, 2);
+        assert_eq!(factors.at([3.0, 0.0, 0.0]), 0.5);
+        assert_eq!(factors.at([0.0, -2.0, 0.0]), 1.0);
+        assert_eq!(factors.at([2.0, 3.0, 0.0]), 0.0);
+        assert!(factors.at([3.1, 0.0, 0.0]) > 0.0);
+        let inside = VolumeFactors::new(VolumeCorrection::LinearInside, 3.0, 1.0, 2);
         assert_eq!(inside.at([3.0, 0.0, 0.0]), 0.5);
-        assert_eq!(inside.at([2.0, 2.0, 0.0]), share.at([2.0, 2.0, 0.0]));
+        assert_eq!(inside.at([2.0, 2.0, 0.0]), factors.at([2.0, 2.0, 0.0]));
         assert_eq!(inside.at([3.1, 0.0, 0.0]), 0.0);
     }
 }

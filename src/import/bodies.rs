@@ -62,7 +62,7 @@ pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &No
 }
 
 /// Laws whose bonds cannot break by a critical stretch.
-const BY_ENERGY: [&str; 3] = [
+const WITHOUT_CRITICAL_STRETCH: [&str; 3] = [
     "ordinary_plastic",
     "correspondence",
     "bond_associated_correspondence",
@@ -80,9 +80,9 @@ pub fn damage(
     material: &Material,
     horizon: f64,
 ) -> Option<String> {
-    let by_energy = BY_ENERGY.contains(&material.law);
+    let lacks_critical_stretch = WITHOUT_CRITICAL_STRETCH.contains(&material.law);
     match &model.criterion {
-        Criterion::Stretch(value, _) if !by_energy => {
+        Criterion::Stretch(value, _) if !lacks_critical_stretch => {
             let name = translation.name("damage", &model.read);
             let header = format!("damage.{name}.critical_stretch");
             translation

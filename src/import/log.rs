@@ -195,7 +195,7 @@ impl fmt::Display for Losses {
 pub(super) struct Log {
     fates: RefCell<HashMap<usize, (Fate, String)>>,
     /// Tables whose outcome holds for all their keys.
-    whole: RefCell<HashSet<usize>>,
+    whole_tables: RefCell<HashSet<usize>>,
 }
 
 impl Log {
@@ -230,9 +230,9 @@ impl Log {
     }
 
     /// Log the outcome of a table and all its keys; the keys are not listed separately.
-    pub(super) fn whole(&self, table: &Node, fate: Fate, note: impl Into<String>) {
+    pub(super) fn note_whole_table(&self, table: &Node, fate: Fate, note: impl Into<String>) {
         self.note(table, fate, note);
-        self.whole.borrow_mut().insert(table.id);
+        self.whole_tables.borrow_mut().insert(table.id);
     }
 
     /// Log that the new deck expresses a key (`node`) without a change of meaning.
@@ -283,7 +283,7 @@ impl Log {
             note,
         });
         // A table that is left out completely is one entry.
-        if fate != Fate::LeftOut && !self.whole.borrow().contains(&node.id) {
+        if fate != Fate::LeftOut && !self.whole_tables.borrow().contains(&node.id) {
             for (name, child) in children {
                 self.collect(child, &format!("{key} > {name}"), entries);
             }

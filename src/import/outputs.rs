@@ -205,7 +205,7 @@ impl Outputs {
             }
             self.angular_momentum |= written.angular_momentum;
             let (fate, note) = (written.fate, written.note);
-            translation.log.whole(table, fate, note.clone());
+            translation.log.note_whole_table(table, fate, note.clone());
             self.computed.push((label, fate, note));
         }
         Ok(())

@@ -50,7 +50,7 @@ pub struct Stage {
     /// step is unknown.
     pub damping: Option<f64>,
     /// Whether damage models are active.
-    pub breaks: bool,
+    pub is_damage_enabled: bool,
 }
 
 /// Read the time at which the first solver starts.
@@ -92,10 +92,10 @@ pub fn stage(
             Some(translation.count(id, "Step ID")?)
         }
     };
-    let breaks = node.get("Damage Models");
-    let breaks = breaks.map_or(damage_by_default, |breaks| {
-        log.taken(breaks, "whether bodies have damage");
-        translation.is_true(breaks)
+    let damage_models = node.get("Damage Models");
+    let is_damage_enabled = damage_models.map_or(damage_by_default, |damage_models| {
+        log.taken(damage_models, "whether bodies have damage");
+        translation.is_true(damage_models)
     });
     let mut solver = None;
     for (name, table) in node.entries() {
@@ -141,7 +141,7 @@ pub fn stage(
         method,
         step_id,
         damping: None,
-        breaks,
+        is_damage_enabled,
     };
     if is(&STATIC) {
         if let Some(times) = solver.get("Time Steps") {
@@ -161,7 +161,7 @@ pub fn stage(
             let after = list.iter().filter(|end| **end > start);
             let stages: Vec<Stage> = after.map(|end| new(*end, Method::Equilibria(1))).collect();
             later(*list.last().expect("two at least"), times.line)?;
-            tolerances(translation, solver);
+            note_unread_keys(translation, solver);
             return Ok(stages);
         }
         let end = later(end(&[])?, node.line)?;
@@ -202,7 +202,7 @@ pub fn stage(
             log.taken(steps, "load_steps");
             load_steps = translation.count(steps, key)?.max(1);
         }
-        tolerances(translation, solver);
+        note_unread_keys(translation, solver);
         return Ok(vec![new(end, Method::Equilibria(load_steps))]);
     }
     let fixed = solver.get("Fixed dt");
@@ -268,7 +268,7 @@ pub fn stage(
 }
 
 /// Log the tolerances of a static solver, and its keys that have not been read.
-fn tolerances(translation: &Translation, solver: &Node) {
+fn note_unread_keys(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
         if is(&[

@@ -46,7 +46,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Return `a`. With AVX2 and AVX-512, the compiler cannot see that the result is `a`. It then keeps the
     /// operations before and after this call in whole vectors, instead of splitting them by lane.
     #[inline(always)]
-    fn whole(self, a: Lanes) -> Lanes {
+    fn opaque(self, a: Lanes) -> Lanes {
         a
     }
 
@@ -69,15 +69,15 @@ pub trait Task {
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// Portable fallback. `ONCE` selects fused multiply-add, which is slow on processors without this
+/// Portable fallback. `FUSED` selects fused multiply-add, which is slow on processors without this
 /// instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Portable<const ONCE: bool>;
+pub struct Portable<const FUSED: bool>;
 
-impl<const ONCE: bool> Simd for Portable<ONCE> {
+impl<const FUSED: bool> Simd for Portable<FUSED> {
     #[inline(always)]
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
-        if !ONCE {
+        if !FUSED {
             return a * b + c;
         }
         let mut result = a;
@@ -179,7 +179,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn whole(self, a: Lanes) -> Lanes {
+        fn opaque(self, a: Lanes) -> Lanes {
             // SAFETY: `self` proves that the machine has AVX2.
             unsafe {
                 let [low, high] = halves(a);
@@ -226,7 +226,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn whole(self, a: Lanes) -> Lanes {
+        fn opaque(self, a: Lanes) -> Lanes {
             // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { lanes(opaque(vector(a))) }
         }

@@ -112,10 +112,10 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
-    /// Test whether the law defines [`Law::bond_stress_across`].
-    pub fn has_bond_stress_across<const D: usize>(&self) -> bool {
+    /// Test whether the law defines [`Law::out_of_plane_bond_stress`].
+    pub fn has_out_of_plane_bond_stress<const D: usize>(&self) -> bool {
         fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
-            L::HAS_BOND_STRESS_ACROSS
+            L::HAS_OUT_OF_PLANE_BOND_STRESS
         }
         with_law!(self, law => of::<_, D>(law))
     }
@@ -290,17 +290,25 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::dilatation(law, numbers))
     }
 
-    fn stress_across(&self, gradient: &SMatrix<f64, D, D>, plastic: &PlasticState) -> Option<f64> {
-        with_law!(self, law => Law::<D>::stress_across(law, gradient, plastic))
+    fn out_of_plane_stress(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        plastic: &PlasticState,
+    ) -> Option<f64> {
+        with_law!(self, law => Law::<D>::out_of_plane_stress(law, gradient, plastic))
     }
 
     #[inline(never)]
-    fn bond_stress_across(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes {
-        with_law!(self, law => law.bond_stress_across(bond, &first(end)))
+    fn out_of_plane_bond_stress(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes {
+        with_law!(self, law => law.out_of_plane_bond_stress(bond, &first(end)))
     }
 
-    fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, plastic: &PlasticState) -> Option<f64> {
-        with_law!(self, law => Law::<D>::stretch_across(law, gradient, plastic))
+    fn out_of_plane_stretch(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        plastic: &PlasticState,
+    ) -> Option<f64> {
+        with_law!(self, law => Law::<D>::out_of_plane_stretch(law, gradient, plastic))
     }
 
     fn needs_shape(&self) -> bool {

@@ -217,7 +217,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     for d in 1..D {
         relative_square_extension = simd.multiply_add(eta[d], sum(d), relative_square_extension);
     }
-    let relative_square_extension = simd.whole(relative_square_extension * inverse_square);
+    let relative_square_extension = simd.opaque(relative_square_extension * inverse_square);
     if linear {
         return Bond {
             reference: xi,
@@ -239,7 +239,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     if wanted.stretch {
         let near = series(simd, relative_square_extension, &STRETCH);
         stretch = if ONLY_NEAR {
-            simd.whole(near)
+            simd.opaque(near)
         } else {
             with_far(simd, relative_square_extension, beyond_series, near, |_| {
                 (Lanes::splat(1.0), Lanes::splat(0.0))
@@ -249,7 +249,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     if wanted.extension_over_deformed {
         let near = series(simd, relative_square_extension, &EXTENSION_OVER_DEFORMED);
         extension_over_deformed = if ONLY_NEAR {
-            simd.whole(near)
+            simd.opaque(near)
         } else {
             with_far(
                 simd,
@@ -306,9 +306,9 @@ fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     other: O,
 ) -> Lanes {
     if beyond_series == 0 {
-        return simd.whole(near);
+        return simd.opaque(near);
     }
-    simd.whole(simd.aside(ClosedForm {
+    simd.opaque(simd.aside(ClosedForm {
         relative_square_extension,
         beyond_series,
         near,

@@ -193,9 +193,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     const FORCE_READS_HISTORY: bool = true;
 
     /// Whether the out-of-plane stress of a point is the mean of the stresses of its bonds. The sum of
-    /// [`Self::bond_stress_across`] then replaces the value of [`Self::stress_across`], unless this value is
-    /// `None`.
-    const HAS_BOND_STRESS_ACROSS: bool = false;
+    /// [`Self::out_of_plane_bond_stress`] then replaces the value of [`Self::out_of_plane_stress`], unless
+    /// this value is `None`.
+    const HAS_OUT_OF_PLANE_BOND_STRESS: bool = false;
 
     /// Return the contribution of an undeformed bond to the sums over the initial family.
     #[inline(always)]
@@ -351,7 +351,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Return the out-of-plane Kirchhoff stress τ_zz (Pa) in plane strain, at an in-plane displacement
     /// gradient. If `None`, the caller uses ν (τ_xx + τ_yy), which is correct for laws that are linear in the
     /// strain.
-    fn stress_across(
+    fn out_of_plane_stress(
         &self,
         _gradient: &SMatrix<f64, D, D>,
         _plastic: &PlasticState,
@@ -360,15 +360,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return the contribution of a bond to the out-of-plane Kirchhoff stress, per volume of j, Pa/m³; for
-    /// laws with [`Self::HAS_BOND_STRESS_ACROSS`].
+    /// laws with [`Self::HAS_OUT_OF_PLANE_BOND_STRESS`].
     #[inline(always)]
-    fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
+    fn out_of_plane_bond_stress(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
         Lanes::splat(0.0)
     }
 
     /// Return the out-of-plane stretch F_zz in plane stress, at an in-plane displacement gradient. If `None`,
     /// the caller computes F_zz from Hooke's law with logarithmic strains.
-    fn stretch_across(
+    fn out_of_plane_stretch(
         &self,
         _gradient: &SMatrix<f64, D, D>,
         _plastic: &PlasticState,

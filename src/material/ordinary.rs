@@ -37,13 +37,17 @@ pub struct Ordinary {
     /// Constant A of the law, Pa.
     extensional: f64,
     /// m of an untruncated family, m⁵.
-    whole: f64,
+    untruncated_weighted_volume: f64,
 }
 
 impl Ordinary {
     /// Create the law from the elastic constants and the weighted volume (m⁵) of an untruncated family.
     /// `None` in 1-D, where the Poisson ratio has no meaning.
-    pub fn new(dimension: Dimension, elastic: Isotropic, whole: f64) -> Option<Self> {
+    pub fn new(
+        dimension: Dimension,
+        elastic: Isotropic,
+        untruncated_weighted_volume: f64,
+    ) -> Option<Self> {
         let (modulus, shear) = (bulk_modulus(dimension, elastic)?, elastic.shear_modulus());
         let (count, extensional) = match dimension {
             Dimension::Space => (3.0, 15.0 * shear),
@@ -53,14 +57,14 @@ impl Ordinary {
             dimension: count,
             volumetric: modulus - extensional / (count * count),
             extensional,
-            whole,
+            untruncated_weighted_volume,
         })
     }
 
     /// Create the law of a body with this influence function, in the plane or in space.
     pub(super) fn of(given: &Given, influence: Influence) -> Self {
-        let whole = influence.weighted_volume(given.dimension, given.horizon);
-        Self::new(given.dimension, given.elastic, whole)
+        let untruncated_weighted_volume = influence.weighted_volume(given.dimension, given.horizon);
+        Self::new(given.dimension, given.elastic, untruncated_weighted_volume)
             .expect("the law declares that it has no 1-D form")
     }
 
@@ -93,8 +97,8 @@ impl Ordinary {
     }
 
     /// Return m of an untruncated family, m⁵.
-    pub(super) fn whole(&self) -> f64 {
-        self.whole
+    pub(super) fn untruncated_weighted_volume(&self) -> f64 {
+        self.untruncated_weighted_volume
     }
 
     /// Return m (m⁵) from A/m; `None` if the point has no bonds.
@@ -105,7 +109,11 @@ impl Ordinary {
     /// Return the energy of a bond at one end, divided by the energy of this bond in an untruncated family at
     /// the same stretch. `sum` is the weighted volume m of this end, m⁵.
     pub(super) fn truncation_factor_of(&self, sum: f64) -> f64 {
-        if sum > 0.0 { self.whole / sum } else { 1.0 }
+        if sum > 0.0 {
+            self.untruncated_weighted_volume / sum
+        } else {
+            1.0
+        }
     }
 }
 
@@ -204,19 +212,19 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 /// Return the force state t = v |ξ| + a (e − e_i) of bonds with the inelastic deviatoric extension e_i. Here
-/// a = A/m is `extension_factor` and v is `volume_factor`, for example d κ θ/m, both N/m⁷. `taken` is
-/// e_i/|ξ|.
+/// a = A/m is `extension_factor` and v is `volume_factor`, for example d κ θ/m, both N/m⁷.
+/// `inelastic_stretch` is e_i/|ξ|.
 #[inline(always)]
-pub(super) fn eased_force<const D: usize>(
+pub(super) fn inelastic_force_state<const D: usize>(
     bond: &Bond<D>,
     extension_factor: Lanes,
     volume_factor: Lanes,
-    taken: Lanes,
+    inelastic_stretch: Lanes,
 ) -> Along {
-    let eased = taken * (Lanes::splat(1.0) - bond.extension_over_deformed);
+    let inelastic = inelastic_stretch * (Lanes::splat(1.0) - bond.extension_over_deformed);
     Along(
         volume_factor + bond.extension_over_deformed * (extension_factor - volume_factor)
-            - extension_factor * eased,
+            - extension_factor * inelastic,
     )
 }
 

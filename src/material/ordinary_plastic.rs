@@ -25,7 +25,7 @@
 //! value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G, whereas this law has A = 8G in the
 //! plane.
 
-use super::ordinary::{Ordinary, SURFACE_CORRECTION, eased_force};
+use super::ordinary::{Ordinary, SURFACE_CORRECTION, inelastic_force_state};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary, DirectionalPlastic,
     Given, Influence, Invariants, Key, Kind, Law, LawFault, Pals, PalsPlastic, PlasticState,
@@ -39,11 +39,11 @@ use crate::lanes::{IsaSet, Lanes};
 pub struct OrdinaryPlastic {
     elastic: Ordinary,
     /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by the weighted volume m.
-    /// `whole` determines which m.
+    /// `untruncated_weighted_volume` determines which m.
     strength: f64,
     /// m of an untruncated family (m⁵), if this m determines the yield value of all points. `None` if the m
     /// of each point determines the yield value of the point.
-    whole: Option<f64>,
+    untruncated_weighted_volume: Option<f64>,
 }
 
 const YIELD_STRESS: Key = Key {
@@ -110,7 +110,7 @@ fn without_correction(given: &Given, stress: f64) -> Built {
     Built::plain(OrdinaryPlastic {
         elastic,
         strength: factor * stress * stress,
-        whole: (!of_family).then_some(elastic.whole()),
+        untruncated_weighted_volume: (!of_family).then_some(elastic.untruncated_weighted_volume()),
     })
 }
 
@@ -129,7 +129,7 @@ fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
 impl Described for OrdinaryPlastic {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
-        let yields = match self.whole {
+        let yields = match self.untruncated_weighted_volume {
             None => "by each point's own family",
             Some(_) => "as if families were whole",
         };
@@ -199,7 +199,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
             }
             1 => {
                 let mass = self
-                    .whole
+                    .untruncated_weighted_volume
                     .unwrap_or(self.elastic.extensional() / extension_factor);
                 let limit = 2.0 * self.strength / mass;
                 let square = extension_factor * extension_factor * sums[0];
@@ -226,14 +226,15 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     fn bond_history(
         &self,
         bond: &Bond<D>,
-        [extension_factor, _, mean, shrunk]: &[Lanes; 4],
+        [extension_factor, _, mean, plastic_fraction]: &[Lanes; 4],
         [plastic, loss]: &[Lanes; 2],
         _: f64,
     ) -> [Lanes; 2] {
         let trial = bond.stretch - *mean - *plastic;
-        let change = trial * *shrunk;
-        let taken = *extension_factor * (bond.length * bond.length) * (trial - change) * change;
-        [*plastic + change, *loss + taken]
+        let change = trial * *plastic_fraction;
+        let dissipated =
+            *extension_factor * (bond.length * bond.length) * (trial - change) * change;
+        [*plastic + change, *loss + dissipated]
     }
 
     #[inline(always)]
@@ -243,7 +244,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         [extension_factor, volume_factor, ..]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
     ) -> Along {
-        eased_force(bond, *extension_factor, *volume_factor, *plastic)
+        inelastic_force_state(bond, *extension_factor, *volume_factor, *plastic)
     }
 
     #[inline(always)]

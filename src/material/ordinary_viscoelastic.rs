@@ -15,7 +15,7 @@
 //! The elastic constants are those of the instantaneous response. The long-term shear modulus is (1 − λ) G.
 
 use super::ordinary::{
-    INFLUENCE, Ordinary, SURFACE_CORRECTION, eased_force, influence, with_influence,
+    INFLUENCE, Ordinary, SURFACE_CORRECTION, inelastic_force_state, influence, with_influence,
 };
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary,
@@ -165,13 +165,13 @@ impl Relaxation {
         let now = *back + change;
         // Energy that the dashpot dissipates, with the force of the dashpot at the middle of the step.
         let force = (*before - *back + deviatoric - now) * (0.5 * self.share);
-        let taken = factor * force * change;
-        [now, deviatoric, *loss + taken]
+        let dissipated = factor * force * change;
+        [now, deviatoric, *loss + dissipated]
     }
 
     /// Return λ (e_b² − 2 e_d e_b)/|ξ|² from e_d/|ξ| and e_b/|ξ|.
     #[inline(always)]
-    pub(super) fn released(&self, deviatoric: Lanes, back: Lanes) -> Lanes {
+    pub(super) fn change_of_square(&self, deviatoric: Lanes, back: Lanes) -> Lanes {
         (back - deviatoric * 2.0) * back * self.share
     }
 }
@@ -243,12 +243,12 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     fn bond_history(
         &self,
         bond: &Bond<D>,
-        [extension_factor, _, even]: &[Lanes; 3],
+        [extension_factor, _, isotropic_stretch]: &[Lanes; 3],
         history: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
         let factor = *extension_factor * (bond.length * bond.length);
-        (self.relaxation).after(bond.stretch - *even, history, factor, step)
+        (self.relaxation).after(bond.stretch - *isotropic_stretch, history, factor, step)
     }
 
     #[inline(always)]
@@ -258,7 +258,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         [extension_factor, volume_factor, _]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Along {
-        eased_force(
+        inelastic_force_state(
             bond,
             *extension_factor,
             *volume_factor,
@@ -270,12 +270,12 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        [extension_factor, _, even]: &[Lanes; 3],
+        [extension_factor, _, isotropic_stretch]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
-        let deviatoric = bond.stretch - *even;
-        let eased = self.relaxation.released(deviatoric, *back);
-        let square = bond.stretch * bond.stretch + eased;
+        let deviatoric = bond.stretch - *isotropic_stretch;
+        let change = self.relaxation.change_of_square(deviatoric, *back);
+        let square = bond.stretch * bond.stretch + change;
         square * (bond.length * bond.length) * *extension_factor * 0.5
     }
 

@@ -547,9 +547,9 @@ impl<const D: usize> Law<D> for SofteningPmb {
         }
         let strength = self.strength_stretch;
         let largest = self.in_softening(*largest);
-        let taken = self.relative_area(largest) + Lanes::splat(0.5 * strength);
+        let work = self.relative_area(largest) + Lanes::splat(0.5 * strength);
         let stored = self.relative_force(largest) * largest * 0.5;
-        (taken - stored) * length * (0.5 * self.elastic.micromodulus * strength)
+        (work - stored) * length * (0.5 * self.elastic.micromodulus * strength)
     }
 
     #[inline(always)]

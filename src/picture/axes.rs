@@ -109,12 +109,12 @@ impl Pen<'_> {
         }
         self.outline(bar.columns, bar.rows);
         let spacing = if bar.upright { 3.0 } else { 6.0 };
-        let most = ((length / (spacing * self.text)) as usize).clamp(2, 8);
+        let most_intervals = ((length / (spacing * self.text)) as usize).clamp(2, 8);
         let magnitude = low.abs().max(high.abs());
         let scale = if colouring.is_logarithmic {
-            Scale::logarithmic(low, high, unit, most)
+            Scale::logarithmic(low, high, unit, most_intervals)
         } else {
-            Scale::new(low, high, unit, magnitude, most)
+            Scale::new(low, high, unit, magnitude, most_intervals)
         };
         let (from, to, outward) = if bar.upright {
             ([right, bottom], [right, top], [1.0, 0.0])

@@ -443,10 +443,16 @@ impl Chart<'_> {
     }
 }
 
-/// Create a scale with at most n + 1 ticks, where n is `most` limited to the range from 2 to 9.
-fn scale(low: f64, high: f64, unit: &str, most: f64) -> Scale {
+/// Create a scale with at most n + 1 ticks, where n is `most_intervals` limited to the range from 2 to 9.
+fn scale(low: f64, high: f64, unit: &str, most_intervals: f64) -> Scale {
     let magnitude = low.abs().max(high.abs()) / (1.0 + MARGIN);
-    Scale::new(low, high, unit, magnitude, (most as usize).clamp(2, 9))
+    Scale::new(
+        low,
+        high,
+        unit,
+        magnitude,
+        (most_intervals as usize).clamp(2, 9),
+    )
 }
 
 /// Split a curve at points that are not finite, and leave out points within [`RESOLUTION`] of the previous

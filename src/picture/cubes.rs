@@ -60,14 +60,14 @@ struct Surface {
 impl<'a> Cubes<'a> {
     pub fn new(image: &'a mut Image, camera: Camera) -> Self {
         let pixels = image.width as usize * image.height as usize;
-        let towards = camera.towards();
+        let to_camera = camera.to_camera();
         let view = Projection::Orthographic(camera);
-        let cosines = towards.map(f64::abs);
+        let cosines = to_camera.map(f64::abs);
         Self {
             image,
             edges: [0, 1, 2].map(|axis| {
                 let mut step = [0.0; 3];
-                step[axis] = if towards[axis] < 0.0 { 1.0 } else { -1.0 };
+                step[axis] = if to_camera[axis] < 0.0 { 1.0 } else { -1.0 };
                 let [across, up] = view.project(step);
                 [across, -up]
             }),

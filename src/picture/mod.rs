@@ -200,7 +200,7 @@ fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)
 
 /// Return the largest number (2 to 10) of intervals between the ticks of a ruler. `from` and `to` are the
 /// ends of the ruler, and `text` is the text size, pixels. Each label needs `spacing` text sizes.
-fn ticks_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
+fn most_intervals_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     ((length / (spacing * text)) as usize).clamp(2, 10)
 }
@@ -218,8 +218,14 @@ fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
         ([left, bottom], [left, top], [-1.0, 0.0], 2.6),
     ];
     for (direction, (axis, (from, to, outward, spacing))) in axes.iter().zip(ends).enumerate() {
-        let most = ticks_on(from, to, spacing, layout.text);
-        let scale = Scale::new(low[direction], high[direction], "m", magnitude, most);
+        let most_intervals = most_intervals_on(from, to, spacing, layout.text);
+        let scale = Scale::new(
+            low[direction],
+            high[direction],
+            "m",
+            magnitude,
+            most_intervals,
+        );
         let name = axis.letter();
         pen.ruler(&Ruler {
             from,
@@ -235,7 +241,7 @@ fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
 fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
     let view = Projection::Orthographic(camera);
     let place = |corner| layout.pixel(view.project(bounds.corner(corner)));
-    let hidden = camera.towards().map(|component| component < 0.0);
+    let hidden = camera.to_camera().map(|component| component < 0.0);
     for axis in 0..3 {
         let mut neighbour = hidden;
         neighbour[axis] = !neighbour[axis];
@@ -264,9 +270,15 @@ fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
         if (to[0] - from[0]).hypot(to[1] - from[1]) < LEAST_RULER * layout.text {
             continue;
         }
-        let most = ticks_on(from, to, 3.4, layout.text);
+        let most_intervals = most_intervals_on(from, to, 3.4, layout.text);
         let index = axis.index();
-        let scale = Scale::new(bounds.low[index], bounds.high[index], "m", magnitude, most);
+        let scale = Scale::new(
+            bounds.low[index],
+            bounds.high[index],
+            "m",
+            magnitude,
+            most_intervals,
+        );
         let name = axis.letter();
         pen.ruler(&Ruler {
             from,

@@ -21,7 +21,7 @@ pub struct Camera {
     /// Unit vector up the picture.
     up: [f64; 3],
     /// Unit vector from the body to the camera.
-    towards: [f64; 3],
+    to_camera: [f64; 3],
 }
 
 /// A unit vector counts as parallel to the direction of view if its projected length is below this limit.
@@ -44,7 +44,7 @@ impl Camera {
         Self {
             across: [-sin, cos, 0.0],
             up: [-rise * cos, -rise * sin, level],
-            towards: [level * cos, level * sin, rise],
+            to_camera: [level * cos, level * sin, rise],
         }
     }
 
@@ -55,7 +55,7 @@ impl Camera {
 
     /// Return the depth of a position, m; larger values are nearer to the camera.
     pub fn depth(&self, position: [f64; 3]) -> f64 {
-        dot(self.towards, position)
+        dot(self.to_camera, position)
     }
 
     /// Return the outer edge of a box for the ruler of an axis: the corner at the low end of the edge, and
@@ -89,7 +89,7 @@ impl Camera {
             // If the other axis is parallel to the direction of view, neither end is farther out, so take the
             // end that is farther from the camera.
             start[other.index()] = if ahead.abs() < ALONG_VIEW {
-                self.towards[other.index()] < 0.0
+                self.to_camera[other.index()] < 0.0
             } else {
                 ahead > 0.0
             };
@@ -98,8 +98,8 @@ impl Camera {
     }
 
     /// Return the components along x, y and z of the unit vector from the body to the camera.
-    pub fn towards(&self) -> [f64; 3] {
-        self.towards
+    pub fn to_camera(&self) -> [f64; 3] {
+        self.to_camera
     }
 }
 
@@ -275,7 +275,7 @@ mod tests {
         let view = |azimuth, elevation| {
             let camera = Camera::new(azimuth, elevation);
             let view = Projection::Orthographic(camera);
-            (AXES.map(|step| view.project(step)), camera.towards())
+            (AXES.map(|step| view.project(step)), camera.to_camera())
         };
         // From +x, y points to the right and z up.
         assert_eq!(
@@ -283,20 +283,20 @@ mod tests {
             ([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], AXES[0])
         );
         // From −y, x points to the right.
-        let (steps, towards) = view(-90.0, 0.0);
+        let (steps, to_camera) = view(-90.0, 0.0);
         assert_eq!(steps, [[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]);
-        assert_eq!(towards, [0.0, -1.0, 0.0]);
+        assert_eq!(to_camera, [0.0, -1.0, 0.0]);
         // From above with an azimuth of −90°, x points to the right and y up, as on a map.
-        let (steps, towards) = view(-90.0, 90.0);
+        let (steps, to_camera) = view(-90.0, 90.0);
         assert_eq!(steps, [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]);
-        assert_eq!(towards, AXES[2]);
+        assert_eq!(to_camera, AXES[2]);
     }
 
     #[test]
     fn cameras_keep_lengths_across_the_view() {
         for (azimuth, elevation) in [(17.0, 33.0), (200.0, -60.0), (-45.0, 89.0)] {
             let camera = Camera::new(azimuth, elevation);
-            let vectors = [camera.across, camera.up, camera.towards];
+            let vectors = [camera.across, camera.up, camera.to_camera];
             for (k, one) in vectors.into_iter().enumerate() {
                 for (l, other) in vectors.into_iter().enumerate() {
                     let expected = f64::from(u8::from(k == l));
@@ -305,7 +305,7 @@ mod tests {
             }
             // Right-handed: across × up points to the camera.
             let [a, u] = [camera.across, camera.up];
-            assert!((a[0] * u[1] - a[1] * u[0] - camera.towards[2]).abs() < 1e-12);
+            assert!((a[0] * u[1] - a[1] * u[0] - camera.to_camera[2]).abs() < 1e-12);
         }
     }
 

@@ -19,14 +19,15 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Create a scale from `low` to `high` with at most `most + 1` ticks. `unit` is the unit of both numbers.
+    /// Create a scale from `low` to `high` with at most `most_intervals + 1` ticks. `unit` is the unit of
+    /// both numbers.
     ///
     /// The prefix of the unit suits numbers up to `magnitude`. Scales that belong together get the same
     /// magnitude, so that their units have the same prefix.
-    pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most: usize) -> Self {
+    pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most_intervals: usize) -> Self {
         let (exponent, unit) = prefixed(unit, magnitude);
         let factor = 10_f64.powi(-exponent);
-        let (step, ticks) = round_numbers(low * factor, high * factor, most);
+        let (step, ticks) = round_numbers(low * factor, high * factor, most_intervals);
         let decimals = decimals_of(step);
         let ticks = ticks
             .into_iter()
@@ -41,9 +42,9 @@ impl Scale {
     /// Create a logarithmic scale from `low` to `high`, both above 0.
     ///
     /// If the range contains three or more powers of ten, the ticks are at powers of ten, and there are at
-    /// most max(`most`, 2) ticks. Otherwise, the ticks are at 1, 2 and 5 times powers of ten. If there are
-    /// fewer than two such ticks, there are at most `most + 1` ticks at round numbers.
-    pub fn logarithmic(low: f64, high: f64, unit: &str, most: usize) -> Self {
+    /// most max(`most_intervals`, 2) ticks. Otherwise, the ticks are at 1, 2 and 5 times powers of ten. If
+    /// there are fewer than two such ticks, there are at most `most_intervals + 1` ticks at round numbers.
+    pub fn logarithmic(low: f64, high: f64, unit: &str, most_intervals: usize) -> Self {
         let (exponent, unit) = prefixed(unit, high);
         let factor = 10_f64.powi(-exponent);
         let decades = |decade: f64| (decade.log10() - 1e-9).ceil() as i32;
@@ -52,7 +53,7 @@ impl Scale {
         let inside = |number: &f64| (-1e-9..=1.0 + 1e-9).contains(&fraction(*number));
         let powers = (end - first).max(0) as usize;
         let ticks: Vec<Tick> = if powers >= 3 {
-            let stride = powers.div_ceil(most.max(2));
+            let stride = powers.div_ceil(most_intervals.max(2));
             let powers = (first..end).rev().step_by(stride).collect::<Vec<i32>>();
             let plain = powers.iter().all(|power| (-3..=4).contains(power));
             let tick = |power: &i32| Tick {
@@ -69,7 +70,7 @@ impl Scale {
                 .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| (digit * 10_f64.powi(power), power)));
             let digits: Vec<(f64, i32)> = digits.filter(|(number, _)| inside(number)).collect();
             if digits.len() < 2 {
-                let (step, numbers) = round_numbers(low * factor, high * factor, most);
+                let (step, numbers) = round_numbers(low * factor, high * factor, most_intervals);
                 let decimals = decimals_of(step);
                 let tick = |number: f64| Tick {
                     fraction: fraction(number),
@@ -103,9 +104,9 @@ fn decimals_of(step: f64) -> usize {
 }
 
 /// Return a step of 1, 2 or 5 times a power of ten, and the multiples of the step within `low..=high`. There
-/// are at most `most + 1` multiples; none if `low` is not below `high`.
-pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
-    let coarse = (high - low) / most.max(1) as f64;
+/// are at most `most_intervals + 1` multiples; none if `low` is not below `high`.
+pub fn round_numbers(low: f64, high: f64, most_intervals: usize) -> (f64, Vec<f64>) {
+    let coarse = (high - low) / most_intervals.max(1) as f64;
     if !(coarse.is_finite() && coarse > 0.0) {
         return (1.0, Vec::new());
     }
@@ -117,7 +118,7 @@ pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
         .unwrap_or(10.0 * power);
     let first = (low / step - 1e-6).ceil();
     let last = (high / step + 1e-6).floor();
-    let count = (last - first + 1.0).clamp(0.0, most as f64 + 1.0) as usize;
+    let count = (last - first + 1.0).clamp(0.0, most_intervals as f64 + 1.0) as usize;
     // Adding 0 replaces −0 by 0.
     let numbers = (0..count).map(|index| (first + index as f64) * step + 0.0);
     (step, numbers.collect())
@@ -190,9 +191,9 @@ fn superscript(number: i32) -> String {
 mod tests {
     use super::*;
 
-    fn labels(low: f64, high: f64, unit: &str, most: usize) -> (Vec<String>, String) {
+    fn labels(low: f64, high: f64, unit: &str, most_intervals: usize) -> (Vec<String>, String) {
         let magnitude = low.abs().max(high.abs());
-        let scale = Scale::new(low, high, unit, magnitude, most);
+        let scale = Scale::new(low, high, unit, magnitude, most_intervals);
         let labels = scale.ticks.into_iter().map(|tick| tick.label).collect();
         (labels, scale.unit)
     }
@@ -208,9 +209,9 @@ mod tests {
         assert_eq!(round_numbers(f64::NAN, 2.0, 4).1, Vec::<f64>::new());
         for exponent in -20..20 {
             let high = 7.3 * 10_f64.powi(exponent);
-            for most in 2..12 {
-                let (step, ticks) = round_numbers(-high, high, most);
-                assert!(ticks.len() > most / 3 && ticks.len() <= most + 1);
+            for most_intervals in 2..12 {
+                let (step, ticks) = round_numbers(-high, high, most_intervals);
+                assert!(ticks.len() > most_intervals / 3 && ticks.len() <= most_intervals + 1);
                 assert!(ticks.iter().all(|tick| tick.abs() <= high));
                 let steps = ticks.windows(2).map(|pair| (pair[1] - pair[0]) / step);
                 assert!(steps.into_iter().all(|ratio| (ratio - 1.0).abs() < 1e-9));
@@ -234,8 +235,8 @@ mod tests {
 
     #[test]
     fn logarithmic_ticks_are_at_powers_of_ten() {
-        let scale = |low, high, most| {
-            let scale = Scale::logarithmic(low, high, "Pa", most);
+        let scale = |low, high, most_intervals| {
+            let scale = Scale::logarithmic(low, high, "Pa", most_intervals);
             for tick in &scale.ticks {
                 assert!((-1e-6..=1.0 + 1e-6).contains(&tick.fraction), "{tick:?}");
             }

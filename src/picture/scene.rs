@@ -117,9 +117,9 @@ pub struct Mark {
     pub scattered: bool,
 }
 
-/// Limit of the absolute value of a coordinate, m. Points beyond this limit are omitted, because they result
-/// from a failed run.
-const LARGEST_COORDINATE: f64 = 1e100;
+/// Limit of the absolute value of a coordinate, and of the size of a point, m. Points with coordinates beyond
+/// this limit are omitted, because they result from a failed run.
+const LARGEST_LENGTH: f64 = 1e100;
 
 impl Scene<'_> {
     /// Return the view; in 1-D and 2-D, this is always the plane view.
@@ -140,7 +140,7 @@ impl Scene<'_> {
         let points = index_limit(points.min(self.values.len()))?;
         let is_drawn = |point: &u32| {
             let mark = self.mark(*point);
-            let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
+            let usable = |coordinate: &f64| coordinate.abs() < LARGEST_LENGTH;
             mark.position.iter().all(usable)
                 && self.bounds.is_none_or(|bounds| bounds.holds(mark.position))
                 && self.view_holds(&mark)
@@ -173,7 +173,7 @@ impl Scene<'_> {
         Mark {
             scattered: self.scattered.get(point).copied().unwrap_or(false),
             position: self.without_unused(self.positions[point]),
-            size: if (0.0..LARGEST_COORDINATE).contains(&size) {
+            size: if (0.0..LARGEST_LENGTH).contains(&size) {
                 size
             } else {
                 0.0

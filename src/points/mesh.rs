@@ -40,7 +40,7 @@ pub(super) struct User<'a> {
 }
 
 /// The points of a mesh, and the ids of the points in each set of the problem.
-pub struct Found {
+pub struct PointsAndSets {
     /// The points, with ids from 0.
     pub points: Vec<Point>,
     /// For each set of the problem, the ids of its points; `None` for sets that name no group of the mesh.
@@ -82,7 +82,11 @@ pub(super) fn users<'a>(bodies: &[BodyPoints<'a>], file: &Path) -> Vec<User<'a>>
 ///
 /// # Errors
 /// Same as for [`read`]; the error is the same on all ranks.
-pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Found> {
+pub(super) fn piece(
+    problem: &Problem,
+    path: &Path,
+    comm: &dyn Communicator,
+) -> Result<PointsAndSets> {
     let read = if comm.rank() == 0 {
         read(problem, path).map(Some)
     } else {
@@ -103,7 +107,7 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     }
     let received = comm.all_to_all(outgoing);
     comm.broadcast(0, &mut packed);
-    Ok(Found {
+    Ok(PointsAndSets {
         points: bytemuck::pod_collect_to_vec(&received[0]),
         sets: unpack(&packed, problem.sets.len()),
         names,
@@ -141,9 +145,9 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
 /// If the file name does not have the ending of a mesh format, or the file cannot be read or parsed. If an
 /// element is invalid, belongs to two bodies or coincides with another element. If the block of a body is no
 /// group with elements of the problem's dimension, or the name of a block or set is ambiguous.
-pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
+pub fn read(problem: &Problem, path: &Path) -> Result<PointsAndSets> {
     let bodies = BodyPoints::of(&problem.bodies);
-    let MeshPoints {
+    let MeshAndPoints {
         mesh,
         points,
         point_of,
@@ -169,7 +173,7 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
         };
         sets.push(group.map(ids));
     }
-    Ok(Found {
+    Ok(PointsAndSets {
         sets,
         names: mesh.names(|group| mesh.dimension(group) <= dimension),
         points,
@@ -177,7 +181,7 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
 }
 
 /// A mesh and the points of its elements.
-pub(super) struct MeshPoints {
+pub(super) struct MeshAndPoints {
     mesh: Mesh,
     /// The points, with ids from 0.
     pub points: Vec<Point>,
@@ -193,7 +197,7 @@ pub(super) fn read_points(
     bodies: &[BodyPoints],
     dimension: Dimension,
     path: &Path,
-) -> Result<MeshPoints> {
+) -> Result<MeshAndPoints> {
     let users = users(bodies, path);
     let Some(format) = Format::of(path) else {
         let (name, endings) = (path.display(), Format::endings());
@@ -212,7 +216,7 @@ pub(super) fn read_points(
     drop(bytes);
     let of_elements = bodies_of_elements(bodies, dimension.count(), &mesh, &users)?;
     let (points, point_of) = points(dimension, &mesh, &users, &of_elements)?;
-    Ok(MeshPoints {
+    Ok(MeshAndPoints {
         mesh,
         points,
         point_of,

@@ -167,13 +167,13 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     Ok((points, total))
 }
 
-/// Displace points randomly from the centres of their cells, by at most `jitter.share` edges in each
+/// Displace points randomly from the centres of their cells, by at most `jitter.largest_shift` edges in each
 /// direction. `spacing` contains the edges of the cells, m.
 fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     for point in points {
         for (k, edge) in spacing.iter().enumerate() {
             let shift = 2.0 * uniform(jitter.seed, Scattered::Position(k), point.id) - 1.0;
-            point.position[k] += jitter.share * edge * shift;
+            point.position[k] += jitter.largest_shift * edge * shift;
         }
     }
 }
@@ -184,12 +184,12 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
 /// # Errors
 /// If no mesh has the group that a set names, or if the points of a set differ from those of an earlier call.
 /// Only rank 0 knows the names of the groups and can suggest similar names.
-fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result<()> {
+fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::PointsAndSets, u64)]) -> Result<()> {
     for (index, set) in problem.sets.iter().enumerate() {
         let Selector::Mesh(group) = &set.selector else {
             continue;
         };
-        let of_mesh = |(found, first): &'_ (mesh::Found, u64)| {
+        let of_mesh = |(found, first): &'_ (mesh::PointsAndSets, u64)| {
             let ids = found.sets[index].clone()?;
             Some((ids, *first))
         };

@@ -20,7 +20,7 @@ pub enum Kind {
     Partial,
     /// Points with coarser points within their horizon. The horizon of these points is multiplied by
     /// [`Refinement::interface_factor`](super::Refinement::interface_factor).
-    AtCoarser,
+    NearCoarser,
 }
 
 /// A block of a problem.
@@ -84,7 +84,7 @@ impl Problem {
         let body = &self.bodies[self.body_of(number)];
         let part = number / self.bodies.len();
         let level = (part / KINDS) as u32;
-        let kind = [Kind::Whole, Kind::Partial, Kind::AtCoarser][part % KINDS];
+        let kind = [Kind::Whole, Kind::Partial, Kind::NearCoarser][part % KINDS];
         Block {
             level,
             kind,
@@ -110,7 +110,7 @@ impl Problem {
             _ => body.horizon * scale,
         };
         match kind {
-            Kind::AtCoarser => horizon * refinement.interface_factor,
+            Kind::NearCoarser => horizon * refinement.interface_factor,
             Kind::Whole | Kind::Partial => horizon,
         }
     }

@@ -29,7 +29,7 @@ pub struct Body {
     pub horizon: f64,
     /// Span of the horizon in the deck: in the section of the body, or in `[grid]` if the body gives no
     /// horizon.
-    pub horizon_place: Range<usize>,
+    pub horizon_span: Range<usize>,
     /// Source of the points.
     pub points: PointSource,
 }
@@ -126,7 +126,7 @@ impl Quadrature {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jitter {
     /// The largest displacement in each direction, as a fraction of the cell's edge.
-    pub share: f64,
+    pub largest_shift: f64,
     /// Seed of the random displacements.
     pub seed: u64,
 }

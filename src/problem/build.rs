@@ -3,8 +3,8 @@
 use super::{
     Action, Body, CheckpointRule, Condition, Crack, DEFAULT_DAMAGE_THRESHOLD, DEFAULT_FIELDS,
     Damage, DamageRule, FamilyRule, History, Initial, Interface, InterfaceRule, Interval, Law,
-    Material, Method, OUTPUTS, Output, Places, PointSource, PreCrack, Problem, Quadrature,
-    Selector, Set, Shape, StepRule, ThermalExpansion, Time, Toughness, VolumeCorrection,
+    Material, Method, OUTPUTS, Output, PointSource, PreCrack, Problem, Quadrature, Selector, Set,
+    Shape, Spans, StepRule, ThermalExpansion, Time, Toughness, VolumeCorrection,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -19,7 +19,7 @@ impl Problem {
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
             warnings: Vec::new(),
-            places: Places::default(),
+            spans: Spans::default(),
             title: String::new(),
             dimension,
             horizon,
@@ -103,7 +103,7 @@ impl Problem {
             material,
             damage,
             horizon: self.horizon,
-            horizon_place: 0..0,
+            horizon_span: 0..0,
             points: PointSource::Lattice {
                 shape,
                 spacing: edges,

@@ -1,6 +1,6 @@
 //! The law of a material, with the values of its keys.
 
-use super::{Damage, DamageRule, Sense};
+use super::{BreakableBonds, Damage, DamageRule};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
@@ -112,7 +112,10 @@ impl Law {
             ),
             DamageRule::Energy { work, .. } => {
                 let wanted = [
-                    (work.sense == Sense::Either, "tension_only = false"),
+                    (
+                        work.breakable == BreakableBonds::Any,
+                        "tension_only = false",
+                    ),
                     (work.family_correction > 0.0, "family_correction"),
                 ];
                 let wanted = wanted.into_iter().find_map(|(is, key)| is.then_some(key));

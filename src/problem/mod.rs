@@ -25,7 +25,8 @@ use crate::dimension::Dimension;
 use crate::error::Warning;
 
 pub use crate::damage::{
-    Calibration, Sense, StressMeasure, StressRule, ToughnessByDirection, WorkMeasure, WorkRule,
+    BreakableBonds, Calibration, StressMeasure, StressRule, ToughnessByDirection, WorkMeasure,
+    WorkRule,
 };
 pub use blocks::{Block, Kind};
 pub use bodies::*;
@@ -47,7 +48,7 @@ pub struct Problem {
     /// Title, one line.
     pub title: String,
     /// Spans of values in the deck, for errors.
-    pub places: Places,
+    pub spans: Spans,
     /// Dimension and out-of-plane condition.
     pub dimension: Dimension,
     /// Horizon δ of the grid, m; bodies may have other horizons.
@@ -97,7 +98,7 @@ pub struct Problem {
 
 /// Spans of values for errors that are found after the deck has been read.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Places {
+pub struct Spans {
     /// Span of the horizon of the grid.
     pub horizon: Range<usize>,
     /// Span of the end time.

@@ -20,7 +20,7 @@ impl ThermalExpansion {
     /// If the strain perpendicular to the plane or bar is 0, the stress in this direction adds to the
     /// stretch. The free stretch per kelvin is then (1 + ν) α in plane strain, and (1 + ν)/(1 − ν) α under
     /// uniaxial strain. Otherwise, the free stretch per kelvin is α.
-    pub fn in_setting(self, dimension: Dimension, poisson_ratio: f64) -> f64 {
+    pub fn free_stretch_per_kelvin(self, dimension: Dimension, poisson_ratio: f64) -> f64 {
         let factor = match dimension {
             Dimension::PlaneStrain { .. } => 1.0 + poisson_ratio,
             Dimension::Line {
@@ -76,7 +76,7 @@ mod tests {
             constraint: Constraint::UniaxialStrain,
         };
         for (dimension, directions) in [(plane, 2.0), (line, 1.0), (Dimension::Space, 3.0)] {
-            let stretch = expansion.in_setting(dimension, poisson_ratio);
+            let stretch = expansion.free_stretch_per_kelvin(dimension, poisson_ratio);
             let stress = (directions * lambda + 2.0 * shear) * stretch - 3.0 * bulk * 1e-5;
             assert!(stress.abs() < 1e-18, "{dimension:?}: {stress}");
         }

@@ -10,9 +10,9 @@ use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
 use crate::problem::{Kind, PreCrack, Problem, Refinement};
 
-use super::at_coarser::AtCoarser;
 use super::grid_index::{GridIndex, canonical, numbered, parents};
 use super::grid_index_set::GridIndexSet;
+use super::near_coarser::NearCoarser;
 use super::pattern::{Node, Pattern};
 
 /// The grids of all bodies; equal on all ranks.
@@ -342,7 +342,7 @@ impl<'a> Grids<'a> {
 
     /// For each level from 1 on, the test for coarser nodes within the horizon. The result is empty if
     /// horizons are not enlarged at interfaces.
-    fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
+    fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<NearCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
             // Without enlarged horizons, no test is needed, because nodes at interfaces can be in the same
@@ -353,7 +353,12 @@ impl<'a> Grids<'a> {
             let number = self.problem.block_number(body, level, Kind::Whole);
             let block = self.problem.block(number);
             let edges = block.spacing()?;
-            Some(AtCoarser::new(pattern, level, edges, cutoff(block.horizon)))
+            Some(NearCoarser::new(
+                pattern,
+                level,
+                edges,
+                cutoff(block.horizon),
+            ))
         };
         (1..=self.finest).filter_map(of_level).collect()
     }
@@ -361,20 +366,20 @@ impl<'a> Grids<'a> {
     fn block(
         &self,
         body: usize,
-        interfaces: &[AtCoarser],
+        interfaces: &[NearCoarser],
         grid: &BodyGrid,
         index: GridIndex,
         node: &Node,
     ) -> usize {
         let cells = &grid.cells;
-        let at_coarser = node.level.checked_sub(1).is_some_and(|k| {
+        let near_coarser = node.level.checked_sub(1).is_some_and(|k| {
             let index = index.map(|x| x >> (self.finest - node.level));
             let interface = interfaces.get(k as usize);
             interface.is_some_and(|nodes| nodes.has(&|cell| cells.has_cell(cell), index))
         });
-        let kind = if at_coarser {
-            Kind::AtCoarser
-        } else if node.whole {
+        let kind = if near_coarser {
+            Kind::NearCoarser
+        } else if node.has_cell_volume {
             Kind::Whole
         } else {
             Kind::Partial

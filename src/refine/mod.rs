@@ -8,11 +8,11 @@
 //! body, the pattern determines the positions, levels and volumes of all nodes. Therefore nodes do not depend
 //! on the number of ranks.
 
-mod at_coarser;
 mod fractions;
 mod grid_index;
 mod grid_index_set;
 mod grids;
+mod near_coarser;
 mod pattern;
 
 pub use fractions::SetFractions;

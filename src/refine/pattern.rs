@@ -15,7 +15,7 @@ pub struct Node {
     /// Ratio of the node's volume to the volume of a level-0 cell.
     pub volume_fraction: f64,
     /// Whether the volume is exactly the volume of a cell of the node's level.
-    pub whole: bool,
+    pub has_cell_volume: bool,
 }
 
 /// The refined nodes of a body, by level. A node is stored as a grid index in spacings of its level.
@@ -117,7 +117,8 @@ impl Pattern {
         let steps = 1 << (self.finest() - level - 1);
         around(index, self.dimension)
             .filter(move |other| {
-                !self.is_taken(level + 1, *other) && self.is_possible(body, level + 1, *other)
+                !self.exists_if_possible(level + 1, *other)
+                    && self.is_possible(body, level + 1, *other)
             })
             .map(move |other| other.map(|x| x * steps))
     }
@@ -130,11 +131,11 @@ impl Pattern {
 
     /// Test whether a node exists at an index of a level.
     pub fn exists(&self, body: &impl Fn(GridIndex) -> bool, level: u32, index: GridIndex) -> bool {
-        self.is_taken(level, index) && self.is_possible(body, level, index)
+        self.exists_if_possible(level, index) && self.is_possible(body, level, index)
     }
 
     /// Test whether a node exists at an index of a level, given that a node is possible at this index.
-    fn is_taken(&self, level: u32, index: GridIndex) -> bool {
+    fn exists_if_possible(&self, level: u32, index: GridIndex) -> bool {
         let (level, index) = canonical(level, index);
         level == 0 || {
             let refined = &self.refined[level as usize - 1];
@@ -179,24 +180,24 @@ impl Pattern {
         let mut complete = true;
         let mut centre = canonical_index;
         for coarse in coarsest..finest {
-            let (mut taken, mut all) = (0, 0);
+            let (mut existing, mut all) = (0, 0);
             for other in around(centre, self.dimension) {
                 if !self.is_possible(body, coarse + 1, other) {
                     continue;
                 }
                 all += 1;
-                if self.is_taken(coarse + 1, other) {
-                    taken += 1;
+                if self.exists_if_possible(coarse + 1, other) {
+                    existing += 1;
                     // Eq. 12 of Dipasquale et al.: subtract 1/2, 1/4 or 1/8 of the finer volume for a node
                     // that is offset along 1, 2 or 3 axes.
                     volume -= cell(coarse + 1) >> halves(other);
                 }
             }
-            complete &= taken == all && all > 0;
+            complete &= existing == all && all > 0;
             if complete {
                 level = coarse + 1;
             }
-            if taken == 0 {
+            if existing == 0 {
                 break;
             }
             centre = centre.map(|x| 2 * x);
@@ -205,7 +206,7 @@ impl Pattern {
         Some(Node {
             level,
             volume_fraction: volume as f64 / scale,
-            whole: volume == cell(level),
+            has_cell_volume: volume == cell(level),
         })
     }
 
@@ -263,7 +264,7 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::at_coarser::AtCoarser;
+    use super::super::near_coarser::NearCoarser;
     use super::*;
     use proptest::prelude::*;
 
@@ -309,15 +310,15 @@ mod tests {
         let mut pattern = Pattern::new(2, 2);
         pattern.refine(&body, 0, [0, 2, 0]);
         let node = pattern.node(&body, [0, 8, 0]).unwrap();
-        assert_eq!((node.level, node.whole), (1, false));
+        assert_eq!((node.level, node.has_cell_volume), (1, false));
         let inner = pattern.node(&body, [4, 8, 0]).unwrap();
-        assert_eq!((inner.level, inner.whole), (0, false));
-        let at_coarser = |x, reach| {
-            let at_coarser = AtCoarser::new(&pattern, 1, [0.5; 3], reach);
-            at_coarser.has(&body, [x, 4, 0])
+        assert_eq!((inner.level, inner.has_cell_volume), (0, false));
+        let near_coarser = |x, reach| {
+            let near_coarser = NearCoarser::new(&pattern, 1, [0.5; 3], reach);
+            near_coarser.has(&body, [x, 4, 0])
         };
-        assert!(!at_coarser(0, 0.5) && at_coarser(0, 1.2));
-        assert!(!at_coarser(1, 0.5) && at_coarser(1, 0.75));
+        assert!(!near_coarser(0, 0.5) && near_coarser(0, 1.2));
+        assert!(!near_coarser(1, 0.5) && near_coarser(1, 0.75));
     }
 
     /// Check volumes and levels after random refinement up to level `finest`, with suppressed nodes, and

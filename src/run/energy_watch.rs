@@ -106,7 +106,7 @@ impl EnergyWatch {
     ///
     /// # Errors
     /// If a time step is clearly unstable, see [`Self::check`].
-    pub fn look<const D: usize>(
+    pub fn check_row<const D: usize>(
         &mut self,
         row: &HistoryRow,
         simulation: &Simulation<'_, D>,

@@ -64,7 +64,7 @@ use energy_watch::{EnergyWatch, StepKinds};
 use output_file::Start;
 use recorder::{Continuation, Recorder, damage, reasons_for_new_results};
 use restart::{Restart, restart};
-use watch::{Decision, Votes, Watch};
+use watch::{Decision, OwnRequests, Watch};
 
 /// The outcome of a run; equal on all ranks.
 #[derive(Debug, Clone)]
@@ -312,7 +312,7 @@ impl<'a> Job<'a> {
             let is_checked = due || complete || stepper.load_step().has_failed;
             let is_agreed = watch.end_iteration(step) || is_checked;
             let mut decision = if is_agreed {
-                watch.decide(self.comm, step, Votes::of(stepper))
+                watch.decide(self.comm, step, OwnRequests::of(stepper))
             } else {
                 Decision::default()
             };
@@ -333,14 +333,17 @@ impl<'a> Job<'a> {
                 }
                 if due {
                     let simulation = stepper.at_full_step();
-                    if let Some(found) = contact.as_ref().and_then(|watch| watch.look(simulation)) {
+                    if let Some(found) = contact
+                        .as_ref()
+                        .and_then(|watch| watch.find_contact(simulation))
+                    {
                         self.warn_of_contact(&found, clock.time());
                         contact = None;
                     }
                     recorder.record(stepper, self.observer)?;
                     // The observer may have made requests during the output of the row. If the requests of
                     // the ranks differ, the checkpoint below must not be written.
-                    let requests = Votes::of(stepper).agree(self.comm);
+                    let requests = OwnRequests::of(stepper).agree(self.comm);
                     if requests.are_wrong {
                         return Ok(LoopEnd::Failed(self.wrong_request(stepper)));
                     }
@@ -358,7 +361,7 @@ impl<'a> Job<'a> {
                 }
                 if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
                     let simulation = stepper.at_full_step();
-                    match energy.look(row, simulation, complete) {
+                    match energy.check_row(row, simulation, complete) {
                         Ok(texts) => {
                             for text in texts {
                                 self.observer.message(&Message::Warning(text));
@@ -379,7 +382,7 @@ impl<'a> Job<'a> {
             if let (Some(reason), false) = (decision.stop, complete) {
                 return Ok(LoopEnd::Stopped(reason));
             }
-            if !complete && let Some(repartition) = balance.look(stepper)? {
+            if !complete && let Some(repartition) = balance.rebalance_if_due(stepper)? {
                 recorder.update_points(stepper.at_full_step())?;
                 self.observer.message(&Message::Repartitioned {
                     number: clock.number(),

@@ -38,7 +38,7 @@ pub struct OutputFile<'a> {
 }
 
 /// History rows of a resumed main result.
-pub type Past = Vec<Vec<f64>>;
+pub type RetainedRows = Vec<Vec<f64>>;
 
 impl<'a> OutputFile<'a> {
     /// Create or resume the file at a path. `history` is the history of the main result and its number of
@@ -53,7 +53,7 @@ impl<'a> OutputFile<'a> {
         order: &IdOrder,
         (start, history): (Start, Option<(&HistoryContents, u64)>),
         metadata: &[(&str, String)],
-    ) -> Result<(Self, Past)> {
+    ) -> Result<(Self, RetainedRows)> {
         let comm = simulation.comm;
         let rows = output_rows(simulation, output, order)?;
         let schedule = Schedule::of_outputs(output);
@@ -77,7 +77,7 @@ impl<'a> OutputFile<'a> {
                     // An error is ignored, because a result without outputs only takes space.
                     let _ = std::fs::remove_file(path);
                 }
-                (created?, Past::new())
+                (created?, RetainedRows::new())
             }
             Start::After(outputs) => ResultFile::resume(path, comm, &contents, history, outputs)?,
         };

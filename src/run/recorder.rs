@@ -84,7 +84,7 @@ impl<'a> Recorder<'a> {
                 }
             }
         }
-        observer.recall(&past);
+        observer.record_past(&past);
         Ok(Self {
             observer,
             order,
@@ -328,7 +328,7 @@ pub fn reasons_for_new_results<const D: usize>(
                         let text = "the checkpoint does not contain this output".to_owned();
                         Ok(is_taken(path).then_some(text))
                     };
-                    let there = found_by_root(simulation.comm, there)?;
+                    let there = check_on_rank_0(simulation.comm, there)?;
                     found.push(Continuation::New(there));
                     continue;
                 }
@@ -429,7 +429,7 @@ fn reason_for_new_result<const D: usize>(
         }
         Ok(changed.map(|lines| format!("history columns have another definition: {lines}")))
     };
-    found_by_root(comm, compare)
+    check_on_rank_0(comm, compare)
 }
 
 /// Check that the first `outputs` outputs of a result file can be read. Return a description of the damage,
@@ -438,7 +438,7 @@ fn reason_for_new_result<const D: usize>(
 /// # Errors
 /// If the result is locked or unreadable.
 pub fn damage(comm: &dyn Communicator, path: &Path, outputs: u64) -> Result<Option<String>> {
-    found_by_root(comm, || {
+    check_on_rank_0(comm, || {
         ResultReader::open(path)?.check(outputs as usize)?;
         Ok(None)
     })
@@ -446,7 +446,7 @@ pub fn damage(comm: &dyn Communicator, path: &Path, outputs: u64) -> Result<Opti
 
 /// Run `check` on rank 0, and return its result on all ranks. A damaged result file gives a reason; a failure
 /// to read the file is an error. Collective.
-fn found_by_root(
+fn check_on_rank_0(
     comm: &dyn Communicator,
     check: impl FnOnce() -> Result<Option<String>>,
 ) -> Result<Option<String>> {

@@ -37,7 +37,7 @@ pub struct Decision {
 
 /// Requests of the observer of this rank.
 #[derive(Debug, Clone, Copy)]
-pub struct Votes {
+pub struct OwnRequests {
     stop: bool,
     is_wrong: bool,
     /// Fingerprint of all load factors that this rank's observer has requested.
@@ -46,14 +46,14 @@ pub struct Votes {
 
 /// Combined requests of the observers of all ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Requests {
+pub struct CombinedRequests {
     /// Whether an observer has requested a stop.
     pub stop: bool,
     /// Whether a request is invalid, or the load factors differ between ranks.
     pub are_wrong: bool,
 }
 
-impl Votes {
+impl OwnRequests {
     /// Collect the requests that this rank's observer has made so far.
     pub fn of<const D: usize>(stepper: &Stepper<'_, D>) -> Self {
         Self {
@@ -63,8 +63,8 @@ impl Votes {
         }
     }
 
-    /// Encode the requests, so that [`Requests::of_maxima`] can decode the element-wise maximum over all
-    /// ranks.
+    /// Encode the requests, so that [`CombinedRequests::of_maxima`] can decode the element-wise maximum over
+    /// all ranks.
     fn entries(self) -> [f64; 4] {
         let flag = |set: bool| f64::from(u8::from(set));
         [
@@ -76,14 +76,14 @@ impl Votes {
     }
 
     /// Combine the requests of all ranks. Collective.
-    pub fn agree(self, comm: &dyn Communicator) -> Requests {
+    pub fn agree(self, comm: &dyn Communicator) -> CombinedRequests {
         let mut entries = self.entries();
         comm.max(&mut entries);
-        Requests::of_maxima(entries)
+        CombinedRequests::of_maxima(entries)
     }
 }
 
-impl Requests {
+impl CombinedRequests {
     fn of_maxima([stop, is_wrong, largest, least]: [f64; 4]) -> Self {
         Self {
             stop: stop > 0.0,
@@ -172,7 +172,7 @@ impl<'a> Watch<'a> {
         &mut self,
         comm: &dyn Communicator,
         step: Option<&Clock>,
-        observer: Votes,
+        observer: OwnRequests,
     ) -> Decision {
         let (then, before) = self.last_decision;
         let per_iteration = then.elapsed().as_secs_f64() / (self.iterations - before).max(1) as f64;
@@ -200,7 +200,7 @@ impl<'a> Watch<'a> {
         ];
         comm.max(&mut votes);
         let [.., stop, is_wrong, largest, least] = votes;
-        let requests = Requests::of_maxima([stop, is_wrong, largest, least]);
+        let requests = CombinedRequests::of_maxima([stop, is_wrong, largest, least]);
         let iterations = (INTERVAL / votes[3].max(1e-9)) as u64;
         self.next_decision = self.iterations + iterations.clamp(1, MAX_ITERATIONS);
         self.last_decision = (Instant::now(), self.iterations);

@@ -50,7 +50,7 @@ impl Expansion {
     fn of(material: &Material, dimension: Dimension) -> Self {
         let (expansion, ratio) = (material.expansion, material.elastic.poisson_ratio);
         Self {
-            stretch_per_kelvin: expansion.in_setting(dimension, ratio),
+            stretch_per_kelvin: expansion.free_stretch_per_kelvin(dimension, ratio),
             reference_temperature: expansion.reference_temperature,
         }
     }
@@ -132,7 +132,7 @@ impl<const D: usize> Model<D> {
     /// Return `force`, a component of the force density on an owned point (N/m³), plus the viscous damping −r
     /// ρ u̇. `velocity` is the same component of the velocity u̇, m/s.
     #[inline]
-    pub fn less_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
+    pub fn with_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
         let damping = self.damping_of(point);
         if damping > 0.0 {
             force - damping * self.density_of(point) * velocity

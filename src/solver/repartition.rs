@@ -54,7 +54,7 @@ impl BalanceWatch {
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
     /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
     /// are freed.
-    pub fn look<const D: usize>(
+    pub fn rebalance_if_due<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
     ) -> Result<Option<Repartition>> {

@@ -13,7 +13,7 @@ use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
-use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
+use super::conditions::{Conditions, PartConditions, Work, apply_initials, are_finite, members};
 use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
@@ -305,7 +305,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         let clock = self.clock;
         self.set_second_half(&clock);
-        let finite = self.walk(|part, mut here| second_half(part, &mut here, clock.step()));
+        let finite =
+            self.walk(|part, mut conditions| second_half(part, &mut conditions, clock.step()));
         if !finite {
             self.note_bad(&clock);
         }
@@ -327,17 +328,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(contact) = &mut self.contact {
             contact.drift(self.clock.time(), step);
         }
-        let finite = self.walk(|part, mut here| {
-            let finite = if half_kick_pending && here.is_empty() && part.damping.is_none() {
+        let finite = self.walk(|part, mut conditions| {
+            let finite = if half_kick_pending && conditions.is_empty() && part.damping.is_none() {
                 verlet::kick_and_drift(part, step)
             } else {
-                let finite = !half_kick_pending || second_half(part, &mut here, step);
-                here.before_moving(part);
+                let finite = !half_kick_pending || second_half(part, &mut conditions, step);
+                conditions.before_moving(part);
                 verlet::half_kick_and_drift(part, step);
-                here.apply_displacements(part);
+                conditions.apply_displacements(part);
                 finite
             };
-            here.apply_temperatures(part);
+            conditions.apply_temperatures(part);
             part.write_bond_inputs();
             finite
         });
@@ -361,7 +362,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// part. Returns whether all calls returned true.
     pub(super) fn walk(
         &mut self,
-        work: impl Fn(&mut Part<'_, D>, Here<'_, D>) -> bool + Sync,
+        work: impl Fn(&mut Part<'_, D>, PartConditions<'_, D>) -> bool + Sync,
     ) -> bool {
         let Self {
             model,
@@ -370,12 +371,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
             conditions,
             ..
         } = self;
-        let (all, on_parts) = conditions.by_part();
+        let (stage, on_parts) = conditions.by_part();
         forces.with_bond_inputs(model.owned(), |bond_inputs| {
             walk(
                 Part::all(model, fields, bond_inputs),
                 on_parts,
-                &|part, on| work(part, Here::new(all, on)),
+                &|part, on| work(part, PartConditions::new(stage, on)),
             )
         })
     }
@@ -383,8 +384,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Evaluate the internal forces at the present displacements. Collective.
     pub fn evaluate(&mut self, bond_update: BondUpdate) {
         self.conditions.set_temperatures(self.clock.time());
-        self.walk(|part, here| {
-            here.apply_temperatures(part);
+        self.walk(|part, conditions| {
+            conditions.apply_temperatures(part);
             part.write_bond_inputs();
             true
         });
@@ -439,8 +440,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// this time (s); 0 if there is no such step.
     pub(super) fn apply_displacements(&mut self, time: f64, step: f64) {
         self.conditions.set_displacements(time, step);
-        self.walk(|part, here| {
-            here.apply_displacements(part);
+        self.walk(|part, conditions| {
+            conditions.apply_displacements(part);
             true
         });
     }
@@ -450,8 +451,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
         self.conditions
             .set_loads(time, self.progress.load_factors.present(), all);
-        self.walk(|part, mut here| {
-            here.apply_loads(part);
+        self.walk(|part, mut conditions| {
+            conditions.apply_loads(part);
             true
         });
     }
@@ -460,11 +461,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// these velocities and reactions are finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
         if self.is_quasi_static() {
-            return self.walk(|part, here| here.project_residual(part));
+            return self.walk(|part, conditions| conditions.project_residual(part));
         }
         self.conditions
             .set_velocities(self.clock.time(), self.clock.step());
-        self.walk(|part, here| here.apply_velocities(part))
+        self.walk(|part, conditions| conditions.apply_velocities(part))
     }
 
     /// Compute the power of viscous damping at the present velocities.
@@ -592,11 +593,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
 /// Complete a step of length `step` (s) with the forces at the new positions: loads, second half kick,
 /// supports and work. Returns whether all velocities and reactions are finite.
-fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, step: f64) -> bool {
-    here.apply_loads(part);
+fn second_half<const D: usize>(
+    part: &mut Part<'_, D>,
+    conditions: &mut PartConditions<'_, D>,
+    step: f64,
+) -> bool {
+    conditions.apply_loads(part);
     let finite = verlet::second_half_kick(part, step);
-    let finite = here.apply_velocities(part) && finite;
-    here.add_work(part, Work::Trapezoid);
+    let finite = conditions.apply_velocities(part) && finite;
+    conditions.add_work(part, Work::Trapezoid);
     part.add_damped_energy(step);
     finite
 }

@@ -51,7 +51,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
     }
     let (step, steps) = match time.step {
         StepRule::Fixed(step) => {
-            follows_damping(problem, "step", &problem.places.step, step)?;
+            follows_damping(problem, "step", &problem.spans.step, step)?;
             (step, steps_to(length, step))
         }
         StepRule::Automatic(_) if stable.is_infinite() => {
@@ -84,7 +84,7 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
         "[grid] horizon: no point has a neighbour, so there is no {missing}; check that the horizon is in metres and \
          exceeds the spacing{scale}"
     );
-    Error::input(message).at(&problem.places.horizon)
+    Error::input(message).at(&problem.spans.horizon)
 }
 
 /// Return the given step (s) and number of steps of a stage of duration `length` (s). Return an error if the
@@ -95,7 +95,7 @@ fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Resul
             "[time] end: {} s take {steps:.1e} steps of {step:.1e} s; at most {MOST_STEPS:.0e} steps are allowed",
             format_number(length)
         );
-        return Err(Error::input(message).at(&problem.places.step));
+        return Err(Error::input(message).at(&problem.spans.step));
     }
     Ok((step, steps))
 }
@@ -108,7 +108,7 @@ const MOST_REPEATS: f64 = 100.0;
 /// of the stage (s), and `step` is the step without the rule (s).
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
-    let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));
+    let error = |message: String| Err(Error::input(message).at(&problem.spans.adaptive));
     if length / smallest > MOST_STEPS {
         return error(format!(
             "[time] adaptive smallest: {} s take {:.1e} steps of {smallest:.1e} s; at most {MOST_STEPS:.0e} steps are allowed",
@@ -129,7 +129,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     follows_damping(
         problem,
         "adaptive largest",
-        &problem.places.adaptive,
+        &problem.spans.adaptive,
         largest,
     )
 }

@@ -31,7 +31,7 @@ pub fn check_conditions<const D: usize>(
         .iter()
         .map(|condition| members(problem, &simulation.model, condition.set))
         .collect();
-    twice_prescribed(simulation, &points, warnings);
+    overridden_motions(simulation, &points, warnings);
     without_effect(simulation, &points, warnings);
     for (condition, points) in problem.conditions.iter().zip(&points) {
         if condition.depth == Some(Depth::Spacing) {
@@ -62,7 +62,7 @@ fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
 }
 
 /// Warn of prescribed motions that a later condition with other values overrides.
-fn twice_prescribed<const D: usize>(
+fn overridden_motions<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
     warnings: &mut Vec<Warning>,
@@ -85,8 +85,8 @@ fn twice_prescribed<const D: usize>(
             if components.is_empty() {
                 continue;
             }
-            let taken = |point: &&u32| points[earlier].binary_search(point).is_ok();
-            let common = points[later].iter().filter(taken).count();
+            let is_common = |point: &&u32| points[earlier].binary_search(point).is_ok();
+            let common = points[later].iter().filter(is_common).count();
             let common = total(simulation.comm, common as u64);
             if common > 0 {
                 let words = format!(

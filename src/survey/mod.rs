@@ -59,7 +59,7 @@ pub struct Survey {
     /// Figures of each body.
     pub bodies: Vec<BodyFigures>,
     /// Number of bonds between each pair of bonded bodies; the lower body index comes first.
-    pub joints: Vec<([usize; 2], u64)>,
+    pub bonds_between_bodies: Vec<([usize; 2], u64)>,
     /// Number of bonds cut by each pre-crack.
     pub cuts: Vec<u64>,
     /// The point nearest to each probe.
@@ -78,8 +78,8 @@ impl Survey {
         let bodies = bodies::figures(simulation, &mut warnings);
         horizons(problem, &bodies, &mut warnings);
         stretches(problem, &mut warnings);
-        let joints = joints(simulation);
-        touching_joints(problem, &joints, &mut warnings);
+        let bonds_between_bodies = bonds_between_bodies(simulation);
+        bonded_with_contact(problem, &bonds_between_bodies, &mut warnings);
         let mut cuts = simulation.undeformed.cut.clone();
         comm.sum(&mut cuts);
         cuts.iter_mut().for_each(|ends| *ends /= 2);
@@ -101,7 +101,7 @@ impl Survey {
         time(simulation, &mut warnings);
         Self {
             bodies,
-            joints,
+            bonds_between_bodies,
             cuts,
             probes,
             sets,
@@ -111,7 +111,7 @@ impl Survey {
 }
 
 /// Return the number of bonds of each pair of different bodies, over all ranks.
-fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
+fn bonds_between_bodies<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
     let count = simulation.problem.bodies.len();
     let mut bonds = vec![0; count * count];
     for (blocks, own) in simulation.forces.bonds_of_blocks() {
@@ -128,11 +128,15 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
 
 /// Warn of pairs of bodies that have contact, and are bonded although the deck has no `[interface.pair]`
 /// for them.
-fn touching_joints(problem: &Problem, joints: &[([usize; 2], u64)], warnings: &mut Vec<Warning>) {
+fn bonded_with_contact(
+    problem: &Problem,
+    bonds_between_bodies: &[([usize; 2], u64)],
+    warnings: &mut Vec<Warning>,
+) {
     let Some(contact) = &problem.contact else {
         return;
     };
-    for (pair, bonds) in joints {
+    for (pair, bonds) in bonds_between_bodies {
         let [first, second] = pair.map(|body| &problem.bodies[body]);
         let is_chosen = problem.interface.pair(first, second).is_some();
         if is_chosen || contact.between(first, second).is_none() {
@@ -170,7 +174,7 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
                 format_number(body.horizon),
                 format_number((100.0 * horizon).round() / 100.0)
             );
-            warnings.push(Warning::new(message).at(&body.horizon_place));
+            warnings.push(Warning::new(message).at(&body.horizon_span));
         }
     }
 }
@@ -349,14 +353,14 @@ fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: 
 
 fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let problem = simulation.problem;
-    let places = &problem.places;
+    let spans = &problem.spans;
     let mut warn = |place, message: String| warnings.push(Warning::new(message).at(place));
     let clock = simulation.clock;
     let (step, stable) = (clock.step(), simulation.scaled_stable_step());
     if step > stable && !simulation.is_quasi_static() {
         let message =
             format!("[time] step: {step:.4e} s is larger than the stable step, {stable:.4e} s");
-        warn(&places.step, message);
+        warn(&spans.step, message);
     }
     let rule = simulation.time_rule().adaptive;
     if let Some(largest) = rule.and_then(|rule| rule.largest)
@@ -365,7 +369,7 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
         let message = format!(
             "[time] adaptive largest: {largest:.4e} s is larger than the stable step, {stable:.4e} s"
         );
-        warn(&places.step, message);
+        warn(&spans.step, message);
     }
     let last = simulation.last_step();
     if last > MANY_STEPS {
@@ -374,14 +378,14 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
              densities",
             last as f64
         );
-        warn(&places.end, message);
+        warn(&spans.end, message);
     }
     if last < FEW_STEPS && !simulation.is_quasi_static() {
         let message = format!(
             "[time] end: the run has only {last} step(s) of {step:.4e} s; check the units of the end, the lengths and \
              the moduli"
         );
-        warn(&places.end, message);
+        warn(&spans.end, message);
     }
     for output in problem.outputs() {
         if let Some(Interval::Seconds(every)) = output.every

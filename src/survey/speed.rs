@@ -110,7 +110,9 @@ fn exchange_without_overlap<const D: usize>(
     barrier(comm);
     for _ in 0..times {
         let displacement = &mut simulation.fields.displacement;
-        simulation.forces.update_ghosts(comm, displacement);
+        simulation
+            .forces
+            .update_ghost_displacements(comm, displacement);
     }
     since(before, simulation.forces.halo().sent)
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the energy that separates a body over the direction of separation, for several laws and damage criteria.
+"""Plots the separation energy of a body against the direction of separation, for several laws and damage criteria.
 
 Builds and runs examples/parting.rs, which separates the two halves of a small block. Prints the separation energies as
 fractions of the fracture energy, at increasing angles between the direction of separation and the normal of the crack:

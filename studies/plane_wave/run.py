@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The effect of a refined patch on a plane wave, beside table 3 of Dipasquale et al. (2014).
+"""The effect of a refined patch on a plane wave, compared with table 3 of Dipasquale et al. (2014).
 
 Runs inputs/plane_wave_refined.toml without refinement, and with 1 to 3 levels for both rules of convergence (`delta`
 and `delta-m`). Compares two quantities of the refined and the uniform grid: the energy densities when the crest of the
@@ -9,8 +9,8 @@ Four interpretations of the paper are run:
 1. Each level is two horizons wide, the energies of refined nodes are compared (caption of table 3), and each end of a
    bond uses the horizon of its own level.
 2. Each level is one horizon wide, and the energies of all nodes in the patch are compared.
-3. As 2, but bonds between levels use the mean of the two horizons.
-4. As 2, but without the enlarged horizon at interfaces (figure 5b); only for the rule `delta`.
+3. Same as 2, but bonds between levels use the mean of the two horizons.
+4. Same as 2, but without the enlarged horizon at interfaces (figure 5b); only for the rule `delta`.
 """
 
 import pathlib
@@ -53,7 +53,7 @@ def horizons(rule, level):
 
 
 def deck(rule, levels, margin, factor, bonds, seen, end):
-    """Return the text of the deck with an output at the time `seen`; 0 levels mean no refinement.
+    """Return the text of the deck with an output at the time `seen` and the end at `end`; 0 levels mean no refinement.
 
     The patch of each level has a radius of `margin` horizons of the next coarser level. `factor` is the value of the key
     `interface_factor` (None for its default), and `bonds` the value of the key `bonds`.

@@ -75,8 +75,8 @@ set = "ends"
 displacement = {displacement}
 """
 
-# The opening at the end exceeds the stretch at which the last bond breaks. Each of the steps opens the crack by a small
-# part of this stretch, so bonds break near their thresholds.
+# The final opening is large enough to break the last bond. Each step adds a small part of this opening, so bonds break
+# near their thresholds.
 SEPARATION = """\
 [damage.brittle]
 {criterion}
@@ -155,7 +155,7 @@ def stiffness(options, law, across, load):
 
 
 def separation(options, law, across):
-    """Return the energy of the broken bonds of a bar whose halves were moved apart, divided by that of the section."""
+    """Return the energy of the broken bonds of a bar whose halves were moved apart, divided by G₀ times the section."""
     rule = "energy" if law.startswith("correspondence") else "critical_stretch"
     text = bar(law, across, 14) + SEPARATION.format(criterion=f"{rule} = {{ fracture_energy = {TOUGHNESS}, alpha = 0 }}", opening=6e-3, step=1.5e-6)
     text = text.replace('material = "solid"', 'material = "solid"\ndamage = "brittle"')

@@ -228,7 +228,8 @@ fn refined_points_are_matched_by_id() {
     }
 }
 
-/// Return the parts of the line about displacements, for the points with equal ids.
+/// Return the largest difference of the displacements of points with equal ids, as text. The bars separate
+/// the parts that `compare` prints in one line.
 fn largest_difference(first: &Path, second: &Path) -> String {
     let readers = [first, second].map(open);
     let (mut largest, mut found) = (0.0, String::new());

@@ -1,4 +1,4 @@
-//! Runs started from Rust, with and without a deck, behave as runs of the command.
+//! Runs started from Rust, with and without a deck, behave like runs of the command.
 
 use std::path::Path;
 use std::time::Duration;

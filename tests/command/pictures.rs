@@ -160,7 +160,7 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
     );
 }
 
-/// A file name that the pictures of a test share, and the pictures with given options.
+/// A result, and the path of the picture that each drawing of a test overwrites.
 struct Drawings {
     result: PathBuf,
     picture: PathBuf,
@@ -436,7 +436,8 @@ fn cameras_look_at_solids_from_any_side() {
     let isometric = pixels(block.draw(&["--deform", "0"]));
     height("-45,35.264389682754654");
     assert_eq!(pixels(&block.picture), isometric);
-    // The block has edges of 6, 4 and 3 mm. The widths are equal, so the heights are 4/6, 3/6 and 3/4 of them.
+    // The block has edges of 6, 4 and 3 mm. The widths are equal, so the heights are 4/6, 3/6 and 3/4 of the
+    // width.
     let [above, front, side] = ["-90,90", "-90,0", "0,0"].map(height);
     assert!(front < above && above < side, "{front} {above} {side}");
     block.reject(

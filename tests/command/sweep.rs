@@ -123,7 +123,7 @@ fn combinations_are_run_and_tabled() {
     assert_eq!(numbers(column(&table, "last_broken_bonds")), [0.0; 4]);
     assert!(sweep.folder.join("here/max_kinetic_energy.png").exists());
 
-    // The same command runs nothing. Another value of a parameter runs only the missing runs.
+    // Repeating the same command starts no run. A further value of a parameter starts only the missing runs.
     let history = sweep.folder.join("here/speed=1,dx=1e-3/history.csv");
     let before = modified(&history);
     let printed = succeed(&mut sweep.command(&options));

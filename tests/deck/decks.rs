@@ -122,7 +122,7 @@ fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
 
 #[test]
 fn a_deck_with_its_defaults_written_out_has_the_same_grid() {
-    // Cells from 0 do not fill the first body, so the origins of the grids are in its corner.
+    // Cells that start from 0 do not fit the first body, so the grids start in the corner of this body.
     let count = |corner: &str, fine: &str| {
         let text = format!(
             "dimension = 'plane-stress'

@@ -1009,7 +1009,7 @@ fn what_perilab_would_read_otherwise_is_named() {
     );
     let losses = folder.import("strip.yaml", STRIP).unwrap().losses();
     assert_eq!(losses.columns, [5], "{losses}");
-    // Without a row of its block, a deck has no body.
+    // If the file has no row of the block of the deck, the new deck would have no body.
     folder.write("strip.txt", "header: x y block_id volume\n0 0 11 0.5\n");
     let error = folder.import("strip.yaml", STRIP).unwrap_err();
     assert!(

@@ -12,7 +12,7 @@ use crate::support::command::{Folder, finish, fissure, succeed, text};
 use crate::support::datasets::{datasets, difference};
 use crate::support::recorded::record;
 
-/// A mesh with the rectangles [0, 4] × [0, 2] and [0, 1] × [4, 5] of squares with the edges 1 and 0.5.
+/// Write a mesh with the rectangles [0, 4] × [0, 2] and [0, 1] × [4, 5] of squares with the edges 1 and 0.5.
 fn write_mesh(path: &Path) {
     let (mut nodes, mut elements) = (Vec::new(), Vec::new());
     let mut add = |corner: [f64; 2], edge: f64, counts: [usize; 2], group: u32| {
@@ -45,8 +45,9 @@ fn write_mesh(path: &Path) {
     std::fs::write(path, text).unwrap();
 }
 
-/// Plane stress, with the bodies `coarse` and `fine` of the mesh, a body of two points from a file, and
-/// a lattice of cells with different edges.
+/// Write a plane-stress deck, and return its path. The deck has the bodies `coarse` and `fine` of the mesh, a
+/// body of two points from a file, and a lattice of cells with different edges. `of_fine` is the horizon of
+/// `fine`.
 fn four_bodies(folder: &Folder, of_fine: &str) -> PathBuf {
     write_mesh(&folder.join("two.msh"));
     folder.write("points.csv", "x,y,volume\n9,0,0.2\n9,1,0.4\n");
@@ -98,7 +99,7 @@ fn a_horizon_is_a_multiple_of_the_mean_spacing_of_each_body() {
             assert_eq!(problem.horizon, alone.horizon);
         }
     }
-    // The deck with all defaults has numbers and needs no mesh.
+    // The deck that `explain` writes has horizons as numbers, so it needs no mesh.
     let full = deck::read(&deck, &[]).unwrap().explain().unwrap();
     std::fs::remove_file(folder.join("two.msh")).unwrap();
     let full = Deck::new(Source::new("full.toml", full)).unwrap();

@@ -686,7 +686,7 @@ fn entities_are_the_groups_of_a_mesh_without_physical_groups() {
     for (_, physical, ..) in &mut written.elements {
         *physical = 0;
     }
-    // The cubes are the volumes 1 and 2, and the faces have a physical group.
+    // The cubes are the volumes 1 and 2. One of the two faces has a physical group.
     written.elements[0].1 = 7;
     for (encoding, bytes) in written.all() {
         let path = folder.write("two.msh", &bytes);
@@ -704,7 +704,7 @@ fn entities_are_the_groups_of_a_mesh_without_physical_groups() {
         assert_eq!(blocks, [1, 0], "{encoding}");
         assert_eq!(ids(&problem, "face"), [0], "{encoding}");
         assert_eq!(ids(&problem, "edge"), [1], "{encoding}");
-        // The tag of a surface without a physical group is no group, because another surface has one.
+        // The other face, surface 2, is not a group, because a surface has a physical group.
         let mesh = parse("two.msh", &bytes).unwrap();
         let second = GroupKey::Name("surface 2".to_owned());
         assert!(
@@ -714,8 +714,8 @@ fn entities_are_the_groups_of_a_mesh_without_physical_groups() {
     }
 }
 
-/// A geometrical entity never replaces a physical group: it has no name, and a number alone stands for the
-/// group.
+/// A geometrical entity never replaces a physical group: the entity never has the name of a group, and a
+/// number alone means the physical group.
 #[test]
 fn physical_groups_precede_entities() {
     let mut written = two_cubes();
@@ -1162,7 +1162,7 @@ fn a_plate_of_a_mesh_has_equal_bits_on_two_ranks() {
     let first = problem();
     let alone = record(&first, 1, 1);
     assert_eq!(record(&problem(), 2, 1).datasets, alone.datasets);
-    // Use the points of an earlier run again.
+    // Run the same problem again, whose sets already have their points.
     assert_eq!(record(&first, 3, 1).datasets, alone.datasets);
     // The area is the square minus a regular polygon of 48 sides, the hole.
     let hole = 0.5 * 48.0 * 64.0 * (std::f64::consts::TAU / 48.0).sin();
@@ -1742,7 +1742,7 @@ fn spheres() -> Exodus {
 fn spheres_of_exodus_become_points_with_their_volume() {
     let folder = Folder::new("mesh-spheres");
     let mut named = spheres();
-    // The name of an attribute counts more than its position.
+    // The name of an attribute takes precedence over its position.
     named
         .texts
         .push(("attrib_name1", vec!["SPHERE_VOLUME", "other"]));
@@ -1799,7 +1799,7 @@ fn spheres_without_a_volume_are_an_error() {
             format!("[body.a] points block: `block_1` has {need}")
         );
     }
-    // The spheres of a block without volumes are not lost beside other elements.
+    // Spheres without volumes are an error even if another block has elements with volumes.
     let mut mixed = spheres();
     mixed.reals.truncate(4);
     let path = folder.write("mixed.e", &mixed.classic(1));

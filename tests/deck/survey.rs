@@ -3,7 +3,7 @@
 
 use crate::support::command::Folder;
 use crate::support::{problem, simulate, simulate_on};
-use fissure::families::CellShare;
+use fissure::families::VolumeFactors;
 use fissure::problem::VolumeCorrection;
 use fissure::solver::steps::even_clock;
 use fissure::survey::{Cost, Survey, dry_run, interior, size};
@@ -96,7 +96,7 @@ fn figures_of_bodies_cracks_and_probes() {
             }
         }
     }
-    assert_eq!(found.joints, [([0, 1], joint)]);
+    assert_eq!(found.bonds_between_bodies, [([0, 1], joint)]);
     assert_eq!(found.cuts, cut);
     assert_eq!(found.probes[0].id, 0);
     assert!((found.probes[0].distance - 0.02_f64.sqrt()).abs() < 1e-15);
@@ -104,7 +104,7 @@ fn figures_of_bodies_cracks_and_probes() {
     for ranks in [2, 3] {
         for other in survey(ranks) {
             assert_eq!(other.bodies, found.bodies);
-            assert_eq!(other.joints, found.joints);
+            assert_eq!(other.bonds_between_bodies, found.bonds_between_bodies);
             assert_eq!((&other.cuts, &other.sets), (&found.cuts, &found.sets));
             assert_eq!(other.probes[0].id, found.probes[0].id);
         }
@@ -380,14 +380,14 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
         // Expected bulk modulus, divided by the exact one: Σ |ξ| Ṽ over the family, divided by the integral
         // of |ξ| over the ball, disc or interval of radius δ.
         let count = exact.dimension.count();
-        let share = CellShare::new(VolumeCorrection::Exact, 3.0, 1.0, count);
+        let factors = VolumeFactors::new(VolumeCorrection::Exact, 3.0, 1.0, count);
         let range = |k: usize| if k < count { -5..=5 } else { 0..=0 };
         let mut sum = 0.0;
         for [x, y, z] in range(0)
             .flat_map(|x| range(1).flat_map(move |y| range(2).map(move |z| [x, y, z])))
             .map(|cell: [i32; 3]| cell.map(f64::from))
         {
-            sum += (x * x + y * y + z * z).sqrt() * share.at([x, y, z]);
+            sum += (x * x + y * y + z * z).sqrt() * factors.at([x, y, z]);
         }
         let pi = std::f64::consts::PI;
         let whole = [9.0, 18.0 * pi, 81.0 * pi][count - 1];

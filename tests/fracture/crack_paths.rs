@@ -7,7 +7,7 @@ use crate::support::command::{Folder, finish, fissure, succeed, text};
 use crate::support::history::column;
 use crate::support::{simulate, simulate_on};
 
-/// Return the branches of the only crack, and its columns of the history.
+/// Return the branches of the only crack, and its length (m) and number of branches from the history.
 fn crack(simulation: &mut Simulation<2>) -> (Vec<Branch>, [f64; 2]) {
     let mut observer = HistoryObserver::new(simulation).unwrap_or_else(|error| panic!("{error}"));
     let snapshot = Snapshot::new(simulation);

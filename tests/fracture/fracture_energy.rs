@@ -1,5 +1,5 @@
 //! The energy that separating a body along a plane dissipates, compared with the fracture energy, for damage
-//! by stretch, by energy and of softening bonds.
+//! by stretch and by energy, and for softening bonds.
 //!
 //! The opening is multiplied by a factor in each step, so the stretch at which a bond breaks is too large by
 //! up to this factor. The overshoot energy of the bond is not counted. The remaining error is the quadrature
@@ -458,7 +458,7 @@ fn of_mixed_modes_of_correspondence() {
         let either = of(law, "energy tension_only = false");
         assert!(both.contains(&either), "{law}: {either}");
     }
-    // This effect is smaller if each bond has its own deformation gradient.
+    // The delay is smaller if each bond has its own deformation gradient.
     let associated = of(&format!("bond_associated_{CORRESPONDENCE}"), ENERGY);
     assert!((0.85..0.98).contains(&associated), "{associated}");
 }

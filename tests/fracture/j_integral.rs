@@ -1,4 +1,5 @@
-//! J integrals of plane problems in the history: equal boxes, closed-form solutions, boxes without a crack tip, equal bits.
+//! J integrals of plane problems in the history: agreement between boxes, closed-form solutions, boxes
+//! without a crack tip, equal bits.
 
 use std::f64::consts::PI;
 
@@ -18,9 +19,9 @@ fn equilibrium<const N: usize>(deck: &str, names: [&str; N]) -> [f64; N] {
     })
 }
 
-/// Return the deck of a strip of 190 mm by 20 mm between rigid grips that are moved apart. The crack runs from
-/// the left end to x = 0. The column `field_ahead_integral` is the strain energy of a strip of 4 mm far ahead of
-/// the tip.
+/// Return the deck of a strip of 190 mm by 20 mm between rigid grips that are moved apart. The crack runs
+/// from the left end to x = 0. The column `field_ahead_integral` is the strain energy of a strip of 4 mm far
+/// ahead of the tip.
 fn strip(law: &str, grid: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -87,8 +88,8 @@ fn the_energy_ahead_is_released_in_correspondence_laws() {
     check_strip("correspondence = { poisson_ratio = 0.3", "");
 }
 
-/// Return K²/E (J/m²) of an edge crack of length `a` (m) in a long strip of the given width (m) under the stress
-/// `s` (Pa), from the formula of Tada, Paris & Irwin (2000, p. 52), whose error is below 0.5 %.
+/// Return K²/E (J/m²) of an edge crack of length `a` (m) in a long strip of the given width (m) under the
+/// stress `s` (Pa), from the formula of Tada, Paris & Irwin (2000, p. 52), whose error is below 0.5 %.
 fn edge_crack(s: f64, a: f64, width: f64) -> f64 {
     let angle = 0.5 * PI * a / width;
     let curve = 0.752 + 2.02 * a / width + 0.37 * (1.0 - angle.sin()).powi(3);
@@ -96,8 +97,8 @@ fn edge_crack(s: f64, a: f64, width: f64) -> f64 {
     (s * factor).powi(2) * PI * a / YOUNGS_MODULUS
 }
 
-/// Return the J integrals of three boxes divided by [`edge_crack`], for an edge crack of 13 mm in a plate 40 mm
-/// wide and 80 mm high under 0.1 MPa.
+/// Return the J integrals of three boxes divided by [`edge_crack`], for an edge crack of 13 mm in a plate 40
+/// mm wide and 80 mm high under 0.1 MPa.
 fn edge_cracked_plate(law: &str, spacing: f64) -> [f64; 3] {
     let depth = 3.0 * spacing;
     let deck = format!(
@@ -128,9 +129,10 @@ fn edge_cracked_plate(law: &str, spacing: f64) -> [f64; 3] {
     relative
 }
 
-/// Check that the boxes agree within `spread`, and that J differs from K²/E by at most `most`. Measured spreads
-/// are 0.0037 and 0.0004 at the two spacings, and measured differences 6.2 % and 3.4 %. They are those of the
-/// field: surfaces are soft, and the crack is cut between points.
+/// Check that the boxes agree within `spread`, and that J differs from K²/E by at most `most`. Measured
+/// spreads are 0.0037 and 0.0004 at the two spacings, and measured differences 6.2 % and 3.4 %. The
+/// differences from K²/E are errors of the computed displacements: surfaces are soft, and the crack lies
+/// between points.
 fn check_edge_crack(law: &str, spacing: f64, [spread, most]: [f64; 2]) {
     let relative = edge_cracked_plate(law, spacing);
     for value in relative {
@@ -216,7 +218,8 @@ fn the_integral_has_equal_bits_on_any_ranks_and_threads() {
 }
 
 /// Return a compact tension specimen of the width W = 50 mm as a mesh of Gmsh, with n squares along W. The
-/// load line is x = 0. The mesh is 1.25 W long and 1.2 W high; the groups of the pins are discs of the diameter W/4.
+/// load line is x = 0. The mesh is 1.25 W long and 1.2 W high; the groups of the pins are discs of the
+/// diameter W/4.
 fn compact_tension(n: i32) -> String {
     let h = 0.05 / f64::from(n);
     let (columns, rows) = (5 * n / 4, 6 * n / 5);
@@ -258,8 +261,8 @@ fn compact_tension(n: i32) -> String {
     )
 }
 
-/// The stress intensity factor of a compact tension specimen agrees with ASTM E399, whose formula has an error
-/// of 0.5 %. Measured K with 40 squares along the width: +2.8 % (`pmb`), −0.3 % (`ordinary`).
+/// The stress intensity factor of a compact tension specimen agrees with ASTM E399, whose formula has an
+/// error of 0.5 %. Measured K with 40 squares along the width: +2.8 % (`pmb`), −0.3 % (`ordinary`).
 #[test]
 fn a_compact_tension_specimen_of_a_mesh_has_the_stress_intensity_factor_of_astm() {
     let folder = Folder::new("compact-tension");

@@ -93,10 +93,10 @@ fn a_crack_through_a_thick_strip_releases_the_energy_ahead_of_it() {
     check_strip("ordinary = { poisson_ratio = 0.2");
 }
 
-/// With u_z = 0, a slab is in plane strain. Energy and integrals of the slab are 0.5 % smaller than in the plane
-/// problem. J also agrees with the energy of the slab. J of the two outer layers of points, whose families are
-/// incomplete, is 4 % smaller than J of the two inner layers. The box `outermost` has a weight in one outer layer
-/// only. The box `part` has the weights 0.75, 1, 0.5 and 0 in the four layers.
+/// With u_z = 0, a slab is in plane strain. Energy and integrals of the slab are 0.5 % smaller than in the
+/// plane problem. J also agrees with the energy of the slab. J of the two outer layers of points, whose
+/// families are incomplete, is 4 % smaller than J of the two inner layers. The box `outermost` has a weight
+/// in one outer layer only. The box `part` has the weights 0.75, 1, 0.5 and 0 in the four layers.
 #[test]
 fn a_slab_without_strain_across_it_has_the_integral_of_plane_strain() {
     let law = "correspondence = { poisson_ratio = 0.3";
@@ -124,9 +124,9 @@ fn a_slab_without_strain_across_it_has_the_integral_of_plane_strain() {
     assert!((part / expected - 1.0).abs() < 1e-9, "{part} {expected}");
 }
 
-/// A crack front along the diagonal of a block between rigid grips. As in a long strip, the crack releases the
-/// energy per area ahead of it. Displacements in the plane of the crack are 0, so the sides of the block do not
-/// disturb the uniform strain ahead.
+/// A crack front along the diagonal of a block between rigid grips. As in a long strip, the crack releases
+/// the energy per area ahead of it. Displacements in the plane of the crack are 0, so the sides of the block
+/// do not disturb the uniform strain ahead.
 #[test]
 fn a_front_along_the_diagonal_of_a_block_releases_the_energy_ahead_of_it() {
     let deck = "dimension = '3d'
@@ -161,8 +161,8 @@ fn a_front_along_the_diagonal_of_a_block_releases_the_energy_ahead_of_it() {
     }
 }
 
-/// Return the J integrals at both positions of the front of a penny-shaped crack, J/m², and the strain energy, J. The
-/// radius is given in spacings of 1 mm.
+/// Return the J integrals at both positions of the front of a penny-shaped crack, J/m², and the strain
+/// energy, J. The radius is given in spacings of 1 mm.
 fn penny(radius: u8) -> [f64; 3] {
     let names = ["j_integral_at_x", "j_integral_at_y", "strain_energy"];
     let radius = format!("{radius}e-3");
@@ -179,9 +179,9 @@ fn penny(radius: u8) -> [f64; 3] {
     )
 }
 
-/// The stress intensity factor is that of a penny-shaped crack in a long cylinder (Tada, Paris & Irwin 2000). The
-/// difference of 9.3 % is an error of the computed displacements: with cracks of different radii, the derivative of
-/// the strain energy by the area of the crack, at a constant load, agrees with J.
+/// The stress intensity factor is that of a penny-shaped crack in a long cylinder (Tada, Paris & Irwin 2000).
+/// The difference of 9.3 % is an error of the computed displacements: with cracks of different radii, the
+/// derivative of the strain energy by the area of the crack, at a constant load, agrees with J.
 #[test]
 fn a_penny_releases_the_energy_of_its_stress_intensity_along_its_front() {
     let (radius, outer, tension) = (6e-3_f64, 18e-3, 10e6);
@@ -201,8 +201,8 @@ fn a_penny_releases_the_energy_of_its_stress_intensity_along_its_front() {
     assert!((at_x / released - 1.0).abs() < 0.02, "{at_x} {released}");
 }
 
-/// The displacements are those of a plane problem, and the law has no error at surfaces. The mean along the whole
-/// front, which ends at the surfaces of a refined body, is therefore J in the middle.
+/// The displacements are those of a plane problem, and the law has no error at surfaces. The mean along the
+/// whole front, which ends at the surfaces of a refined body, is therefore J in the middle.
 #[test]
 fn a_front_ends_at_the_surface_of_a_refined_body() {
     let deck = "dimension = '3d'
@@ -279,8 +279,8 @@ fn the_integral_has_equal_bits_on_any_ranks_and_threads() {
     }
 }
 
-/// Integrals that differ only in `front` are inversely proportional to the lengths of the fronts. The points need
-/// not lie at the centres of their cells, and the surfaces need not be perpendicular to the front.
+/// Integrals that differ only in `front` are inversely proportional to the lengths of the fronts. The points
+/// need not lie at the centres of their cells, and the surfaces need not be perpendicular to the front.
 #[test]
 fn a_front_is_as_long_as_the_body() {
     for grid in ["", ", quadrature = 'gauss'", ", jitter = 0.3"] {

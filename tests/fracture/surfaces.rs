@@ -103,7 +103,7 @@ impl Block {
     }
 }
 
-/// As [`Block::strength`], for the bonds whose ends satisfy `counts`. Strains grow by 1 % per step.
+/// Same as [`Block::strength`], for the bonds whose ends satisfy `counts`. Strains grow by 1 % per step.
 fn strength<const D: usize>(
     text: &str,
     across: f64,

@@ -1,4 +1,5 @@
-//! Correspondence laws: strains and stresses up to rounding, also in incomplete families; zero-energy modes.
+//! Correspondence laws: homogeneous strains are exact up to rounding, also in incomplete families; control of
+//! zero-energy modes.
 
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -36,7 +37,7 @@ fn deck_of(name: &str, dimension: &str, law: &str, size: usize, horizon: f64) ->
     )
 }
 
-/// Return laws with their Hooke matrices in Voigt order.
+/// Return the keys of laws with their Hooke matrices in Voigt order.
 fn laws(dimension: &str) -> Vec<(String, Matrix6<f64>)> {
     let (young, ratio) = (5.0, 0.3);
     let shear = young / (2.0 * (1.0 + ratio));
@@ -105,8 +106,8 @@ fn stress(hooke: &Matrix6<f64>, strain: &Matrix3<f64>) -> Matrix3<f64> {
     stress
 }
 
-/// Return the Hooke matrix of a material with rotated axes: rotate the strain to the axes of the material,
-/// and rotate the stress back.
+/// Return the Hooke matrix of a material whose axes are rotated by Euler angles about z, x and z (rad). The
+/// strain is rotated to the axes of the material, and the stress is rotated back.
 fn turned(own: &Matrix6<f64>, [a, b, c]: [f64; 3]) -> Matrix6<f64> {
     let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
     let turn = about(Vector3::z_axis(), a) * about(Vector3::x_axis(), b);
@@ -149,7 +150,7 @@ fn check_affine<const D: usize>(
     let stresses = snapshot.field(&mut simulation, Field::Stress);
     let gradients = snapshot.field(&mut simulation, Field::DeformationGradient);
     if D == 2 {
-        // The law does not define the stress across the plane.
+        // Other tests check the stress across the plane.
         kirchhoff[(2, 2)] = 0.0;
     }
     for point in 0..simulation.model.owned() {

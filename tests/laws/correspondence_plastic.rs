@@ -1,4 +1,4 @@
-//! J2 plasticity in correspondence, compared with one-dimensional curves, under rotation, and in dynamics.
+//! J2 plasticity of correspondence laws: comparison with one-dimensional curves, rotation, and dynamics.
 
 use fissure::problem::Field;
 use fissure::solver::Simulation;
@@ -102,8 +102,9 @@ fn cycle() -> impl Iterator<Item = f64> {
     })
 }
 
-/// Follow a cycle. `motion` returns the displacement gradient for a strain and a strain across. If `free`,
-/// the strain across is chosen so that the first normal stress across is 0.
+/// Follow a cycle, and compare stress and dissipation with `curve`. `motion` returns the displacement
+/// gradient for a strain and a lateral strain. If `free`, the lateral strain is chosen so that the stress yy
+/// is 0.
 fn follow<const D: usize>(
     mut simulation: Simulation<D>,
     mut curve: Curve,

@@ -6,8 +6,8 @@ use fissure::elastic::Isotropic;
 use fissure::expression::Expression;
 use fissure::material::{Declaration, Key, Kind, declarations};
 use fissure::problem::{
-    Calibration, Damage, DamageRule, Law, Material, Problem, Sense, Shape, StepRule, Toughness,
-    VolumeCorrection, WorkMeasure, WorkRule,
+    BreakableBonds, Calibration, Damage, DamageRule, Law, Material, Problem, Shape, StepRule,
+    Toughness, VolumeCorrection, WorkMeasure, WorkRule,
 };
 use fissure::solver::Simulation;
 
@@ -156,7 +156,7 @@ fn a_law_of_a_problem_in_rust_is_checked_before_the_run() {
     let found = fault::<1>(&body(line, law("ordinary"), None)).unwrap();
     assert!(found.contains("has no 1-D form"), "{found}");
     let work = WorkRule {
-        sense: Sense::Pulled,
+        breakable: BreakableBonds::Stretched,
         family_correction: 0.0,
         measure: WorkMeasure::Displacement,
     };

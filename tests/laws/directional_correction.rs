@@ -11,8 +11,8 @@ const YOUNG: f64 = 5.0;
 const HORIZON: f64 = 3.0;
 const EDGES: [i32; 3] = [5, 4, 3];
 
-/// Displacement gradient. The sums below are linear in it. Their relative error is about its size, 4e-6, so
-/// energies are compared to 1e-5.
+/// Displacement gradient. The sums below use stretches that are linear in this gradient. The relative error
+/// of the sums is about the size of the gradient, 4e-6, so energies must agree to 1e-5.
 const GRADIENT: [[f64; 3]; 3] = [
     [3e-6, 1e-6, -2e-6],
     [2e-6, -4e-6, 1e-6],
@@ -38,7 +38,7 @@ fn bonds(point: [i32; 3]) -> Vec<(f64, [f64; 3], f64)> {
     found
 }
 
-/// Return the factor of a bond of direction n from the factors of the axes.
+/// Return the factor of a bond of direction n from the factors g of the axes.
 fn ellipsoid(n: [f64; 3], g: [f64; 3]) -> f64 {
     let sum: f64 = (0..3).map(|a| (n[a] / g[a]).powi(2)).sum();
     sum.powf(-0.5)

@@ -42,7 +42,7 @@ fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -
     )
 }
 
-/// Return the ratio of the 3-D trace of a strain to its trace over the axes of the setting.
+/// Return the 3-D trace of a strain divided by its trace over the axes of the problem.
 fn trace_share(dimension: &str, ratio: f64) -> f64 {
     match dimension {
         "plane-stress" => (1.0 - 2.0 * ratio) / (1.0 - ratio),
@@ -371,7 +371,8 @@ fn bond_based_laws_under_every_strain() {
     let (horizon, modulus) = (3.0, 5.0);
     let pi = std::f64::consts::PI;
     for (dimension, count, section, c, energy, bulk_energy) in [
-        // For E = 1: c, the classical energy at unit isotropic stretch, and 9K/4 for the printed form.
+        // The last three numbers are for E = 1: c, the classical energy density at unit isotropic stretch,
+        // and 9K/4 for the form `diehl2016`.
         ("uniaxial-strain", 1, 1.0, 12.0 / (5.0 * 9.0), 0.6, 0.0),
         ("uniaxial-stress", 1, 1.0, 2.0 / 9.0, 0.5, 0.0),
         ("1d", 1, 1.0, 2.0 / 9.0, 0.5, 0.0),

@@ -63,7 +63,8 @@ fn a_bond_breaks_after_its_life_within_one_block() {
             simulate::<1, _>(&pair(&law(&keys), ""), |mut simulation| {
                 let strain = (1.0 - ratio) * stretch;
                 let life = 1.0 / (coefficient * libm::pow(strain - limit, exponent));
-                // A block has one hundredth of the life, less a little, so that the last block is not full.
+                // A block has slightly more than one hundredth of the life, so the bond breaks within the
+                // 100th block.
                 let cycles = life / 99.5;
                 let found = blocks(&mut simulation, stretch, [cycles / 50.0, 200.0]).unwrap();
                 assert_eq!(found, 100.0, "{keys} {stretch}");
@@ -184,7 +185,8 @@ fn with_life_left_it_is_the_prototype_law_to_the_last_bit() {
     assert!(run(&law(keys)) == run(&pmb));
 }
 
-/// Return two bonded bodies, of which the upper one has fatigue. The bonds between them have this setting.
+/// Return the deck of two bonded bodies, of which the upper one has fatigue. `bonds` has the settings of the
+/// bonds between the bodies.
 fn joined(bonds: &str) -> String {
     let keys = "cycles_per_second = 1, fatigue_coefficient = 1, fatigue_exponent = 1";
     format!(
@@ -281,8 +283,8 @@ fn the_lives_of_a_plate_lie_on_a_line_of_basquin() {
 }
 
 /// Let a crack grow along the middle of a strip whose edges are moved apart. `strain` is the strain of the
-/// strip between the edges. Return the J integral (J/m²) during the growth, and the number of broken bonds per
-/// load step. J of the strip does not depend on the length of the crack.
+/// strip between the edges. Return the mean J integral (J/m²) during the growth, and the number of broken
+/// bonds per load step. J of the strip does not depend on the length of the crack.
 fn growth(exponent: f64, strain: f64) -> [f64; 2] {
     // A bond at a strain of 0.01 lives for one load step.
     let coefficient = libm::pow(100.0, exponent);
@@ -309,8 +311,8 @@ fn growth(exponent: f64, strain: f64) -> [f64; 2] {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let [broken, j_integral] =
             ["broken_bonds", "j_integral_tip"].map(|name| column(&observer, name));
-        // The first bonds break in the notch field, before the bonds ahead of the tip have worn as they wear
-        // ahead of a crack that grows. The measurement begins after a growth of about one horizon.
+        // When the first bonds break, the bonds ahead of the notch have worn less than those ahead of a
+        // growing crack. The measurement therefore begins after a growth of about one horizon.
         let mut start = None;
         let mut sum = 0.0;
         loop {

@@ -72,7 +72,7 @@ fn each_pair_has_its_rule() {
 
 #[test]
 fn bodies_with_the_rule_none_do_not_feel_each_other() {
-    // Three blocks side by side; the law of the last block cannot share bonds with the others.
+    // Three blocks side by side; the law of the last block cannot be combined with that of the others.
     let force = |family: &str, interface: &str| {
         let text = format!(
             "dimension = 'plane-strain'
@@ -183,10 +183,10 @@ fn momentum_is_kept_by_every_rule() {
 
 #[test]
 fn pieces_that_are_worked_on_between_messages_do_not_cut_vectors() {
-    // Points of the fine layers have bonds in two lists and in a lattice, and floating-point sums depend on
-    // the order of their terms. Each rank has more points than one piece of work. A border between pieces
-    // that does not lie between two vectors would cut a vector; the position of this border depends on the
-    // width.
+    // While messages are under way, a rank computes its interior points in pieces. A border between two
+    // pieces must not cut a lane group (`Vector`), because this would change the order of floating-point
+    // sums. The order matters for points of the fine layers, which have bonds in two lists and in a lattice.
+    // Each rank has more points than one piece, and the position of the border depends on `width`.
     let piece = 4096 * rayon::current_num_threads();
     let layers = |below: usize, above: usize, width: usize| {
         let boxes = (0..piece / 280).map(|n| {

@@ -1,6 +1,6 @@
-//! Requirements on the laws in every dimension, except where a law declares otherwise. No force at rest or
-//! under rigid motion; equal and opposite forces that are the derivative of the energy. Both ends of a bond
-//! break together. Bits are equal on any number of ranks and after restarts.
+//! Requirements on the laws in every dimension, except where a law declares otherwise. There is no force at
+//! rest or under rigid motion. Forces are equal and opposite, and they are the derivative of the energy. Both
+//! ends of a bond break together. Bits are equal on any number of ranks and after restarts.
 
 use crate::support::saved::{state, whole};
 use crate::support::{displace, force, forces, largest_force, problem, simulate, simulate_on};
@@ -265,7 +265,8 @@ fn no_bond_breaks_under_rigid_rotation_of_any_size() {
             simulate(&breakable("3d"), check::<3>);
         }
     }
-    // Bonds between a law with forces along the bonds and a law with other directions.
+    // Bonds between two laws: forces of `ordinary` are along the bonds, and forces of `correspondence` are
+    // not.
     let text = "dimension = 'plane-strain'
         grid = { spacing = 1, horizon = 3 }
         material.soft.correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
@@ -314,8 +315,8 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
     sums
 }
 
-/// Assert that the sum of the forces is zero; for laws that conserve angular momentum, also the sum of the
-/// moments.
+/// Assert that the sum of the forces is zero. For laws that conserve angular momentum, the sum of the moments
+/// must also be zero.
 pub(super) fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
     displace(&mut simulation, wave);
     let laws = simulation
@@ -440,7 +441,7 @@ pub(super) fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
 #[test]
 fn the_force_is_the_slope_of_the_energy() {
     for_all_laws!(check_slope, Case::is_conservative);
-    // The same with bonds that the deformation has broken.
+    // Repeat the check with bonds that the deformation breaks.
     let breakable = |case: &Case| case.can_break() && case.is_conservative();
     for case in cases().filter(breakable) {
         let body = |dimension| deck(dimension, &case.table(), "exact", ", damage = 'brittle'");
@@ -481,7 +482,7 @@ fn with_a_fixed_history_the_force_is_the_slope_of_the_energy() {
     }
 }
 
-/// As [`check_slope`], after loading at smaller strains during which bonds yield.
+/// Same as [`check_slope`], after loading to smaller strains, during which bonds yield.
 fn check_slope_after_loading<const D: usize>(mut simulation: Simulation<D>) {
     for share in [0.25, 0.5, 0.75] {
         displace(&mut simulation, |x| {
@@ -655,8 +656,8 @@ pub(super) fn same_bits<const D: usize>(text: &str) {
     assert!(whole(continued) == wanted, "after a restart: {text}");
 }
 
-/// The same for pairs of bodies with their own damage law, by stretch and by work, and with different laws at
-/// both ends.
+/// A pair of bodies has its own damage law, by stretch or by work. The bodies differ in stiffness, horizon
+/// and, with lists, in spacing.
 #[test]
 fn damage_of_a_pair_has_the_same_bits_on_any_ranks_and_after_a_restart() {
     let ordinary = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";

@@ -156,7 +156,7 @@ fn forces_that_are_evaluated_again_do_not_flow_again() {
                 assert_eq!(forces(&simulation), before);
                 assert_eq!(state(&simulation), kept);
             }
-            // Time at the same strain relaxes the stress to that of a smaller rate.
+            // While time passes at the same strain, the stress relaxes to that of a smaller strain rate.
             pull(&mut simulation, 9.0 * yields, BondUpdate::Trial(1.0));
             assert_ne!(forces(&simulation), before);
             assert_eq!(state(&simulation), kept);

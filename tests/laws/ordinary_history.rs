@@ -134,8 +134,8 @@ fn small_block(dimension: &str, law: &str) -> String {
     )
 }
 
-/// With the influence functions of its own family, each point has the energies of the solid in shear, also at
-/// edges and corners: of the instantaneous and relaxed response, and at the yield stress.
+/// With `surface_correction = "pals"`, each point has the energy of the solid in shear, also at edges and
+/// corners. This holds for the instantaneous and the relaxed response, and at the yield stress.
 #[test]
 fn with_pals_points_at_surfaces_relax_and_yield_as_the_solid_does() {
     fn energies<const D: usize>(simulation: &mut Simulation<D>) -> Vec<[f64; 2]> {
@@ -158,8 +158,8 @@ fn with_pals_points_at_surfaces_relax_and_yield_as_the_solid_does() {
         for [energy, lost] in energies(&mut simulation) {
             let left = energy / elastic;
             assert!((left - 0.4).abs() < 1e-4, "{left}");
-            // Each step of a tenth of the relaxation time takes the force of the dashpot at its middle, with an
-            // error of second order in the step.
+            // Each step lasts a tenth of the relaxation time and uses the force of the dashpot at the middle
+            // of the step. The error is of second order in the step.
             let lost = lost / elastic;
             assert!((lost - 0.6).abs() < 1e-2, "{lost}");
         }

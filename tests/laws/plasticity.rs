@@ -177,7 +177,8 @@ fn below_the_yield_stretch_it_is_the_prototype_law_to_the_bit() {
 
 #[test]
 fn work_goes_into_energy_and_dissipation() {
-    /// Check the balance near the last of the states with these sizes.
+    /// Deform the body by waves of these sizes, one after the other. Near the last state, check that forces
+    /// are the negative derivative of the sum of energy and dissipation.
     fn near<const D: usize>(mut simulation: Simulation<D>, sizes: &[f64]) {
         for size in sizes {
             displace(&mut simulation, wave(*size));

@@ -74,7 +74,8 @@ fn stiffness((law, correction): (&str, &str), across: u32, load: Load) -> f64 {
     by_length / (0.5 * load.stiffness(f64::from(across)) * curvature * curvature)
 }
 
-/// Check torsion and bending of correspondence bars with this many points across, for each control.
+/// Check correspondence bars with this many points across. `rows` has the expected stiffnesses in torsion and
+/// bending for each control.
 fn check(across: u32, rows: &[(&str, [f64; 2])]) {
     for (control, wanted) in rows {
         let law = format!(

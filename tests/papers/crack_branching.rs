@@ -1,4 +1,4 @@
-//! The first benchmark: Dipasquale et al. 2014, section 4. The test runs the deck unchanged, and checks its
+//! Crack branching of Dipasquale et al. 2014, section 4. The test runs the deck unchanged, and checks its
 //! result.
 
 use std::path::Path;
@@ -6,7 +6,8 @@ use std::path::Path;
 use crate::support::command::{Folder, fissure, succeed};
 use fissure::output::ResultReader;
 
-/// Points with more damage than this are on a crack; points at the face of a straight cut have 0.4 or more.
+/// Points with more damage than this are on a crack. Points at the face of a straight cut have a damage of
+/// 0.4 or more.
 const CRACKED: f64 = 0.38;
 
 /// Columns and rows of the deck's lattice.

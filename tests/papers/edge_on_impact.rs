@@ -79,8 +79,8 @@ fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
         ("normalised_pmb", "3", 0.971),
     ] {
         let expected = ratio * classical();
-        // A dispersing step has the shape ∫Ai at its front. It has a third of its height p/(ρ c) at the
-        // position of the longest waves.
+        // The front of a dispersing step has the shape of the integral of the Airy function Ai. At the
+        // position of the longest waves, the step has a third of its height p/(ρ c).
         let pressure = 1.267e9;
         let third = pressure / (DENSITY * expected) / 3.0;
         let text = deck(&[
@@ -95,8 +95,8 @@ fn in_the_bulk_the_wave_has_the_speed_of_the_lattice() {
             ("duration = 8.7e-6", "duration = 2.3e-6"),
         ]);
         let found = speed(&run(&text), WAVE, 8e-3, 22e-3);
-        // The front moves between points by linear interpolation, with an error of up to a tenth of a spacing
-        // at both ends of 14 spacings.
+        // The position of the front is interpolated linearly between points. The error is up to a tenth of a
+        // spacing at each end of a path of 14 spacings.
         assert!(
             (found / expected - 1.0).abs() < 0.01,
             "{law}, m = {horizon}: {} of the classical speed",
@@ -116,10 +116,11 @@ fn in_the_tile_a_wave_runs_ahead_of_damage() {
     ] {
         let rows = run(&deck(&[("dx = 1e-3", "dx = 2e-3"), ("pmb]", law)]));
         let wave = speed(&rows, WAVE, 30e-3, 90e-3);
-        // The front is where the velocity exceeds 1 m/s. The wave has at most p/(ρc) = 35 to 49 m/s,
-        // depending on the law. Its front has the shape ∫Ai and the width w = (3βct)^⅓, with β = δ²/50
-        // (lattice) + ν²h²/(24 (1 − ν)²) (tile) = 1.2 mm². The velocity of 1 m/s is up to 2.0 w ahead of the
-        // longest waves. At ct = 60 mm, w is 6 mm, and this lead grows by up to 2.0 β/w² = 7 % of the path.
+        // The front is where the velocity exceeds 1 m/s. The velocity of the wave is at most p/(ρc) = 35 to
+        // 49 m/s, depending on the law. The front has the shape ∫Ai and the width w = (3βct)^⅓, with β =
+        // δ²/50 (lattice) + ν²h²/(24 (1 − ν)²) (tile) = 1.2 mm². The velocity of 1 m/s is up to 2.0 w ahead
+        // of the longest waves. At ct = 60 mm, w is 6 mm, and this lead grows by up to 2.0 β/w² = 7 % of the
+        // path.
         assert!(
             (1.0..1.07).contains(&(wave / long_wave)),
             "{law}: {wave} m/s, long waves {long_wave} m/s"
@@ -145,9 +146,9 @@ fn in_the_tile_a_wave_runs_ahead_of_damage() {
 
 #[test]
 fn the_constant_of_equation_15_in_the_force_of_equation_4_gives_no_wave() {
-    // The constant lacks a length. It is too small by a factor of about the length of a bond in m (0.006), so
-    // that long waves would travel 4 mm only. All moving points are within a horizon of the loaded layer,
-    // which the load pushes up to 6 mm into the tile.
+    // The constant 27K/(4πδ³) of eq. 15 lacks a division by a length. It is 3δ/8 = 0.00225 (δ in m) times the
+    // constant of `pmb`, so long waves would travel only 4 mm. All moving points are within a horizon of the
+    // loaded layer, which the load pushes up to 6 mm into the tile.
     let rows = run(&deck(&[
         ("dx = 1e-3", "dx = 2e-3"),
         (

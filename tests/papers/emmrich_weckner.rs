@@ -229,7 +229,7 @@ fn the_slit_opens_and_runs() {
         let faces = ["upper", "lower"]
             .map(|face| column(&observer, &format!("probe_{face}_face_displacement_y")));
         let broken = column(&observer, "broken_bonds");
-        // Time, half the length of the crack, its extent across, and its opening.
+        // Time, half the length of the crack, its largest distance from the mid-plane, and its opening.
         let mut rows = Vec::new();
         while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
@@ -277,8 +277,8 @@ fn damage_grows_from_the_defect() {
     // 20 × 40 × 20 points; the steps are four times as long as in the deck.
     let coarse = [("dx", "1.5e-3"), ("safety", "0.8")];
     simulate_input::<3, _>("steel_bar_defect", &coarse, |mut simulation| {
-        // Time, number of cracked points, and their largest distances from the centre of the defect: in its
-        // plane and across.
+        // Time, number of cracked points, and their largest distances from the centre of the defect, in the
+        // plane of the defect and normal to this plane.
         let mut rows = Vec::new();
         while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();

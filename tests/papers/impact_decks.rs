@@ -150,8 +150,8 @@ fn an_elastic_sphere_between_rigid_plates_has_the_force_of_hertz() {
     assert!(fine < middle && middle < coarse, "{coarse} {middle} {fine}");
 }
 
-/// Return the angle of the crack to the notch (degrees) and the largest speed of the crack over 10 mm (m/s).
-/// The angle is that of the line from the tip of the notch to the crack tip 40 mm above.
+/// Return the angle between crack and notch (degrees), and the largest mean speed of the crack over 10 mm
+/// (m/s). The angle is that of the line from the tip of the notch to the crack tip 40 mm above.
 fn kalthoff(simulation: Simulation<'_, 3>) -> [f64; 2] {
     let names = ["time", "tip_upper_x", "tip_upper_y"];
     let rows = series(simulation, &names, 1);
@@ -230,7 +230,7 @@ fn a_crack_whose_faces_slide_runs_at_the_load_of_a_beam() {
         for row in &before {
             assert!(row[6] > 0.0 && row[7] > 0.0, "{row:?}");
         }
-        // The crack jumps by at least 5 mm, and does not grow before.
+        // The crack jumps by at least 5 mm, and does not grow before the jump.
         let runs = rows.iter().position(|row| row[5] > 0.02).unwrap();
         let load = -rows[..runs].iter().map(|row| row[1]).fold(0.0, f64::min) / critical;
         assert!((1.0..1.5).contains(&load), "{load}");

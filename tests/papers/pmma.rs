@@ -1,5 +1,5 @@
-//! The PMMA plate of Willberg, Hesse & Heinecke (2022) on a coarse grid, which takes a second. For the crack
-//! path on finer grids see studies/pmma/run.py and docs/src/verification/pmma.md.
+//! The PMMA plate of Willberg, Hesse & Heinecke (2022) on a coarse grid. For the crack path on finer grids,
+//! see studies/pmma/run.py and docs/src/verification/pmma.md.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};

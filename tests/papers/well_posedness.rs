@@ -13,9 +13,9 @@ const HORIZON: f64 = 3.0;
 const END: f64 = 2.0;
 const STEPS: usize = 400;
 
-/// Return the deck of a plate of 8 × 4 cells with the kernel function `lambda`, λ(r). The damping is r =
-/// `damping` (1/s), the body force `push` sin(2t) along x (N/m³). The initial displacements and velocities
-/// vary by 30 % around a uniform value.
+/// Return the deck of a plate of 8 × 4 cells. `lambda` is the kernel function λ of the bond length r, and
+/// `damping` the rate of the damping (1/s). The body force along x is `push` sin(2t) (N/m³). The initial
+/// displacements and velocities vary by 30 % around a uniform value.
 fn deck(lambda: &str, damping: f64, push: f64) -> String {
     let step = END / STEPS as f64;
     format!(
@@ -98,8 +98,8 @@ fn bound(simulation: &Simulation<2>, lambda: impl Fn(f64) -> f64) -> f64 {
     kappa.sqrt() + kappa_0
 }
 
-/// Compute ∫ e^{−r(t−s)/2} sinh((t − s) w)/w f(s) ds from 0 to t by the trapezoidal rule. t is the end of
-/// step `count`, r is `damping`, and `values` returns f at a step.
+/// Compute ∫ e^{−r(t−s)/2} sinh((t − s) w)/w f(s) ds from 0 to t by the trapezoidal rule. Here t is the end
+/// of step `count`, and r is `damping`. `values` returns f at a step.
 fn response(count: usize, damping: f64, w: f64, values: impl Fn(usize) -> f64) -> f64 {
     let step = END / STEPS as f64;
     let at = |k: usize| {

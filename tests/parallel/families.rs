@@ -203,7 +203,7 @@ fn bonds_that_hold_more_beside_surfaces() {
     }
 }
 
-/// Ranks without points take part in all collective messages.
+/// Ranks without points take part in all collective operations.
 #[test]
 fn ranks_without_points() {
     let two = "

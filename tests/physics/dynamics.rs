@@ -382,7 +382,7 @@ fn supports_do_the_work_that_becomes_energy() {
             let of = |name: &str| end.values[column(&observer, name)];
             assert!(of("reaction_right_x") > 0.0);
             assert!(of("reaction_left_x") < 0.0);
-            // Projected on a direction vector of any length.
+            // The length of a given direction vector does not matter.
             assert_eq!(of("force_pull"), of("reaction_right_x"));
             let [x, y] = ["reaction_left_x", "reaction_left_y"].map(of);
             let slanted = 0.6 * x - 0.8 * y;
@@ -453,7 +453,8 @@ fn a_pressure_pushes_against_its_normal() {
 
 #[test]
 fn a_load_without_depth_acts_on_one_spacing_of_each_body() {
-    // The load acts on two layers, each one spacing thick. The spacing of the grid is that of no body.
+    // The load acts on two layers, each one spacing thick. Both bodies have a spacing that differs from that
+    // of the grid.
     let text = "dimension = 'plane-stress'
         thickness = 0.1
         grid = { spacing = 2, horizon = 3 }
@@ -532,8 +533,8 @@ fn a_reaction_knows_a_motion_better_than_its_rounded_places() {
                 simulation.advance();
                 let [reaction] = simulation.fields.reaction.as_ref().unwrap();
                 let largest = reaction.iter().fold(0.0_f64, |most, it| most.max(it.abs()));
-                // Positions of 1e3 m are rounded to 1e-13 m, which limits the accuracy of bonds of 1 m and 5
-                // Pa.
+                // Positions of 1e3 m are rounded to 1e-13 m. This limits the accuracy of bonds with a length
+                // of 1 m and a modulus of 5 Pa.
                 assert!(largest < 1e-11, "{motion}: {largest} N/m³");
             }
         });

@@ -302,7 +302,7 @@ fn angular_momentum_of_a_turning_body_stays() {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let row = row(&mut observer, &mut simulation).values;
         let of = |axis: &str| row[column(&observer, &format!("angular_momentum_{axis}"))];
-        // Eight points of mass 2 at 0.5 and 1.5: Σ m z 2z, and −Σ m y 2z.
+        // Eight points of 2 kg with coordinates 0.5 and 1.5: L_y = Σ m z·2z, and L_z = −Σ m y·2z.
         let square = 16.0 * (0.25 + 2.25) / 2.0;
         assert_eq!([of("x"), of("y"), of("z")], [0.0, 2.0 * square, -32.0]);
     });

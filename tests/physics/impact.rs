@@ -147,7 +147,7 @@ fn points_that_stick_move_together() {
     let deck = two_points("friction = 50", 1.0, [[0.2, 0.004], [0.0, 0.0]], 4.0);
     let rows = history::<2>(&deck, 1, &names);
     let last = rows.last().unwrap();
-    // Without friction the value is 0.0052, because the direction of the contact rotates.
+    // Without friction, this velocity would be 0.0052 m/s, because the direction of the contact rotates.
     assert!((last[0] / 0.002 - 1.0).abs() < 0.25, "{last:?}");
     assert!(last[1] > 0.0 && last[2].abs() < 1e-2 * last[1], "{last:?}");
 }
@@ -398,9 +398,9 @@ fn a_closed_crack_carries_load() {
     let closed = force(&cracked_block("contact = {}"));
     let open = force(&cracked_block(""));
     assert!(open.abs() < 0.02 * whole, "{open} of {whole}");
-    // The contact layer is in series with the 17 m between the supports. Its thickness is δ and its modulus E
-    // instead of E/(1 − ν²): 17/(17 + 3.015/(1 − 1/16)) = 0.84. Softer surfaces at the crack faces reduce
-    // this value slightly.
+    // The contact layer is in series with the 17 m between the supports. The layer has the thickness δ and
+    // the modulus E, and the block has the modulus E/(1 − ν²). The ratio is therefore
+    // 17/(17 + 3.015/(1 − 1/16)) = 0.84. Softer surfaces at the crack faces reduce this ratio slightly.
     assert!(
         (0.77..0.84).contains(&(closed / whole)),
         "{closed} of {whole}"

@@ -15,7 +15,7 @@ const DECK: &str = "dimension = 'plane-stress'
     set.right.where = 'x > 4'
     time.end = 1\n";
 
-/// Return the state at the start on some ranks, or the error.
+/// Return the state at the start on `ranks` ranks, or the error.
 fn start(folder: &Folder, initial: &str, ranks: usize) -> Result<(Vec<u64>, Vec<u8>), String> {
     let source = Source::new(folder.join("plate.toml"), format!("{DECK}{initial}"));
     let problem = deck::parse(&source).map_err(|error| error.message)?;

@@ -1,4 +1,5 @@
-//! Contact in relaxations: closed-form reactions, energies, and equal bits on any ranks and after a restart.
+//! Contact in relaxations: closed-form reactions, energies, and equal bits on any number of ranks and after a
+//! restart.
 
 use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};

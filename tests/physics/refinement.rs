@@ -212,7 +212,7 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     let [least, _] = energies(&format!("{none}\nrefinement.interface_factor = 1"), patch);
     assert!(least < 0.5, "{least}");
     let [least, most] = energies("", patch);
-    // Measured values, without a theory: 0.930 and 1.083, as in docs/src/verification/dipasquale.md.
+    // Measured values, without a theory: 0.930 and 1.083, as in docs/src/theory/refinement.md.
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
 }
 
@@ -256,7 +256,7 @@ fn least_energy_at_rest(bonds: &str) -> f64 {
 #[test]
 fn patches_lose_less_with_bonds_of_mean_horizons() {
     let [own, mean] = ["own", "average"].map(least_energy_at_rest);
-    // A wave, whose energy is half kinetic, loses 17.1 and 8.2 % in such a patch
+    // The energy density of a wave, half of which is kinetic, decreases by 17.1 and 8.2 % in such a patch
     // (docs/src/verification/dipasquale.md).
     assert!(own < 0.75, "{own}");
     assert!((0.78..0.9).contains(&mean), "{mean}");
@@ -290,9 +290,9 @@ fn go_on(simulation: &mut Simulation<'_, 2>, steps: u64) -> [u64; 2] {
     for step in 1..=steps {
         simulation.advance();
         if simulation.is_refinement_due() {
-            let Regridded { born, left } = simulation.refine().unwrap().unwrap_or_default();
-            change[0] += born;
-            change[1] += left;
+            let Regridded { created, removed } = simulation.refine().unwrap().unwrap_or_default();
+            change[0] += created;
+            change[1] += removed;
         }
         if step.is_multiple_of(5) && simulation.comm.size() > 1 {
             let unequal = 1000 * (1 + simulation.comm.rank() as u64);
@@ -381,16 +381,17 @@ fn what_comes_and_goes_keeps_mass_momentum_and_the_energy_set_free() {
     let text = torn_and_coarsened().replace("2000*y*(1 + 10*x)", "2000*y*(1 + 10*x) + 3");
     for ranks in [1, 3] {
         simulate_on::<2, _>(ranks, &text, |mut simulation| {
-            let (mut births, mut leaves) = (0, 0);
+            let (mut creations, mut removals) = (0, 0);
             for _ in 0..60 {
                 simulation.advance();
                 if !simulation.is_refinement_due() {
                     continue;
                 }
                 let before = sums(&simulation);
-                let Regridded { born, left } = simulation.refine().unwrap().unwrap_or_default();
-                births += born;
-                leaves += left;
+                let Regridded { created, removed } =
+                    simulation.refine().unwrap().unwrap_or_default();
+                creations += created;
+                removals += removed;
                 let after = sums(&simulation);
                 for (before, after) in before.iter().zip(&after) {
                     assert!(
@@ -399,7 +400,7 @@ fn what_comes_and_goes_keeps_mass_momentum_and_the_energy_set_free() {
                     );
                 }
             }
-            assert!(births > 100 && leaves > 100, "{births} {leaves}");
+            assert!(creations > 100 && removals > 100, "{creations} {removals}");
         });
     }
 }
@@ -419,7 +420,7 @@ fn new_bonds_do_not_join_what_a_crack_has_parted() {
             |a, b| y[a] * y[b] < 0.0 && 0.5 * (x[a] + x[b]) < limit,
         );
         simulation.advance();
-        assert!(simulation.refine().unwrap().unwrap().born > 100);
+        assert!(simulation.refine().unwrap().unwrap().created > 100);
         let model = &simulation.model;
         let (x, y) = (&model.reference[0], &model.reference[1]);
         let on_the_crack = |k: usize| y[k].abs() < 1e-9 && x[k] < limit - 1e-3;
@@ -555,12 +556,12 @@ fn what_was_refined_for_a_while_is_as_it_was_before() {
                 all
             };
             let (before, total) = (volumes(&simulation), simulation.model.total);
-            let [born, left] = go_on(&mut simulation, 18);
-            assert!(born > 500 && left < born, "{born} {left}");
+            let [created, removed] = go_on(&mut simulation, 18);
+            assert!(created > 500 && removed < created, "{created} {removed}");
             let [again, rest] = go_on(&mut simulation, 32);
             assert!(
-                again == 0 && left + rest == born,
-                "{born} {again} {left} {rest}"
+                again == 0 && removed + rest == created,
+                "{created} {again} {removed} {rest}"
             );
             assert_eq!(simulation.model.total, total);
             if ranks == 1 {
@@ -569,7 +570,8 @@ fn what_was_refined_for_a_while_is_as_it_was_before() {
             let (fields, time) = (&simulation.fields, simulation.clock.time());
             for (d, speed) in [3.0, -2.0].into_iter().enumerate() {
                 for k in 0..simulation.model.owned() {
-                    // Rounding errors of positions of 1e-2 m and displacements of 1e-6 m.
+                    // The bounds allow for rounding errors of positions of 1e-2 m and displacements of 1e-6
+                    // m.
                     let [u, v] = [&fields.displacement, &fields.velocity].map(|field| field[d][k]);
                     assert!((v / speed - 1.0).abs() < 1e-9, "{v}");
                     assert!((u / (speed * time) - 1.0).abs() < 1e-9, "{u}");
@@ -601,14 +603,14 @@ fn points_near_a_crack_stay() {
         simulation.advance();
         simulation.refine().unwrap();
         simulation.advance();
-        assert!(simulation.refine().unwrap().unwrap().born > 100);
+        assert!(simulation.refine().unwrap().unwrap().created > 100);
         let [x, y] = [0, 1].map(|d| simulation.model.reference[d].clone());
         simulation.forces.cut(
             |_| true,
             |a, b| crosses_at(8.1e-3, [&x, &y], a, b).is_some_and(|x| x > 14e-3),
         );
-        let [_, left] = go_on(&mut simulation, 20);
-        assert!(left > 300, "{left}");
+        let [_, removed] = go_on(&mut simulation, 20);
+        assert!(removed > 300, "{removed}");
         let model = &simulation.model;
         let [x, y] = [0, 1].map(|d| model.reference[d].as_slice());
         // The finest points near the cut are still there, and no bond across the cut has been created.
@@ -640,20 +642,20 @@ fn velocities_that_are_linear_in_place_stay_so() {
             simulation.clock.advance();
             simulation.refine().unwrap();
         }
-        let [mut born, mut left] = [0, 0];
+        let [mut created, mut removed] = [0, 0];
         for _ in 0..4 {
             simulation.clock.advance();
             let change = simulation.refine().unwrap().unwrap_or_default();
-            born += change.born;
-            left += change.left;
+            created += change.created;
+            removed += change.removed;
         }
-        assert!(born == 0 && left > 300, "{born} {left}");
+        assert!(created == 0 && removed > 300, "{created} {removed}");
         let (model, velocity) = (&simulation.model, &simulation.fields.velocity);
         for k in 0..model.owned() {
             let [x, y] = [0, 1].map(|d| model.reference[d][k]);
             let expected = [y, 1e3 * (x - 3e-3)];
             for d in 0..2 {
-                // Rounding errors of velocities up to 20 m/s.
+                // The bound allows for rounding errors of velocities up to 20 m/s.
                 assert!((velocity[d][k] - expected[d]).abs() < 1e-11, "{x} {y}");
             }
         }

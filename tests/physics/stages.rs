@@ -32,8 +32,8 @@ fn bar(second: &str) -> String {
     )
 }
 
-/// Energies at the end of the first stage, and afterwards the extremes of the end's displacement and of the
-/// energies.
+/// Energies, and displacement of the bar's end, at the end of the first stage. The other fields are extremes
+/// in the second stage.
 struct Seen {
     preload: Energies,
     displacement: f64,

@@ -228,7 +228,7 @@ fn a_restart_compares_the_rows_and_not_the_file() {
     let old = explained("0,0\n0.5,0.1\n2,0.3\n");
     let against = |rows: &str| deck::differences(&old, &explained(rows)).unwrap();
     assert!(against("0,0\n0.5,1e-1\n2.0,0.3\n").is_empty());
-    // A later end needs more rows.
+    // Rows that are added at the end are not a difference, because a later end of the run needs them.
     assert!(against("0,0\n0.5,0.1\n2,0.3\n3,9\n").is_empty());
     for other in [
         "0,0\n0.5,0.11\n2,0.3\n",

@@ -150,8 +150,8 @@ fn pulses_have_the_speeds_of_the_normalised_law() {
 
 #[test]
 fn a_pulse_has_the_speed_of_the_normalised_law_in_a_wide_family() {
-    // The same for m = 6 in a bar of half the width. The middle column is a body of the normalised law. The
-    // other points get the constant of a complete family from another modulus.
+    // Repeat this for m = 6 in a bar of half the width. The middle column is a body of the normalised law.
+    // The other points get the constant of a complete family from another modulus.
     let horizon: f64 = 6.0;
     let mut lengths = 0.0;
     for x in -6..=6 {

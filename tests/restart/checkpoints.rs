@@ -800,7 +800,7 @@ fn a_file_that_cannot_be_read_is_not_called_damaged() {
         assert_eq!(entries(&out), before);
     };
 
-    // The same lock as that of a program that writes to the file through HDF5.
+    // A program that writes to the file through HDF5 holds the same lock.
     let writer = std::fs::File::open(result(&out)).unwrap();
     writer.lock().unwrap();
     for ranks in [1, 2] {
@@ -822,7 +822,8 @@ fn a_file_that_cannot_be_read_is_not_called_damaged() {
             "checkpoint_0.h5: the checkpoint cannot be read",
         ),
     ] {
-        // Permissions do not apply to root, so a dangling link and a folder replace the file.
+        // Root can read files without permission, so the test replaces the file by a dangling link and by a
+        // folder.
         let aside = folder.join("aside");
         std::fs::rename(file(name), &aside).unwrap();
         std::os::unix::fs::symlink("not-mounted/file", file(name)).unwrap();

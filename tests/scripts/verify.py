@@ -125,7 +125,7 @@ def peridigm_hypoelastic(deck, values):
 
 
 def saint_venant(deck, values):
-    """St. Venant–Kirchhoff solid in the same bar: the Cauchy stress E F (F² − 1)/2."""
+    """St. Venant–Kirchhoff solid in the bar of `peridigm_hypoelastic`: the Cauchy stress E F (F² − 1)/2."""
     [law] = deck["material"]["bar"].values()
     stretches = [1 + 1e-3 * value[2] / deck["time"]["end"] for value in values]
     return [law["youngs_modulus"] * stretch * (stretch**2 - 1) / 2 for stretch in stretches]
@@ -221,7 +221,7 @@ def weighted_pals(deck, values):
     return sheared_cube(deck, values, lambda length, m, shear: (numpy.full_like(length, 3 / m), numpy.full_like(length, 15 * shear / m)), 2)
 
 
-# Functions by name that return results at the positions and times of values.
+# The functions that `formulas` names. They return results at the positions and times of the given values.
 FORMULAS = {
     "lammps_ves": lammps_ves,
     "viscoelastic": viscoelastic,

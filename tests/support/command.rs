@@ -170,8 +170,8 @@ pub fn is_running(process: u32) -> bool {
     !(state.is_empty() || state.starts_with(['Z', 'X']))
 }
 
-/// Wait for the end of a process with little output. Kill an mpirun that hangs after all of its ranks have
-/// ended.
+/// Wait for the end of a process. Its output must fit into the pipes, which are read after the end. Kill an
+/// mpirun that hangs after all of its ranks have ended.
 ///
 /// # Panics
 /// If the process exceeds the time limit; the process is killed.

@@ -26,7 +26,8 @@ pub fn values_at_the_end<const D: usize, const N: usize>(
     names.map(|name| values[column(&observer, name)])
 }
 
-/// Return the deck of a notched plate that tears under supports and a load, with further keys of `[time]`.
+/// Return the deck of a notched plate that tears under supports and a load. `time` has further keys of
+/// `[time]`.
 pub fn torn_plate(family: &str, time: &str) -> String {
     format!(
         "dimension = 'plane-stress'
@@ -46,7 +47,7 @@ pub fn torn_plate(family: &str, time: &str) -> String {
     )
 }
 
-/// Assert that a plane problem in which bonds break has equal bits on one, two and three ranks.
+/// Assert that a plane problem has equal bits on one, two and three ranks, and that bonds break.
 pub fn same_on_ranks(deck: &str) {
     let run = |ranks: usize| {
         let parts = simulate_on(ranks, deck, |mut simulation: Simulation<2>| {

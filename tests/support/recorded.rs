@@ -71,8 +71,8 @@ fn is_rebalance_due<const D: usize>(problem: &Problem, stepper: &Stepper<'_, D>)
     stepper.comm().size() > 1 && problem.balance.is_some_and(is_due)
 }
 
-/// Return an artificial time of the loops over bonds, ns, which makes even and odd ranks slow alternately.
-/// Measured times would make the test depend on the load of the machine.
+/// Return an artificial time of the loops over bonds, ns. Even and odd ranks are slow alternately. Measured
+/// times would make the test depend on the load of the machine.
 fn pretended_time<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
     let rule = simulation.problem.balance.unwrap();
     let turn = simulation.clock.number() / rule.every_steps;
@@ -81,7 +81,7 @@ fn pretended_time<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
 }
 
 impl Recorded {
-    /// Return whether an output and a history row are due.
+    /// Return whether an output is due, and whether a history row is due.
     fn is_due(problem: &Problem, clock: &Clock) -> [bool; 2] {
         let output = Schedule::of_outputs(&problem.output);
         let row = Schedule::every(problem.row_interval());

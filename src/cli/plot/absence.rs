@@ -3,7 +3,7 @@
 use fissure::error::{Error, Result};
 use fissure::picture::{Axis, View};
 
-use super::blocks::blocks;
+use super::chunks::chunks;
 use super::painter::Painter;
 
 impl Painter<'_> {
@@ -62,7 +62,7 @@ impl Painter<'_> {
         let (mut all, mut kept, mut values) = ([none; 3], [none; 3], none);
         let mut nearest: Option<f64> = None;
         let power = 1.0 / self.dimension as f64;
-        for points in blocks(self.result.points(index)) {
+        for points in chunks(self.result.points(index)) {
             let drawn = self.drawn_values(index, points.clone())?;
             let thresholds = self.threshold_values(index, points.clone())?;
             let thresholds = thresholds.unwrap_or(drawn);
@@ -81,7 +81,7 @@ impl Painter<'_> {
                         nearest = Some(at);
                     }
                 }
-                if self.is_in_view(place, (volumes[k] / self.section).powf(power)) {
+                if self.is_in_view(place, (volumes[k] / self.out_of_plane_measure).powf(power)) {
                     include(&mut values, thresholds[k]);
                 }
             }

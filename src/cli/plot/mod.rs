@@ -1,8 +1,8 @@
 //! `fissure plot`: a picture of a field, or curves of the history.
 
 mod absence;
-mod blocks;
 mod choice;
+mod chunks;
 pub mod curves;
 mod difference;
 mod filter;

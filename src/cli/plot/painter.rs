@@ -7,8 +7,8 @@ use fissure::error::{Error, Result};
 use fissure::output::{ResultReader, StoredField};
 use fissure::picture::{ColourMap, Image, Scene, Vectors, View, is_damage, is_in_slice, render};
 
-use super::blocks::{blocks, is_zero, scattered_bodies};
 use super::choice::{choose_field, colour_map, number, view};
+use super::chunks::{chunks, is_zero, scattered_bodies};
 use super::difference::Subtrahend;
 use super::filter::{Clip, Threshold};
 use super::limits::{Frame, Limits, Range, range_of};
@@ -33,7 +33,7 @@ pub struct Painter<'a> {
     /// Result that is subtracted from the drawn result.
     pub(super) minus: Option<Subtrahend>,
     has_displacement: bool,
-    pub(super) section: f64,
+    pub(super) out_of_plane_measure: f64,
     range: Range,
     colours: Option<ColourMap>,
     pub(super) view: View,
@@ -90,7 +90,7 @@ impl<'a> Painter<'a> {
         };
         let number_of = |name: &str| attribute(name).parse::<f64>().map_err(|_| wrong(name));
         let dimension = number_of("dimension")? as usize;
-        let section = number_of("out_of_plane_measure")?;
+        let out_of_plane_measure = number_of("out_of_plane_measure")?;
         let fields = result.fields()?;
         let mut field = choose_field(arguments.field.as_deref(), path, &fields)?;
         if arguments.field.is_none() && field.name == "velocity" {
@@ -150,7 +150,7 @@ impl<'a> Painter<'a> {
             quantity,
             minus,
             has_displacement: fields.iter().any(|field| field.name == "displacement"),
-            section,
+            out_of_plane_measure,
             range,
             clips: clips.collect::<Result<_>>()?,
             threshold: threshold.transpose()?,
@@ -226,7 +226,7 @@ impl<'a> Painter<'a> {
     fn automatic_factor(&self, index: usize) -> Result<Option<f64>> {
         let mut largest = 0.0_f64;
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        for points in blocks(self.result.points(index)) {
+        for points in chunks(self.result.points(index)) {
             let values = self.displacements(index, points.clone())?;
             let finite = values.iter().filter(|u| u.is_finite());
             largest = finite.fold(largest, |a, u| a.max(u.abs()));
@@ -286,7 +286,7 @@ impl<'a> Painter<'a> {
         Ok(Some(quantity.of(values)))
     }
 
-    /// Read the points of an output, in blocks of consecutive points to limit the memory. Keep only the
+    /// Read the points of an output, in chunks of consecutive points to limit the memory. Keep only the
     /// points in the slice, in the half spaces and in the range of the threshold.
     pub(super) fn points(&self, index: usize) -> Result<Points> {
         let mut found = Points::default();
@@ -298,7 +298,7 @@ impl<'a> Painter<'a> {
         }
         let mut paths = NearestPoints::new(&self.paths);
         let power = 1.0 / self.dimension as f64;
-        for points in blocks(count) {
+        for points in chunks(count) {
             let values = self.drawn_values(index, points.clone())?;
             let volumes = self.result.field_of("volume", index, points.clone())?;
             let thresholds = self.threshold_values(index, points.clone())?;
@@ -311,7 +311,7 @@ impl<'a> Painter<'a> {
             let displacements = self.displacements(index, points)?;
             paths.search(&places, &displacements);
             for (k, position) in self.drawn_positions(&places, &displacements).enumerate() {
-                let size = (volumes[k] / self.section).powf(power);
+                let size = (volumes[k] / self.out_of_plane_measure).powf(power);
                 let value = thresholds.as_ref().map_or(values[k], |values| values[k]);
                 if self.is_clipped(position)
                     || !self.is_in_view(position, size)

@@ -209,7 +209,7 @@ pub struct Checkpoint {
 #[serde(deny_unknown_fields)]
 pub struct Balance {
     /// Steps between comparisons of the ranks' times; 500 if not given.
-    #[serde(default = "default_look")]
+    #[serde(default = "default_interval")]
     pub every_steps: Spanned<Count>,
     /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced; 1.2 if not
     /// given.
@@ -217,7 +217,7 @@ pub struct Balance {
     pub imbalance: Number,
 }
 
-fn default_look() -> Spanned<Count> {
+fn default_interval() -> Spanned<Count> {
     Spanned::new(0..0, Count::new(500))
 }
 

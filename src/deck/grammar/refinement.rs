@@ -46,7 +46,7 @@ pub struct Refinement {
 #[serde(deny_unknown_fields)]
 pub struct Trigger {
     /// Steps between evaluations of the criteria; 20 if not given.
-    #[serde(default = "default_look")]
+    #[serde(default = "default_interval")]
     pub every_steps: Spanned<Count>,
     /// Smallest strain energy density of a trigger, as a fraction of the current maximum over all points.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,7 +67,7 @@ pub struct Trigger {
     pub coarsen_after: Option<Number>,
 }
 
-fn default_look() -> Spanned<Count> {
+fn default_interval() -> Spanned<Count> {
     Spanned::new(0..0, Count::new(20))
 }
 

@@ -55,7 +55,9 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     }
     if let Some(restart) = root.get("Restart") {
         let note = "checkpoints are written by default; `fissure run --restart` continues a run";
-        translation.log.whole(restart, Fate::Approximated, note);
+        translation
+            .log
+            .note_whole_table(restart, Fate::Approximated, note);
     }
     let mut sets = Sets::new(matches!(points, Points::Mesh(_)).then_some(""));
     let has_temperature = conditions(translation, root, &mut sets, &stages, &expanding)?;

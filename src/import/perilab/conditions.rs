@@ -7,14 +7,14 @@ use crate::import::solver;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write the initial values, loads, supports and temperatures, then the stages. `expands` says whether a
-/// block has a thermal expansion. Return whether temperatures are prescribed.
+/// Write the initial values, loads, supports and temperatures, then the stages. `has_expansion` says whether
+/// a block has a thermal expansion. Return whether temperatures are prescribed.
 pub(super) fn conditions(
     translation: &mut Translation,
     root: &Node,
     sets: &mut Sets,
     stages: &[solver::Stage],
-    expands: bool,
+    has_expansion: bool,
 ) -> Result<bool> {
     let mut conditions = Conditions::default();
     for (name, table) in root
@@ -45,7 +45,7 @@ pub(super) fn conditions(
             Some(Quantity::BodyForce)
         } else if is(&["Forces", "Force"]) {
             Some(Quantity::ForceOfPoint)
-        } else if is(&["Temperature"]) && expands && !is_initial {
+        } else if is(&["Temperature"]) && has_expansion && !is_initial {
             Some(Quantity::Temperature(None))
         } else {
             None
@@ -53,7 +53,7 @@ pub(super) fn conditions(
         let Some(quantity) = quantity else {
             let note = if !is(&["Temperature"]) {
                 format!("{} has no counterpart", excerpt(text))
-            } else if expands {
+            } else if has_expansion {
                 "temperatures are prescribed only; heat is not conducted".to_owned()
             } else {
                 "no material expands, and heat is not conducted".to_owned()

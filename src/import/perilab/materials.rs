@@ -253,17 +253,18 @@ fn anisotropic(
     Ok(found)
 }
 
-/// Read the thermal models with expansion. `acts` says whether the solver enables thermal models.
+/// Read the thermal models with expansion. `is_thermal_enabled` says whether the solver enables thermal
+/// models.
 pub(super) fn expansions(
     translation: &Translation,
     models: &Node,
-    acts: bool,
+    is_thermal_enabled: bool,
 ) -> Result<Vec<Expansion>> {
     let mut expansions = Vec::new();
     let Some(node) = models.get("Thermal Models") else {
         return Ok(expansions);
     };
-    if !acts {
+    if !is_thermal_enabled {
         let note = "the solver has no `Thermal Models: true`, so nothing expands";
         translation.log.left_out(node, note);
         return Ok(expansions);
@@ -308,17 +309,17 @@ pub(super) fn expansions(
     Ok(expansions)
 }
 
-/// Read the damage models. `breaks` says whether the solver enables damage.
+/// Read the damage models. `is_damage_enabled` says whether the solver enables damage.
 pub(super) fn damages(
     translation: &mut Translation,
     models: &Node,
-    breaks: bool,
+    is_damage_enabled: bool,
 ) -> Result<Vec<DamageModel>> {
     let mut damages = Vec::new();
     let Some(node) = models.get("Damage Models") else {
         return Ok(damages);
     };
-    if !breaks {
+    if !is_damage_enabled {
         let note = "the solver has no `Damage Models: true`, so nothing breaks";
         translation.log.left_out(node, note);
         return Ok(damages);

@@ -46,16 +46,16 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     }
     note_influence(translation, discretization, materials)?;
     let read = read_materials(translation, materials)?;
-    let breaks = stages.iter().any(|stage| stage.breaks);
-    let damages = damages(translation, models, breaks)?;
-    let expands = solvers(translation, root)?.iter().any(|solver| {
+    let is_damage_enabled = stages.iter().any(|stage| stage.is_damage_enabled);
+    let damages = damages(translation, models, is_damage_enabled)?;
+    let is_thermal_enabled = solvers(translation, root)?.iter().any(|solver| {
         let node = solver.get("Thermal Models");
         node.is_some_and(|node| {
             translation.log.taken(node, "whether materials expand");
             translation.is_true(node)
         })
     });
-    let expansions = expansions(translation, models, expands)?;
+    let expansions = expansions(translation, models, is_thermal_enabled)?;
     let damping = stages.iter().find_map(|stage| stage.damping);
     let laws = Laws {
         models: read,
@@ -63,10 +63,10 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
         expansions,
     };
     let bodies = read_blocks(translation, blocks, &points, &laws, damping)?;
-    if let (Some(models), true) = (models.get("Damage Models"), breaks) {
+    if let (Some(models), true) = (models.get("Damage Models"), is_damage_enabled) {
         note_unused_damages(translation, models, blocks);
     }
-    let expands = blocks.tables().any(|(_, block)| {
+    let has_expansion = blocks.tables().any(|(_, block)| {
         let model = block.get("Thermal Model").and_then(Node::text);
         model.is_some_and(|model| {
             laws.expansions
@@ -89,7 +89,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
             sets.define(name, node, true);
         }
     }
-    let has_temperature = conditions(translation, root, &mut sets, &stages, expands)?;
+    let has_temperature = conditions(translation, root, &mut sets, &stages, has_expansion)?;
     contact(translation, root, &bodies)?;
     let names: Vec<(String, String)> = bodies
         .iter()
@@ -192,7 +192,9 @@ fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stag
     let damping_differs = stages
         .iter()
         .any(|stage| stage.damping != stages[0].damping);
-    let damage_differs = stages.iter().any(|stage| stage.breaks != stages[0].breaks);
+    let damage_differs = stages
+        .iter()
+        .any(|stage| stage.is_damage_enabled != stages[0].is_damage_enabled);
     for node in solvers {
         for (_, solver) in node.tables() {
             if let (Some(damping), true) = (solver.get("Numerical Damping"), damping_differs) {

@@ -47,7 +47,7 @@ pub struct BondAssociated {
     /// Largest modulus of the solid, [`Stress::largest_modulus`], Pa.
     modulus: f64,
     /// Trace of the shape tensor of an untruncated family, m⁵.
-    whole: f64,
+    untruncated_trace: f64,
 }
 
 const KEYS: &[Key] = hooke::keys_with_hooke![STRESS];
@@ -80,7 +80,7 @@ fn build(given: &Given) -> Built {
     Built::plain(BondAssociated {
         stress,
         modulus: stress.largest_modulus(),
-        whole: Influence::Constant.weighted_volume(given.dimension, given.horizon),
+        untruncated_trace: Influence::Constant.weighted_volume(given.dimension, given.horizon),
     })
 }
 
@@ -156,7 +156,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     const SUM_READS_STRETCH: bool = false;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_EXTENSION: bool = false;
-    const HAS_BOND_STRESS_ACROSS: bool = true;
+    const HAS_OUT_OF_PLANE_BOND_STRESS: bool = true;
     // An AVX-512 version would gain little: most of the time goes into the stresses. `Stress::of_bonds`
     // computes the stresses, and is not compiled for AVX-512, because it is not inlined into the loop.
     const ISA_SET: IsaSet = IsaSet::Avx2;
@@ -179,7 +179,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {
-            self.whole / shape.trace()
+            self.untruncated_trace / shape.trace()
         } else {
             1.0
         }
@@ -276,21 +276,23 @@ impl<const D: usize> Law<D> for BondAssociated {
         self.stresses(bond, gradient).energy * *weight
     }
 
-    fn stress_across(&self, gradient: &SMatrix<f64, D, D>, _: &PlasticState) -> Option<f64> {
-        self.stress.across(gradient)
+    fn out_of_plane_stress(&self, gradient: &SMatrix<f64, D, D>, _: &PlasticState) -> Option<f64> {
+        self.stress.out_of_plane_stress(gradient)
     }
 
     #[inline(always)]
-    fn bond_stress_across(
+    fn out_of_plane_bond_stress(
         &self,
         bond: &Bond<D>,
         ([.., weight], (gradient, _)): &Point<D>,
     ) -> Lanes {
-        self.stress.across_of_bonds(&own_gradient(bond, gradient)) * *weight
+        self.stress
+            .out_of_plane_stress_of_bonds(&own_gradient(bond, gradient))
+            * *weight
     }
 
-    fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, _: &PlasticState) -> Option<f64> {
-        self.stress.stretch_across(gradient)
+    fn out_of_plane_stretch(&self, gradient: &SMatrix<f64, D, D>, _: &PlasticState) -> Option<f64> {
+        self.stress.out_of_plane_stretch(gradient)
     }
 
     fn needs_shape(&self) -> bool {
@@ -302,8 +304,8 @@ impl<const D: usize> Law<D> for BondAssociated {
     }
 
     #[inline(always)]
-    fn stiffness(&self, bond: &Bond<D>, ([whole, along, ..], _): &Point<D>) -> Lanes {
-        *whole + *along / (bond.length * bond.length)
+    fn stiffness(&self, bond: &Bond<D>, ([constant, along, ..], _): &Point<D>) -> Lanes {
+        *constant + *along / (bond.length * bond.length)
     }
 
     fn resists_across(&self) -> bool {

@@ -73,8 +73,8 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
         key: Some(KIND.name),
         message: format!(
-            "the control C : K⁻¹ of this solid has a negative stiffness: C : I has the eigenvalue {least:.4e} Pa, and \
-             all must be above 0; take \"dispersion\" or \"silling2017\""
+            "with \"wan2019\", the control would have a negative stiffness, because the tensor C : I of this solid has the \
+             eigenvalue {least:.4e} Pa, and all its eigenvalues must be above 0; take \"dispersion\" or \"silling2017\""
         ),
     })
 }
@@ -88,9 +88,9 @@ impl Control {
             "dispersion" => {
                 let (dimension, horizon) = (given.dimension, given.horizon);
                 let trace = Influence::Constant.weighted_volume(dimension, horizon);
-                let whole = trace / dimension.count() as f64;
+                let untruncated = trace / dimension.count() as f64;
                 Self::Dispersion {
-                    strength: 4.0 / 3.0 * hooke.shear_modulus(dimension) / whole,
+                    strength: 4.0 / 3.0 * hooke.shear_modulus(dimension) / untruncated,
                 }
             }
             _ => {

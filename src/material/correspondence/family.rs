@@ -77,10 +77,14 @@ impl<const D: usize> ShapeTensor<D> {
     /// Return K⁻¹ (m⁻⁵) of the intact part of a family; `None` if K is nearly singular, or if this part is
     /// stiffer than `STIFFEST` allows.
     ///
-    /// `modulus` is the largest modulus of the solid (Pa), and `whole` the spring constant of the initial
-    /// family (N/m⁷).
-    pub fn inverse_of_rest(&self, modulus: f64, whole: f64) -> Option<SMatrix<f64, D, D>> {
-        let least = SMatrix::from_diagonal_element(modulus / (STIFFEST * whole));
+    /// `modulus` is the largest modulus of the solid (Pa), and `initial_spring_constant` the spring constant
+    /// of the initial family (N/m⁷).
+    pub fn inverse_of_rest(
+        &self,
+        modulus: f64,
+        initial_spring_constant: f64,
+    ) -> Option<SMatrix<f64, D, D>> {
+        let least = SMatrix::from_diagonal_element(modulus / (STIFFEST * initial_spring_constant));
         if is_positive_definite(&(self.0 - least)) {
             self.inverse()
         } else {

@@ -27,7 +27,7 @@ pub struct Hooke {
     ///
     /// The sum of factors times strains is the stress zz (Pa) in plane strain, and the strain zz in plane
     /// stress. `None` in 3-D and 1-D, and if the constants of the deck do not determine these factors.
-    across: Option<[f64; 3]>,
+    out_of_plane_factors: Option<[f64; 3]>,
 }
 
 /// Keys of the full matrix: its upper triangle.
@@ -192,11 +192,14 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
         );
     }
     if let Some(first) = full {
-        let across = |(k, name): (usize, &'static str)| {
+        let is_out_of_plane = |(k, name): (usize, &'static str)| {
             let (row, column) = (k / 6, k % 6);
             (!PLANE.contains(&row) || !PLANE.contains(&column)).then_some(name)
         };
-        let outside = given_of(values, full_entries().enumerate().filter_map(across));
+        let outside = given_of(
+            values,
+            full_entries().enumerate().filter_map(is_out_of_plane),
+        );
         if let (false, Some(key)) = (space, outside) {
             let message = "in plane problems, Hooke's matrix has only the entries c11, c12, c16, c22, c26 and c66";
             return fault_at(key, message);
@@ -280,7 +283,7 @@ fn used(dimension: Dimension) -> Vec<usize> {
 pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64> {
     let hooke = Hooke {
         matrix: unturned(values, dimension)?,
-        across: None,
+        out_of_plane_factors: None,
     };
     Some(match dimension {
         Dimension::Space => hooke.least_of_unit_strain::<3>(),
@@ -354,11 +357,14 @@ impl Hooke {
             let matrix = isotropic(given);
             let ratio = given.elastic.poisson_ratio;
             let thinning = -ratio / (1.0 - ratio);
-            let across = match given.dimension {
+            let out_of_plane_factors = match given.dimension {
                 Dimension::PlaneStress { .. } => Some([thinning, thinning, 0.0]),
-                dimension => row_across(&matrix, dimension),
+                dimension => out_of_plane_row(&matrix, dimension),
             };
-            return Some(Self { matrix, across });
+            return Some(Self {
+                matrix,
+                out_of_plane_factors,
+            });
         };
         let degrees = ANGLES.map(|key| given.values.number(key));
         let turned = if degrees == [0.0; 3] {
@@ -367,20 +373,20 @@ impl Hooke {
             turned(&own, degrees.map(f64::to_radians))
         };
         let is_full = given_of(given.values, full_entries()).is_some();
-        let across = row_across(&turned, given.dimension).filter(|_| !is_full);
+        let out_of_plane_factors = out_of_plane_row(&turned, given.dimension).filter(|_| !is_full);
         turned
             .iter()
             .all(|entry| entry.is_finite())
             .then_some(Self {
                 matrix: turned,
-                across,
+                out_of_plane_factors,
             })
     }
 
     /// Return the stress zz (Pa) in plane strain, or the strain zz in plane stress, from the strain in the
     /// plane. `None` in 3-D and 1-D, and if the constants of the deck do not determine this result.
-    pub fn across<const D: usize>(&self, strain: &Tensor<f64, D>) -> Option<f64> {
-        let [xx, yy, xy] = self.across?;
+    pub fn out_of_plane<const D: usize>(&self, strain: &Tensor<f64, D>) -> Option<f64> {
+        let [xx, yy, xy] = self.out_of_plane_factors?;
         Some(xx * strain[0][0] + yy * strain[1][1] + xy * (strain[0][1] + strain[1][0]))
     }
 
@@ -461,8 +467,8 @@ fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
 }
 
-/// Return the factors `across` of [`Hooke`] for plane strain; `None` in other dimensions.
-fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
+/// Return the factors `out_of_plane_factors` of [`Hooke`] for plane strain; `None` in other dimensions.
+fn out_of_plane_row(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
     let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
     is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))
 }
@@ -523,7 +529,7 @@ mod tests {
             }
             let hooke = Hooke {
                 matrix,
-                across: None,
+                out_of_plane_factors: None,
             };
             for dimension in [Dimension::Space, Dimension::PlaneStrain { thickness: 1.0 }] {
                 let found = hooke.shear_modulus(dimension);

@@ -216,10 +216,10 @@ pub struct Modes {
 impl Modes {
     /// Return q (Pa), −dq/dx (Pa²) and dΔε̄/dx (Pa) at x (1/Pa).
     fn at(&self, x: f64) -> [f64; 3] {
-        let shrunk = self.stiffnesses.map(|stiffness| 1.0 + x * stiffness);
-        let parts: [f64; 2] = std::array::from_fn(|k| self.squares[k] / shrunk[k].powi(2));
+        let divisors = self.stiffnesses.map(|stiffness| 1.0 + x * stiffness);
+        let parts: [f64; 2] = std::array::from_fn(|k| self.squares[k] / divisors[k].powi(2));
         let q = (parts[0] + parts[1]).sqrt();
-        let weights: [f64; 2] = std::array::from_fn(|k| parts[k] / shrunk[k]);
+        let weights: [f64; 2] = std::array::from_fn(|k| parts[k] / divisors[k]);
         let fall = weights[0] * self.stiffnesses[0] + weights[1] * self.stiffnesses[1];
         [q, fall / q, 2.0 / 3.0 * (weights[0] + weights[1]) / q]
     }

@@ -95,7 +95,7 @@ pub fn at<const D: usize>(
 
 /// Return the out-of-plane Kirchhoff stress in plane strain, Pa; `None` if det F ≤ 0 or b_e is not positive
 /// definite.
-pub fn across<const D: usize>(
+pub fn out_of_plane_stress<const D: usize>(
     law: &Plastic,
     gradient: &SMatrix<f64, D, D>,
     state: &PlasticState,
@@ -365,7 +365,8 @@ mod tests {
                 let gradient = Matrix2::new(t, 1.3 * t, 0.2 * t, -0.4 * t);
                 let [a, b] = [0, 1].map(|k| laws[k].at(&gradient, &mut states[k], 0.0).unwrap().0);
                 largest = largest.max((a - b).norm() / b.norm());
-                let [a, b] = [0, 1].map(|k| laws[k].across(&gradient, &states[k]).unwrap());
+                let [a, b] =
+                    [0, 1].map(|k| laws[k].out_of_plane_stress(&gradient, &states[k]).unwrap());
                 largest = largest.max((a - b).abs() / b.abs());
             }
             assert!(states.iter().all(|state| state.equivalent > 0.3 * size));

@@ -53,7 +53,7 @@ pub struct Correspondence {
     modulus: f64,
     control: Control,
     /// Trace of the shape tensor of an untruncated family, m⁵.
-    whole: f64,
+    untruncated_trace: f64,
 }
 
 /// Dependence of the stress on the deformation gradient.
@@ -160,7 +160,7 @@ fn build(given: &Given) -> Built {
         response: Plastic::of(given).map_or(Response::Elastic(stress), Response::Plastic),
         modulus: stress.largest_modulus(),
         control: Control::of(given, hooke),
-        whole: Influence::Constant.weighted_volume(given.dimension, given.horizon),
+        untruncated_trace: Influence::Constant.weighted_volume(given.dimension, given.horizon),
     })
 }
 
@@ -245,18 +245,18 @@ struct Family<const D: usize> {
 
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state in a step of this length (s). `sums`
-    /// are the sums of the first pass, and `whole` is the spring constant of the initial family, N/m⁷. `None`
-    /// if K is nearly singular, the intact part of the family is stiffer than the stable step allows
-    /// ([`ShapeTensor::inverse_of_rest`]), or the law has no stress at H.
+    /// are the sums of the first pass, and `initial_spring_constant` is the spring constant of the initial
+    /// family, N/m⁷. `None` if K is nearly singular, the intact part of the family is stiffer than the stable
+    /// step allows ([`ShapeTensor::inverse_of_rest`]), or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],
-        whole: f64,
+        initial_spring_constant: f64,
         state: &mut PlasticState,
         step: f64,
     ) -> Option<Family<D>> {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
-        let inverse = shape.inverse_of_rest(self.modulus, whole)?;
+        let inverse = shape.inverse_of_rest(self.modulus, initial_spring_constant)?;
         let gradient = from_rows::<D>(&sums[2 * D..]) * inverse;
         let (stress, energy) = match &self.response {
             Response::Elastic(stress) => stress.at(&gradient)?,
@@ -344,9 +344,9 @@ impl<const D: usize> Law<D> for Correspondence {
     /// singular.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
-        shape
-            .inverse()
-            .map_or(1.0, |inverse| inverse.trace() * self.whole / (D * D) as f64)
+        shape.inverse().map_or(1.0, |inverse| {
+            inverse.trace() * self.untruncated_trace / (D * D) as f64
+        })
     }
 
     #[inline(always)]
@@ -501,17 +501,25 @@ impl<const D: usize> Law<D> for Correspondence {
         end.0[0]
     }
 
-    fn stress_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
+    fn out_of_plane_stress(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        state: &PlasticState,
+    ) -> Option<f64> {
         match &self.response {
-            Response::Elastic(stress) => stress.across(gradient),
-            Response::Plastic(plastic) => plastic.across(gradient, state),
+            Response::Elastic(stress) => stress.out_of_plane_stress(gradient),
+            Response::Plastic(plastic) => plastic.out_of_plane_stress(gradient, state),
         }
     }
 
-    fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
+    fn out_of_plane_stretch(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        state: &PlasticState,
+    ) -> Option<f64> {
         match &self.response {
-            Response::Elastic(stress) => stress.stretch_across(gradient),
-            Response::Plastic(plastic) => plastic.stretch_across(gradient, state),
+            Response::Elastic(stress) => stress.out_of_plane_stretch(gradient),
+            Response::Plastic(plastic) => plastic.out_of_plane_stretch(gradient, state),
         }
     }
 

@@ -203,13 +203,13 @@ impl Plastic {
 
     /// Return the out-of-plane Kirchhoff stress in plane strain, Pa; `None` if the logarithmic strain does
     /// not exist.
-    pub fn across<const D: usize>(
+    pub fn out_of_plane_stress<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
         state: &PlasticState,
     ) -> Option<f64> {
         if self.is_logarithmic {
-            return logarithmic::across(self, gradient, state);
+            return logarithmic::out_of_plane_stress(self, gradient, state);
         }
         let mut elastic = -tensor_of(&state.strain);
         let in_plane = matrix(&green_strain(&rows(gradient)));
@@ -218,7 +218,7 @@ impl Plastic {
     }
 
     /// Return the out-of-plane stretch F_zz in plane stress; `None` if F_zz² would not be positive.
-    pub fn stretch_across<const D: usize>(
+    pub fn out_of_plane_stretch<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
         state: &PlasticState,
@@ -308,7 +308,7 @@ impl Plastic {
                 let doubled = 2.0 * self.shear;
                 Some(if self.is_sheet {
                     let x = law.flow(&self.modes_of_sheet(trial), &surface, state);
-                    deviator(&self.shrunk_in_sheet(trial, x)) * x
+                    deviator(&self.final_stress_in_sheet(trial, x)) * x
                 } else {
                     let modes = Modes {
                         squares: [0.0, most * most],
@@ -338,12 +338,12 @@ impl Plastic {
     }
 
     /// Return the final stress (Pa) in plane stress, from a trial stress (Pa) and x (1/Pa).
-    fn shrunk_in_sheet(&self, trial: &Matrix3<f64>, x: f64) -> Matrix3<f64> {
+    fn final_stress_in_sheet(&self, trial: &Matrix3<f64>, x: f64) -> Matrix3<f64> {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
-        let [even, uneven] = self.modes_of_sheet(trial).stiffnesses;
-        let sum = 0.5 * (xx + yy) / (1.0 + x * even);
-        let difference = 0.5 * (xx - yy) / (1.0 + x * uneven);
-        let shear = xy / (1.0 + x * uneven);
+        let [equibiaxial, in_plane_shear] = self.modes_of_sheet(trial).stiffnesses;
+        let sum = 0.5 * (xx + yy) / (1.0 + x * equibiaxial);
+        let difference = 0.5 * (xx - yy) / (1.0 + x * in_plane_shear);
+        let shear = xy / (1.0 + x * in_plane_shear);
         let mut stress = Matrix3::from_diagonal(&[sum + difference, sum - difference, 0.0].into());
         stress[(0, 1)] = shear;
         stress[(1, 0)] = shear;
@@ -357,18 +357,20 @@ impl Plastic {
     fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64, modulus: f64) -> (f64, Matrix3<f64>) {
         let Modes {
             squares,
-            stiffnesses: [even, uneven],
+            stiffnesses: [equibiaxial, in_plane_shear],
         } = self.modes_of_sheet(trial);
         let hardening = 2.0 / 3.0 * modulus;
         let mut x = 0.0;
         for _ in 0..100 {
-            let shrunk = [1.0 + x * even, 1.0 + x * uneven];
+            let divisors = [1.0 + x * equibiaxial, 1.0 + x * in_plane_shear];
             let parts = [
-                squares[0] / shrunk[0].powi(2),
-                squares[1] / shrunk[1].powi(2),
+                squares[0] / divisors[0].powi(2),
+                squares[1] / divisors[1].powi(2),
             ];
             let q = (parts[0] + parts[1]).sqrt();
-            let slope = -(parts[0] * even / shrunk[0] + parts[1] * uneven / shrunk[1]) / q;
+            let slope = -(parts[0] * equibiaxial / divisors[0]
+                + parts[1] * in_plane_shear / divisors[1])
+                / q;
             let rest = q * (1.0 - hardening * x) - limit;
             let step = rest / (slope * (1.0 - hardening * x) - hardening * q);
             x -= step;
@@ -376,7 +378,7 @@ impl Plastic {
                 break;
             }
         }
-        let stress = self.shrunk_in_sheet(trial, x);
+        let stress = self.final_stress_in_sheet(trial, x);
         (2.0 / 3.0 * x * equivalent(&stress), deviator(&stress) * x)
     }
 }

@@ -117,12 +117,15 @@ impl Stress {
 
     /// Return the out-of-plane Kirchhoff stress (Pa) in plane strain; `None` if the elastic constants of the
     /// deck do not determine this stress.
-    pub fn across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
+    pub fn out_of_plane_stress<const D: usize>(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+    ) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         let volume = determinant(&(SMatrix::identity() + gradient));
         match self {
-            Self::StVenantKirchhoff(hooke) => hooke.across(&strain),
-            Self::Willberg2022(hooke) => Some(hooke.across(&strain)? * volume),
+            Self::StVenantKirchhoff(hooke) => hooke.out_of_plane(&strain),
+            Self::Willberg2022(hooke) => Some(hooke.out_of_plane(&strain)? * volume),
             // The law has no stress for det F ≤ 0.
             Self::NeoHooke(_) if volume <= 0.0 => Some(0.0),
             Self::NeoHooke(law) => {
@@ -132,26 +135,34 @@ impl Stress {
         }
     }
 
-    /// Same as [`Self::across`] for eight bonds; 0 where [`Self::across`] returns `None`.
+    /// Same as [`Self::out_of_plane_stress`] for eight bonds; 0 where [`Self::out_of_plane_stress`] returns
+    /// `None`.
     #[inline(never)]
-    pub fn across_of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> Lanes {
+    pub fn out_of_plane_stress_of_bonds<const D: usize>(
+        &self,
+        gradient: &Tensor<Lanes, D>,
+    ) -> Lanes {
         Lanes(std::array::from_fn(|lane| {
             let own = SMatrix::<f64, D, D>::from_fn(|a, b| gradient[a][b].0[lane]);
-            self.across(&own).unwrap_or(0.0)
+            self.out_of_plane_stress(&own).unwrap_or(0.0)
         }))
     }
 
     /// Return the out-of-plane stretch F_zz in plane stress. `None` if the elastic constants of the deck do
     /// not determine F_zz, or if no positive F_zz exists.
-    pub fn stretch_across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
+    pub fn out_of_plane_stretch<const D: usize>(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+    ) -> Option<f64> {
         let strain = green_strain(&rows(gradient));
         match self {
-            Self::StVenantKirchhoff(hooke) => stretch_of(hooke.across(&strain)?),
+            Self::StVenantKirchhoff(hooke) => stretch_of(hooke.out_of_plane(&strain)?),
             // J of this law is the determinant of the in-plane F, so F_zz is 1.
             Self::Willberg2022(_) => Some(1.0),
             Self::NeoHooke(law) => {
                 let growth = growth(&(matrix(&strain) * 2.0));
-                (growth > -1.0).then(|| libm::exp(0.5 * law.across(libm::log1p(growth))))
+                (growth > -1.0)
+                    .then(|| libm::exp(0.5 * law.log_square_stretch(libm::log1p(growth))))
             }
         }
     }
@@ -232,21 +243,21 @@ impl NeoHooke {
     /// includes the out-of-plane stretch.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
         let own = libm::log1p(growth(doubled));
-        // `across` is the logarithm of the squared out-of-plane stretch.
-        let across = if self.plane_stress && D == 2 {
-            self.across(own)
+        // `log_square` is the logarithm of the squared out-of-plane stretch.
+        let log_square = if self.plane_stress && D == 2 {
+            self.log_square_stretch(own)
         } else {
             0.0
         };
-        let log = own + across;
-        let trace = doubled.trace() + libm::expm1(across);
+        let log = own + log_square;
+        let trace = doubled.trace() + libm::expm1(log_square);
         let energy = 0.5 * self.shear * (trace - log) + 0.125 * self.lambda * log * log;
         (log, energy)
     }
 
     /// Return the logarithm q of the squared out-of-plane stretch in plane stress. `own` is ln det FᵀF of the
     /// in-plane F. q solves μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
-    fn across(&self, own: f64) -> f64 {
+    fn log_square_stretch(&self, own: f64) -> f64 {
         let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
         for _ in 0..20 {
             let rest = self.shear * libm::expm1(q) + 0.5 * self.lambda * (own + q);

@@ -116,8 +116,8 @@ impl<F: Form> PositionAware<F> {
     }
 
     /// Return σ of an untruncated family, N/m⁷.
-    fn whole(&self) -> f64 {
-        self.ordinary.extensional() / self.ordinary.whole()
+    fn untruncated_sigma(&self) -> f64 {
+        self.ordinary.extensional() / self.ordinary.untruncated_weighted_volume()
     }
 
     /// Return k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa), θ/d and θ, from the sums of [`Law::pass_contribution`].
@@ -311,7 +311,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
             return Lanes::splat(1.0);
         }
         let both = F::deviatoric(bond, &here.1) + F::deviatoric(bond, &there.1);
-        (Lanes::splat(self.whole() + other.whole()) / both).sqrt()
+        (Lanes::splat(self.untruncated_sigma() + other.untruncated_sigma()) / both).sqrt()
     }
 }
 
@@ -457,7 +457,7 @@ mod tests {
             functions_of::<Nearest>(&[], &family(|_| true)),
             functions_of::<Directional>(&[], &family(|_| true)),
         ] {
-            let of_ordinary = law::<Nearest>().whole();
+            let of_ordinary = law::<Nearest>().untruncated_sigma();
             for [omega, sigma] in functions.0 {
                 assert!((0.0..1e-100).contains(&omega), "{omega}");
                 assert!((0.0..1e-100 * of_ordinary).contains(&sigma), "{sigma}");

@@ -45,7 +45,7 @@ impl Form for Nearest {
         let relative = limited(nearest(deviatoric, of_squares).tensor);
         let [least, _] = extremes(&relative);
         let sigma = relative * reference;
-        let square = sum_of_squares(of_squares, &sigma);
+        let square = sigma_weighted_volume(of_squares, &sigma);
         Fit {
             omega: omega.tensor,
             sigma,
@@ -153,7 +153,7 @@ fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
 }
 
 /// Return the sum Σ σ|ξ|² Ṽ for σ = N·S N, from the sums of |ξ|² Ṽ times the monomials of N.
-fn sum_of_squares<const D: usize>(sums: &[f64], tensor: &SMatrix<f64, D, D>) -> f64 {
+fn sigma_weighted_volume<const D: usize>(sums: &[f64], tensor: &SMatrix<f64, D, D>) -> f64 {
     let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
     let polynomial: Vec<_> = pairs
         .map(|(a, b)| (of_product(a, b), tensor[(a, b)]))

@@ -105,7 +105,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
     fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
-        (functions, [ratio, pressure, even, mean, _]): &Self::Point,
+        (functions, [ratio, pressure, isotropic_stretch, mean, _]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> [Lanes; 3] {
         let bond = elastic(bond, *plastic);
@@ -122,7 +122,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
                 [weighted * part, weighted, nothing]
             }
             _ => {
-                let point = (*functions, [*ratio, *pressure, *even]);
+                let point = (*functions, [*ratio, *pressure, *isotropic_stretch]);
                 self.elastic.pass_contribution::<0>(&bond, &point, &[])
             }
         }
@@ -166,25 +166,28 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
     fn bond_history(
         &self,
         bond: &Bond<D>,
-        (functions, [.., even, mean, shrunk]): &Self::Point,
+        (functions, [.., isotropic_stretch, mean, plastic_fraction]): &Self::Point,
         [plastic, loss]: &[Lanes; 2],
         _: f64,
     ) -> [Lanes; 2] {
         let stretch = bond.stretch - *plastic;
-        let change = (stretch - *mean) * *shrunk;
+        let change = (stretch - *mean) * *plastic_fraction;
         let factor = F::deviatoric(bond, &functions.1) * (bond.length * bond.length);
-        let taken = factor * (stretch - *even - change) * change;
-        [*plastic + change, *loss + taken]
+        let dissipated = factor * (stretch - *isotropic_stretch - change) * change;
+        [*plastic + change, *loss + dissipated]
     }
 
     #[inline(always)]
     fn force_state(
         &self,
         bond: &Bond<D>,
-        (functions, [ratio, pressure, even, ..]): &Self::Point,
+        (functions, [ratio, pressure, isotropic_stretch, ..]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> Along {
-        let point = (*functions, [*ratio, *pressure, *even + *plastic]);
+        let point = (
+            *functions,
+            [*ratio, *pressure, *isotropic_stretch + *plastic],
+        );
         self.elastic.force_state(bond, &point, &[])
     }
 
@@ -192,10 +195,13 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        (functions, [ratio, pressure, even, ..]): &Self::Point,
+        (functions, [ratio, pressure, isotropic_stretch, ..]): &Self::Point,
         [plastic, _]: &[Lanes; 2],
     ) -> Lanes {
-        let point = (*functions, [*ratio, *pressure, *even + *plastic]);
+        let point = (
+            *functions,
+            [*ratio, *pressure, *isotropic_stretch + *plastic],
+        );
         self.elastic.bond_energy(bond, &point, &[])
     }
 

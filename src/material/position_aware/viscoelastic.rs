@@ -122,34 +122,38 @@ impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
     fn bond_history(
         &self,
         bond: &Bond<D>,
-        (functions, [_, _, even]): &Self::Point,
+        (functions, [_, _, isotropic_stretch]): &Self::Point,
         history: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
         let factor = F::deviatoric(bond, &functions.1) * (bond.length * bond.length);
-        (self.relaxation).after(bond.stretch - *even, history, factor, step)
+        (self.relaxation).after(bond.stretch - *isotropic_stretch, history, factor, step)
     }
 
     #[inline(always)]
     fn force_state(
         &self,
         bond: &Bond<D>,
-        (functions, [ratio, pressure, even]): &Self::Point,
+        (functions, [ratio, pressure, isotropic_stretch]): &Self::Point,
         [back, ..]: &[Lanes; 3],
     ) -> Along {
-        let eased = *even + *back * self.relaxation.share();
-        (self.elastic).force_state(bond, &(*functions, [*ratio, *pressure, eased]), &[])
+        let isotropic_and_relaxed = *isotropic_stretch + *back * self.relaxation.share();
+        (self.elastic).force_state(
+            bond,
+            &(*functions, [*ratio, *pressure, isotropic_and_relaxed]),
+            &[],
+        )
     }
 
     #[inline(always)]
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        (functions, [_, _, even]): &Self::Point,
+        (functions, [_, _, isotropic_stretch]): &Self::Point,
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
-        let part = bond.stretch - *even;
-        let square = part * part + self.relaxation.released(part, *back);
+        let part = bond.stretch - *isotropic_stretch;
+        let square = part * part + self.relaxation.change_of_square(part, *back);
         square * (bond.length * bond.length) * F::deviatoric(bond, &functions.1) * 0.5
     }
 

@@ -148,7 +148,7 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
         }
         let micromodulus =
             F::half(bond, here) * self.micromodulus + F::half(bond, there) * other.micromodulus;
-        let whole = 0.5 * (self.micromodulus + other.micromodulus);
-        (Lanes::splat(whole) / micromodulus).sqrt()
+        let untruncated = 0.5 * (self.micromodulus + other.micromodulus);
+        (Lanes::splat(untruncated) / micromodulus).sqrt()
     }
 }

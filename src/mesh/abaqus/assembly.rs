@@ -66,7 +66,7 @@ pub(super) struct Instance {
     pub(super) rotation: Rotation3<f64>,
     /// A point on the axis of rotation.
     pub(super) pivot: Vector3<f64>,
-    pub(super) lines: usize,
+    pub(super) position_lines_read: usize,
 }
 
 /// If there are more than `limit` numbers, remove repeated numbers and set a new limit of more than twice the
@@ -85,7 +85,7 @@ impl Reader {
         let mut part = part;
         for node in &mut part.nodes {
             let moved = Vector3::from(*node) + instance.translation;
-            let turned = if instance.lines > 1 {
+            let turned = if instance.position_lines_read > 1 {
                 instance.rotation * (moved - instance.pivot) + instance.pivot
             } else {
                 moved

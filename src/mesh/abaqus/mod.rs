@@ -250,7 +250,7 @@ impl Reader {
                     translation: Vector3::zeros(),
                     rotation: Rotation3::identity(),
                     pivot: Vector3::zeros(),
-                    lines: 0,
+                    position_lines_read: 0,
                 });
                 self.data = Data::Position;
             }
@@ -459,8 +459,8 @@ impl Reader {
         let numbers = numbers.collect::<Result<Vec<f64>>>()?;
         let place = self.place.clone();
         let instance = self.instance.as_mut().expect("an instance is being read");
-        instance.lines += 1;
-        match (instance.lines, &numbers[..]) {
+        instance.position_lines_read += 1;
+        match (instance.position_lines_read, &numbers[..]) {
             (1, all) if all.len() <= 3 => {
                 for (k, x) in all.iter().enumerate() {
                     instance.translation[k] = *x;

@@ -25,7 +25,7 @@ struct Retained {
 }
 
 /// Description of the history of a result, and the number of its retained rows; `None` without a history.
-type KeptHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
+type RetainedHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
     /// Resume a result after its first steps and history rows, and drop later steps and rows. Return the
@@ -65,7 +65,7 @@ impl<'a> ResultFile<'a> {
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
-        history: KeptHistory,
+        history: RetainedHistory,
         retained: Retained,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
         let total = contents.piece.total;
@@ -117,7 +117,7 @@ impl<'a> ResultFile<'a> {
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
-        history: KeptHistory,
+        history: RetainedHistory,
         retained: Retained,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
         let piece = contents.piece;

@@ -8,7 +8,7 @@ use crate::damage::{
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::families::{BlockBonds, CellShare, Fault};
+use crate::families::{BlockBonds, Fault, VolumeFactors};
 use crate::material::{Built, Given, PairLaw};
 use crate::memory::check_room;
 use crate::points::distance_squared;
@@ -120,10 +120,10 @@ fn build(
 
 /// Return the volume correction factors of the cells of block `neighbours` in the families of points with
 /// this horizon (m).
-fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
+fn volume_factors(problem: &Problem, neighbours: &Block, horizon: f64) -> VolumeFactors {
     // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
-    CellShare::new(
+    VolumeFactors::new(
         problem.volume_correction,
         horizon,
         edge,
@@ -138,7 +138,7 @@ pub fn cutoffs(problem: &Problem) -> Vec<f64> {
             return 0.0;
         }
         let horizon = constants(problem, here, there).horizon;
-        cell_share(problem, there, horizon).cutoff()
+        volume_factors(problem, there, horizon).cutoff()
     };
     let blocks: Vec<Block> = problem.blocks().collect();
     let pairs = blocks
@@ -234,7 +234,7 @@ fn damage_law(
     };
     let energy = match damage.rule {
         DamageRule::CriticalStretch | DamageRule::Stress(_) => energy,
-        DamageRule::Energy { calibration, .. } => energy * calibration.share(dimension),
+        DamageRule::Energy { calibration, .. } => energy * calibration.energy_ratio(dimension),
     };
     let (critical, alpha) = (stretch(energy), damage.alpha);
     match damage.rule {
@@ -334,12 +334,12 @@ fn criterion(
     match (rules.reduce(WorkRule::of_both), per_point) {
         (Some(rule), true) => Criterion::WorkThresholds(ratios, rule, directions),
         (Some(rule), false) => {
-            let takes = ratios.map(|of_end| {
+            let shares = ratios.map(|of_end| {
                 let all = of_end.into_iter().zip(critical);
                 let converted = all.filter_map(|(ratio, critical)| Some(ratio * critical?));
                 0.5 * converted.fold(f64::INFINITY, f64::min)
             });
-            Criterion::Work(takes, rule)
+            Criterion::Work(shares, rule)
         }
         (None, true) => {
             let critical = critical.map(|critical| critical.unwrap_or(0.0));
@@ -386,7 +386,7 @@ pub fn assign<const D: usize>(
                     .map(|damage| damage_law(problem, block.body, damage, constants)),
                 own_critical_stretch: own_critical_stretch(problem, block.body, constants),
                 horizon,
-                share: cell_share(problem, &other, horizon),
+                volume_factors: volume_factors(problem, &other, horizon),
             }
         });
         weigh(problem, model, &mut bonds, &ends)?;
@@ -408,7 +408,7 @@ pub fn assign<const D: usize>(
             bonds,
             laws: PairLaw::new(own, far),
             criterion,
-            influence: problem.volume_correction == VolumeCorrection::None,
+            no_volume_correction: problem.volume_correction == VolumeCorrection::None,
         })
     };
     all.into_iter().map(give).collect()
@@ -426,16 +426,16 @@ struct End {
     /// Horizon, m.
     horizon: f64,
     /// Volume correction factors of the other block's cells in the families of this end.
-    share: CellShare,
+    volume_factors: VolumeFactors,
 }
 
 impl End {
     /// Return the weight of the volume of a neighbour at the offset ξ (m) from the point at this end.
     fn weight(&self, offset: [f64; 3]) -> f64 {
-        let share = self.share.at(offset);
+        let factor = self.volume_factors.at(offset);
         match &self.built.influence {
-            None => share,
-            Some(influence) => share * influence(distance_squared([0.0; 3], offset).sqrt()),
+            None => factor,
+            Some(influence) => factor * influence(distance_squared([0.0; 3], offset).sqrt()),
         }
     }
 }

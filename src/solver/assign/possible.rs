@@ -123,7 +123,7 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
         if let Some(fault) = all.into_iter().find_map(of_bonds) {
             let name = law.declaration.name;
             let message = format!("[body.{}] law `{name}`: {fault}", here.body.name);
-            return Err(Error::input(message).at(&here.body.horizon_place));
+            return Err(Error::input(message).at(&here.body.horizon_span));
         }
     }
     Ok(())

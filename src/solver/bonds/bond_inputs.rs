@@ -52,7 +52,7 @@ impl<const D: usize> BondInputs<'_, D> {
         for places in self.places {
             // SAFETY: different `BondInputs` have disjoint ranges of points, so no other thread writes these
             // points.
-            unsafe { places.take(self.points.start, displacement, thermal_stretch) };
+            unsafe { places.copy_from(self.points.start, displacement, thermal_stretch) };
         }
     }
 }

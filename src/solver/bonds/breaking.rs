@@ -23,7 +23,7 @@ pub struct BreakingBonds {
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
     /// Whether the weights of the bonds contain no volume correction, but only the influence function.
-    pub influence: bool,
+    pub no_volume_correction: bool,
 }
 
 impl BreakingBonds {
@@ -34,7 +34,7 @@ impl BreakingBonds {
         if !self.criterion.reads_work() {
             return Lanes::splat(0.0);
         }
-        let weights = group.weights_of_work(simd, self.influence);
+        let weights = group.weights_of_work(simd, self.no_volume_correction);
         group.work_of_ends(simd, &self.laws, weights)
     }
 }

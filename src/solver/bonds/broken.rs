@@ -120,7 +120,7 @@ impl<const D: usize> Forces<D> {
         // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);
         let Acting { force, plastic, .. } = acting;
-        let before = self.held(model, points.clone(), plastic);
+        let before = self.energy_with_plastic_work(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
             if pass != Pass::PointSum(0) {
                 self.update(HaloContent::OwnNumbers, Which::Owned);
@@ -131,7 +131,7 @@ impl<const D: usize> Forces<D> {
         }
         // Lattice bonds read copies of the point numbers in the grids, so update these copies.
         self.update(HaloContent::OwnNumbers, Which::Owned);
-        let after = self.held(model, points.clone(), plastic);
+        let after = self.energy_with_plastic_work(model, points.clone(), plastic);
         for broken in &mut self.broken {
             if points.contains(&broken.point) {
                 let k = broken.point - points.start;
@@ -142,7 +142,7 @@ impl<const D: usize> Forces<D> {
 
     /// Return the stored energy density plus the energy density that plastic flow has dissipated (J/m³), for
     /// each point of a range.
-    fn held(
+    fn energy_with_plastic_work(
         &mut self,
         model: &Model<D>,
         points: Range<usize>,

@@ -106,9 +106,9 @@ impl<const D: usize> Forces<D> {
         let piece = PIECE * rayon::current_num_threads();
         let start = Instant::now();
         let mut in_bonds = Duration::ZERO;
-        for turn in 0..self.passes.len() {
-            let pass = self.passes[turn];
-            let content = self.content(turn);
+        for pass_index in 0..self.passes.len() {
+            let pass = self.passes[pass_index];
+            let content = self.content(pass_index);
             let mut halo = std::mem::take(&mut self.halo);
             let (columns, count) =
                 self.halo_columns(content, displacement, thermal_stretch.as_deref_mut());
@@ -230,8 +230,8 @@ impl<const D: usize> Forces<D> {
     pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
         let mut thermal_stretch = Vec::new();
         let mut sizes = Vec::new();
-        for turn in 0..self.passes.len() {
-            let name = match self.content(turn) {
+        for pass_index in 0..self.passes.len() {
+            let name = match self.content(pass_index) {
                 HaloContent::Motion if is_thermal => "displacements and thermal stretches",
                 HaloContent::Motion => "displacements",
                 HaloContent::Thresholds => "thresholds",
@@ -241,17 +241,17 @@ impl<const D: usize> Forces<D> {
             let mut displacement = [const { Vec::new() }; D];
             let thermal_stretch = is_thermal.then_some(&mut thermal_stretch[..]);
             let (_, columns) =
-                self.halo_columns(self.content(turn), &mut displacement, thermal_stretch);
+                self.halo_columns(self.content(pass_index), &mut displacement, thermal_stretch);
             sizes.push((name, columns));
         }
         sizes
     }
 
-    /// Return the point data that the pass with index `turn` receives from other ranks.
-    fn content(&self, turn: usize) -> HaloContent {
+    /// Return the point data that the pass with index `pass_index` receives from other ranks.
+    fn content(&self, pass_index: usize) -> HaloContent {
         match (
-            turn.checked_sub(1).map(|before| self.passes[before]),
-            self.passes[turn],
+            pass_index.checked_sub(1).map(|before| self.passes[before]),
+            self.passes[pass_index],
         ) {
             (None, _) => HaloContent::Motion,
             (Some(Pass::SmallestStretch), _) => HaloContent::Thresholds,
@@ -355,14 +355,14 @@ impl<const D: usize> Forces<D> {
                     } else {
                         Criterion::Never
                     };
-                    let influence = interaction.influence;
+                    let no_volume_correction = interaction.no_volume_correction;
                     let breaking = BreakingBonds {
                         laws: interaction.laws.laws(),
                         criterion,
-                        influence,
+                        no_volume_correction,
                     };
                     with_pair!(interaction.laws, laws => {
-                        let kernel = Force { laws, criterion, influence, bond_update };
+                        let kernel = Force { laws, criterion, no_volume_correction, bond_update };
                         let results = force.each_mut().map(Vec::as_mut_slice);
                         let bonds = &mut interaction.bonds;
                         let points = points.clone();

@@ -46,7 +46,7 @@ pub struct Force<L> {
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
     /// Whether the weights of the bonds contain no volume correction, but only the influence function.
-    pub influence: bool,
+    pub no_volume_correction: bool,
     /// Changes of the bond state.
     pub bond_update: BondUpdate,
 }
@@ -84,9 +84,9 @@ impl<L> Force<L> {
         if !self.criterion.reads_work() {
             return Lanes::splat(0.0);
         }
-        let weights = group.weights_of_work(simd, self.influence);
+        let weights = group.weights_of_work(simd, self.no_volume_correction);
         if L::Force::CENTRAL {
-            let total = if self.influence {
+            let total = if self.no_volume_correction {
                 total
             } else {
                 self.weighted(simd, group, weights)
@@ -99,7 +99,7 @@ impl<L> Force<L> {
     /// Time increment of the bond history that the evaluation computes, s; `None` if the evaluation computes
     /// no history.
     #[inline(always)]
-    fn advances_history<const D: usize>(&self) -> Option<f64>
+    fn history_step<const D: usize>(&self) -> Option<f64>
     where
         L: Law<D>,
     {
@@ -177,7 +177,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
-        if let Some(step) = self.advances_history() {
+        if let Some(step) = self.history_step() {
             let [own, far] = &self.laws;
             let [here, there] = group.points();
             group.history = [

@@ -140,9 +140,9 @@ pub struct OwnedPlaces<'a, const D: usize> {
     values: PhantomData<&'a mut f64>,
 }
 
-// SAFETY: threads write to the columns only under the conditions of `take`.
+// SAFETY: threads write to the columns only under the conditions of `copy_from`.
 unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
-// SAFETY: threads write to the columns only under the conditions of `take`.
+// SAFETY: threads write to the columns only under the conditions of `copy_from`.
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {
@@ -151,7 +151,7 @@ impl<const D: usize> OwnedPlaces<'_, D> {
     ///
     /// # Safety
     /// No other thread may write any of these points at the same time.
-    pub unsafe fn take(
+    pub unsafe fn copy_from(
         &self,
         first: usize,
         displacement: [&[f64]; D],

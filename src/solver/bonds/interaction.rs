@@ -16,7 +16,7 @@ pub struct Interaction {
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
     /// Whether the weights of the bonds contain no volume correction, but only the influence function.
-    pub influence: bool,
+    pub no_volume_correction: bool,
 }
 
 /// Laws of the points of a block.

@@ -56,11 +56,11 @@ where
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     /// Weights of the force states in the work of a bond: the influence function, without volume correction.
-    /// `influence` says whether [`Self::weights`] contain no volume correction. With a volume correction,
-    /// criteria that read the work require the influence function 1.
+    /// `no_volume_correction` says whether [`Self::weights`] contain no volume correction. With a volume
+    /// correction, criteria that read the work require the influence function 1.
     #[inline(always)]
-    pub fn weights_of_work<S: Simd>(&self, simd: S, influence: bool) -> Weights {
-        if influence {
+    pub fn weights_of_work<S: Simd>(&self, simd: S, no_volume_correction: bool) -> Weights {
+        if no_volume_correction {
             self.weights
         } else {
             self.weights.uncorrected(simd)

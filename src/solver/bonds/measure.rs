@@ -18,7 +18,7 @@ use super::sweep::{PointData, sweep, sweep_from};
 
 /// Sums over the bonds of the owned points, by column.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stored {
+pub struct BondSums {
     /// Strain energy density W, J/m³; empty if energies were not requested.
     pub energy: Vec<f64>,
     /// Volume of the intact neighbours within the horizon of the point, m³.
@@ -47,19 +47,19 @@ impl<const D: usize> Forces<D> {
         sums
     }
 
-    /// Sum the quantities of [`Stored`] except `softened` for each owned point, at the displacements of the
+    /// Sum the quantities of [`BondSums`] except `softened` for each owned point, at the displacements of the
     /// last [evaluation](Self::evaluate).
-    pub fn stored(&mut self, model: &Model<D>) -> Stored {
+    pub fn stored(&mut self, model: &Model<D>) -> BondSums {
         self.stored_at(model, 0..model.owned())
     }
 
     /// Same as [`Self::stored`], for a range of points that consists of whole lane groups.
-    pub(super) fn stored_at(&mut self, model: &Model<D>, points: Range<usize>) -> Stored {
+    pub(super) fn stored_at(&mut self, model: &Model<D>, points: Range<usize>) -> BondSums {
         let mut columns: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; points.len()]);
         self.for_each_interaction(|interaction, source| {
             let [law, _] = interaction.laws.laws();
             let keeps_history = law.counts::<D>().bond_history > 0;
-            let kernel = measures::Stored { law, keeps_history };
+            let kernel = measures::EnergiesAndFamilies { law, keeps_history };
             let results = <[Lanes; 4]>::columns_mut(&mut columns);
             let (bonds, base) = (&mut interaction.bonds, points.start);
             sweep_from(bonds, points.clone(), base, results, &kernel, source);
@@ -71,7 +71,7 @@ impl<const D: usize> Forces<D> {
                 *energy += Law::<D>::point_energy(law, &self.numbers.of(point));
             }
         }
-        Stored {
+        BondSums {
             energy,
             volume,
             softened: Vec::new(),
@@ -85,7 +85,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Same as [`Self::stored`] without the energies, whose computation takes most of the time.
-    pub fn intact_families(&mut self, model: &Model<D>) -> Stored {
+    pub fn intact_families(&mut self, model: &Model<D>) -> BondSums {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
             sweep_all(
                 &mut interaction.bonds,
@@ -95,7 +95,7 @@ impl<const D: usize> Forces<D> {
             );
         });
         let [volume, neighbours] = columns.try_into().expect("two columns");
-        Stored {
+        BondSums {
             energy: Vec::new(),
             volume,
             softened: Vec::new(),
@@ -104,7 +104,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Compute [`Stored::softened`].
+    /// Compute [`BondSums::softened`].
     pub fn softened(&mut self, model: &Model<D>) -> Vec<f64> {
         if !self.blocks.iter().any(|block| block.law.softens::<D>()) {
             return Vec::new();
@@ -151,9 +151,9 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Out-of-plane Kirchhoff stress of each owned point (Pa) in plane strain, at the displacements of the
-    /// last [evaluation](Self::evaluate) and the plastic state of each point; see [`Law::stress_across`].
-    /// `None` for a point whose law does not compute this stress.
-    pub fn stress_across(
+    /// last [evaluation](Self::evaluate) and the plastic state of each point; see
+    /// [`Law::out_of_plane_stress`]. `None` for a point whose law does not compute this stress.
+    pub fn out_of_plane_stress(
         &mut self,
         model: &Model<D>,
         plastic: impl Fn(usize) -> PlasticState,
@@ -161,27 +161,27 @@ impl<const D: usize> Forces<D> {
         let gradients = self.elastic_gradient(model);
         let columns = self.measure(model.owned(), 1, |interaction, sums, source| {
             let [law, _] = interaction.laws.laws();
-            if law.has_bond_stress_across::<D>() {
-                let kernel = measures::StressAcross { law };
+            if law.has_out_of_plane_bond_stress::<D>() {
+                let kernel = measures::OutOfPlaneStress { law };
                 sweep_all(&mut interaction.bonds, sums, &kernel, source);
             }
         });
-        let across = |point: usize| {
+        let stress = |point: usize| {
             let law = &self.blocks[usize::from(model.block[point])].law;
             let gradient = gradients[point] - SMatrix::identity();
-            let of_point = Law::<D>::stress_across(law, &gradient, &plastic(point))?;
-            Some(if law.has_bond_stress_across::<D>() {
+            let of_point = Law::<D>::out_of_plane_stress(law, &gradient, &plastic(point))?;
+            Some(if law.has_out_of_plane_bond_stress::<D>() {
                 columns[0][point]
             } else {
                 of_point
             })
         };
-        (0..model.owned()).map(across).collect()
+        (0..model.owned()).map(stress).collect()
     }
 
     /// Out-of-plane stretch F_zz of an owned point in plane stress, at its deformation gradient and plastic
-    /// state. `None` if the law does not compute this stretch; see [`Law::stretch_across`].
-    pub fn stretch_across(
+    /// state. `None` if the law does not compute this stretch; see [`Law::out_of_plane_stretch`].
+    pub fn out_of_plane_stretch(
         &self,
         model: &Model<D>,
         point: usize,
@@ -190,7 +190,7 @@ impl<const D: usize> Forces<D> {
     ) -> Option<f64> {
         let law = &self.blocks[usize::from(model.block[point])].law;
         let gradient = deformation - SMatrix::identity();
-        Law::<D>::stretch_across(law, &gradient, plastic)
+        Law::<D>::out_of_plane_stretch(law, &gradient, plastic)
     }
 
     /// Deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
@@ -307,10 +307,10 @@ impl<const D: usize> Forces<D> {
             if let Some(volume) = of_law {
                 weighted_volume[point] = volume;
             }
-            // If the law stores its weighted volume, the sum for θ is divided by this volume, which includes
-            // broken bonds. Otherwise the sum is divided by the weighted volume of the intact bonds. `growth`
-            // contains the thermal strain of the intact bonds only, so the thermal strain of the broken bonds
-            // is added.
+            // θ is the elastic dilatation plus the thermal strain. If the law stores its weighted volume, the
+            // sum for θ is divided by this volume, which includes broken bonds. Otherwise the sum is divided
+            // by the weighted volume of the intact bonds. `growth` contains the thermal strain of the intact
+            // bonds only, so the thermal strain of the broken bonds is added.
             let volume = of_law.unwrap_or(intact[point]);
             let thermal = D as f64 * thermal_stretch.map_or(0.0, |stretch| stretch[point]);
             *growth = match Law::<D>::dilatation(law, &numbers) {

@@ -23,14 +23,14 @@ pub(super) const fn wanted(linear: bool) -> Wanted {
 /// 2. number of intact bonds, including bonds longer than the horizon of the point;
 /// 3. energy density that all bonds have dissipated without breaking, J/m³.
 #[derive(Clone, Copy)]
-pub struct Stored {
+pub struct EnergiesAndFamilies {
     /// The law of point i.
     pub law: AnyLaw,
     /// Whether bonds have a history.
     pub keeps_history: bool,
 }
 
-impl<const D: usize> Kernel<D> for Stored {
+impl<const D: usize> Kernel<D> for EnergiesAndFamilies {
     type Sums = [Lanes; 4];
     type Point = AnyPoint;
     type Far = [Lanes; 0];
@@ -56,7 +56,7 @@ impl<const D: usize> Kernel<D> for Stored {
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
         let (family, own) = (group.family(), group.own);
         let energy = self.law.bond_energy(&group.bond, own, &group.history[0]);
-        let energy = simd.whole(group.weighted_by_volume(energy));
+        let energy = simd.opaque(group.weighted_by_volume(energy));
         sums[0] += simd.keep(energy, family);
         sums[1] += simd.keep(group.volume, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
@@ -68,7 +68,7 @@ impl<const D: usize> Kernel<D> for Stored {
 }
 
 /// Kernel that sums the volume of the intact neighbours within the horizon of point i (m³), and counts the
-/// intact bonds as in [`Stored`].
+/// intact bonds as in [`EnergiesAndFamilies`].
 #[derive(Clone, Copy)]
 pub struct IntactFamilies;
 
@@ -223,14 +223,14 @@ impl<const D: usize> Kernel<D> for Stress {
     }
 }
 
-/// Kernel that sums [`Law::bond_stress_across`] times ω Ṽ over the intact bonds, Pa.
+/// Kernel that sums [`Law::out_of_plane_bond_stress`] times ω Ṽ over the intact bonds, Pa.
 #[derive(Clone, Copy)]
-pub struct StressAcross {
+pub struct OutOfPlaneStress {
     /// Law of point i.
     pub law: AnyLaw,
 }
 
-impl<const D: usize> Kernel<D> for StressAcross {
+impl<const D: usize> Kernel<D> for OutOfPlaneStress {
     type Sums = [Lanes; 1];
     type Point = AnyPoint;
     type Far = [Lanes; 0];
@@ -246,7 +246,7 @@ impl<const D: usize> Kernel<D> for StressAcross {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
-        let stress = self.law.bond_stress_across(&group.bond, group.own);
+        let stress = self.law.out_of_plane_bond_stress(&group.bond, group.own);
         sums[0] += simd.keep(group.weighted_by_volume(stress), group.intact);
     }
 }

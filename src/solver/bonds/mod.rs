@@ -56,7 +56,7 @@ pub use broken_moments::Moments;
 pub use evaluate::{Acting, ForceTimes};
 pub use force::BondUpdate;
 pub use interaction::{BlockLaws, Interaction, PairReads};
-pub use measure::Stored;
+pub use measure::BondSums;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
 
@@ -405,17 +405,21 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Exchange the ghost values of a column over the local points. Collective.
-    pub fn bring(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
+    pub fn update_ghosts_of(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
         self.halo.update_ghosts(comm, &mut [values]);
     }
 
     /// Exchange the ghost values of several columns over the local points. Collective.
-    pub fn bring_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
+    pub fn update_ghosts_of_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
         self.halo.update_ghosts(comm, columns);
     }
 
     /// Exchange the displacements of the ghosts. Collective.
-    pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
+    pub fn update_ghost_displacements(
+        &mut self,
+        comm: &dyn Communicator,
+        displacement: &mut [Vec<f64>; D],
+    ) {
         let mut components = displacement.each_mut().map(Vec::as_mut_slice);
         self.halo.update_ghosts(comm, &mut components);
     }
@@ -430,7 +434,7 @@ impl<const D: usize> Forces<D> {
         protected: &mut [f64],
         between: impl Fn([usize; 2]) -> bool,
     ) {
-        self.bring(comm, protected);
+        self.update_ghosts_of(comm, protected);
         let mut in_block = vec![0.0_f64; self.blocks.len()];
         for (block, protected) in block.iter().zip(&*protected) {
             let most = &mut in_block[usize::from(*block)];

@@ -84,16 +84,16 @@ fn cauchy<const D: usize>(
             stress[(a, b)] = 0.5 * (kirchhoff[(a, b)] + kirchhoff[(b, a)]);
         }
     }
-    let in_setting = determinant(&deformation);
+    let in_plane = determinant(&deformation);
     let ratio = block.elastic.poisson_ratio;
-    let (across, directions) = match block.dimension {
+    let (out_of_plane_stretch, directions) = match block.dimension {
         Dimension::PlaneStress { .. } => {
-            let stretch = Law::<D>::stretch_across(&block.law, gradient, plastic);
-            let default = || libm::pow(in_setting, -ratio / (1.0 - ratio));
+            let stretch = Law::<D>::out_of_plane_stretch(&block.law, gradient, plastic);
+            let default = || libm::pow(in_plane, -ratio / (1.0 - ratio));
             (stretch.unwrap_or_else(default), 3)
         }
         Dimension::PlaneStrain { .. } => {
-            let of_law = Law::<D>::stress_across(&block.law, gradient, plastic);
+            let of_law = Law::<D>::out_of_plane_stress(&block.law, gradient, plastic);
             let default = ratio * (stress[(0, 0)] + stress[(1, 1)]);
             // In plane strain, `thermal` is (1 + ν) α ΔT. The thermal stress −E α ΔT perpendicular to the
             // plane is therefore −2G `thermal`.
@@ -103,6 +103,6 @@ fn cauchy<const D: usize>(
         }
         Dimension::Space | Dimension::Line { .. } => (1.0, 3),
     };
-    let growth = in_setting * across * (1.0 + thermal).powi(directions);
-    (growth > 0.0).then(|| stress / growth)
+    let volume_ratio = in_plane * out_of_plane_stretch * (1.0 + thermal).powi(directions);
+    (volume_ratio > 0.0).then(|| stress / volume_ratio)
 }

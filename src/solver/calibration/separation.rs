@@ -104,7 +104,7 @@ fn fracture_energy(problem: &Problem, body: usize, normal: [f64; 3]) -> Option<f
     let elastic = body.material.elastic;
     let damage = body.damage.as_ref()?;
     let cost = damage.direction.map_or(1.0, |direction| {
-        direction.cost(problem.dimension.count(), normal)
+        direction.relative_fracture_energy(problem.dimension.count(), normal)
     });
     let along =
         match damage.toughness {

@@ -27,7 +27,7 @@ pub fn are_finite<const D: usize>(
     model: &Model<D>,
     time: f64,
 ) -> Result<()> {
-    let looker = FiniteCheck {
+    let check = FiniteCheck {
         problem,
         comm,
         model,
@@ -42,7 +42,7 @@ pub fn are_finite<const D: usize>(
                 if let Some((values, place)) = values {
                     let key = format!("[initial.{}] {quantity}", initial.name);
                     let values = values.iter().map(Some).zip([1.0; D]);
-                    looker.look(&key, &COMPONENTS, place, initial.set, values)?;
+                    check.check_values(&key, &COMPONENTS, place, initial.set, values)?;
                 }
             }
         }
@@ -57,7 +57,7 @@ pub fn are_finite<const D: usize>(
         match &condition.action {
             Action::Displacement(values) | Action::Velocity(values) => {
                 let values = values.iter().map(Option::as_ref).zip([1.0; D]);
-                looker.look(&key, &COMPONENTS, place, set, values)?;
+                check.check_values(&key, &COMPONENTS, place, set, values)?;
             }
             Action::BodyForce(values, factors) => {
                 // Only the smallest divisor is checked, because this divisor gives the largest load.
@@ -66,16 +66,16 @@ pub fn are_finite<const D: usize>(
                 let smallest_divisor = divisors.into_iter().fold(f64::INFINITY, f64::min);
                 let factors = factors.iter().map(|factor| factor / smallest_divisor);
                 let values = values.iter().map(Some).zip(factors);
-                looker.look(&key, &COMPONENTS, place, set, values)?;
+                check.check_values(&key, &COMPONENTS, place, set, values)?;
             }
             Action::Force(values) => {
                 let values = values.iter().map(Some).zip([1.0; D]);
-                looker.look(&key, &COMPONENTS, place, set, values)?;
+                check.check_values(&key, &COMPONENTS, place, set, values)?;
             }
             Action::Temperature(value) => {
                 let values = std::iter::once((Some(value), 1.0));
-                looker.look(&key, &["is"], place, set, values)?;
-                looker.look_at_stretches(&key, place, set, value)?;
+                check.check_values(&key, &["is"], place, set, values)?;
+                check.check_stretches(&key, place, set, value)?;
             }
         }
     }
@@ -93,7 +93,7 @@ struct FiniteCheck<'a, const D: usize> {
 impl<const D: usize> FiniteCheck<'_, D> {
     /// Return an error if the thermal stretch of a point of a set is −1 or less. The point's cell would have
     /// no volume at this stretch. Collective.
-    fn look_at_stretches(
+    fn check_stretches(
         &self,
         key: &str,
         place: &Range<usize>,
@@ -132,7 +132,7 @@ impl<const D: usize> FiniteCheck<'_, D> {
 
     /// Return an error if a component, times its factor, is not finite at a point of a set. `names` are the
     /// subjects of the messages. Collective.
-    fn look<'e>(
+    fn check_values<'e>(
         &self,
         key: &str,
         names: &[&str],

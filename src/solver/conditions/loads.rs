@@ -98,7 +98,7 @@ impl<const D: usize> Loaded<D> {
     }
 
     /// Compute the force densities if the load is due.
-    pub fn find(&mut self, loads: &[Load<D>]) {
+    pub fn compute_densities(&mut self, loads: &[Load<D>]) {
         let load = &loads[self.load];
         if !load.is_due {
             return;
@@ -144,14 +144,14 @@ impl<const D: usize> Loaded<D> {
 
     /// Store force density and displacement for the work of the next step. `displacement` (m) contains all
     /// points of the part.
-    pub fn remember(&mut self, displacement: [&[f64]; D]) {
+    pub fn record_for_work(&mut self, displacement: [&[f64]; D]) {
         self.before.copy_from_slice(&self.force);
         for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
             *from = displacement.map(|column| column[usize::from(*point)]);
         }
     }
 
-    /// Add the work (J) of the load since [`Self::remember`] to the external work of each point; see
+    /// Add the work (J) of the load since [`Self::record_for_work`] to the external work of each point; see
     /// [`Work`].
     pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {

@@ -66,14 +66,14 @@ pub enum Work {
 }
 
 /// The conditions that act on a [`Part`] of the points.
-pub struct Here<'a, const D: usize> {
-    all: All<'a, D>,
+pub struct PartConditions<'a, const D: usize> {
+    stage: StageConditions<'a, D>,
     on: &'a mut OnPart<D>,
 }
 
 /// The conditions of the stage, which all parts share.
 #[derive(Clone, Copy)]
-pub struct All<'a, const D: usize> {
+pub struct StageConditions<'a, const D: usize> {
     loads: &'a [Load<D>],
     supports: &'a [Support],
     temperatures: &'a Temperatures,
@@ -328,7 +328,7 @@ impl<const D: usize> Conditions<D> {
     /// (s), 0 at the start.
     pub fn set_displacements(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
-            support.set_place(time, step);
+            support.set_displacements(time, step);
         }
     }
 
@@ -352,19 +352,20 @@ impl<const D: usize> Conditions<D> {
         self.temperatures.set_time(time);
     }
 
-    /// Make the next [`Self::set_temperatures`] and [`Here::apply_temperatures`] set all temperatures.
+    /// Make the next [`Self::set_temperatures`] and [`PartConditions::apply_temperatures`] set all
+    /// temperatures.
     pub fn reset_temperatures(&mut self) {
         self.temperatures.reset();
     }
 
     /// Split into the conditions, and the points on which they act in each part.
-    pub fn by_part(&mut self) -> (All<'_, D>, &mut [OnPart<D>]) {
-        let all = All {
+    pub fn by_part(&mut self) -> (StageConditions<'_, D>, &mut [OnPart<D>]) {
+        let stage = StageConditions {
             loads: &self.loads,
             supports: &self.supports,
             temperatures: &self.temperatures,
         };
-        (all, &mut self.on_parts)
+        (stage, &mut self.on_parts)
     }
 
     /// Return a column per component over `local` points. Entries are 0 at owned points whose component a
@@ -477,15 +478,15 @@ fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16
         .unzip()
 }
 
-impl<'a, const D: usize> Here<'a, D> {
+impl<'a, const D: usize> PartConditions<'a, D> {
     /// Combine the conditions with their points in one part.
-    pub fn new(all: All<'a, D>, on: &'a mut OnPart<D>) -> Self {
-        Self { all, on }
+    pub fn new(stage: StageConditions<'a, D>, on: &'a mut OnPart<D>) -> Self {
+        Self { stage, on }
     }
 
     /// Set temperature and thermal stretch of the points, if temperatures may have changed.
     pub fn apply_temperatures(&self, part: &mut Part<'_, D>) {
-        self.all.temperatures.apply(&self.on.heated, part);
+        self.stage.temperatures.apply(&self.on.heated, part);
     }
 
     /// Whether no load and no support acts on this part.
@@ -498,37 +499,37 @@ impl<'a, const D: usize> Here<'a, D> {
         let displacement = part.displacement.each_ref().map(|column| &**column);
         let reaction = part.reaction.as_ref();
         let reaction = reaction.map(|reaction| reaction.each_ref().map(|column| &**column));
-        self.remember(displacement, reaction);
+        self.record_for_work(displacement, reaction);
     }
 
     /// Store force densities and displacements for the work of the next step. The arguments are the
     /// displacements (m) and reactions (N/m³) of all points of the part.
-    pub fn remember(&mut self, displacement: [&[f64]; D], reaction: Option<[&[f64]; D]>) {
+    pub fn record_for_work(&mut self, displacement: [&[f64]; D], reaction: Option<[&[f64]; D]>) {
         for load in &mut self.on.loads {
-            load.remember(displacement);
+            load.record_for_work(displacement);
         }
         for support in &mut self.on.supports {
-            support.remember(self.all.supports, displacement, reaction);
+            support.record_for_work(self.stage.supports, displacement, reaction);
         }
     }
 
     /// Set the displacements of supported points, after the other points have moved.
     pub fn apply_displacements(&self, part: &mut Part<'_, D>) {
         for support in &self.on.supports {
-            support.apply_displacements(self.all.supports, part);
+            support.apply_displacements(self.stage.supports, part);
         }
     }
 
     /// Compute the force densities of the loads that are due, see `Load::is_due`.
     pub fn find_loads(&mut self) {
         for load in &mut self.on.loads {
-            load.find(self.all.loads);
+            load.compute_densities(self.stage.loads);
         }
     }
 
     /// Update the external forces if any load is due, see `Load::is_due`.
     pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
-        if !self.all.loads.iter().any(|load| load.is_due) {
+        if !self.stage.loads.iter().any(|load| load.is_due) {
             return;
         }
         self.find_loads();
@@ -545,7 +546,7 @@ impl<'a, const D: usize> Here<'a, D> {
     pub fn apply_velocities(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
-            finite &= support.apply_velocities(self.all.supports, part);
+            finite &= support.apply_velocities(self.stage.supports, part);
         }
         finite
     }
@@ -555,19 +556,19 @@ impl<'a, const D: usize> Here<'a, D> {
     pub fn project_residual(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
-            finite &= support.project_residual(self.all.supports, part);
+            finite &= support.project_residual(self.stage.supports, part);
         }
         finite
     }
 
-    /// Add the work of loads and supports since [`Self::remember`]. Force densities and reactions must belong
-    /// to the present positions.
+    /// Add the work of loads and supports since [`Self::record_for_work`]. Force densities and reactions must
+    /// belong to the present positions.
     pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
             load.add_work(part, work);
         }
         for support in &self.on.supports {
-            support.add_work(self.all.supports, part, work);
+            support.add_work(self.stage.supports, part, work);
         }
     }
 }

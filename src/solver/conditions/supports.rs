@@ -23,12 +23,12 @@ pub struct Support {
     /// Time at which the support begins to act, s.
     begin: f64,
     values: Values,
-    place: Place,
-    guidance: Guidance,
+    displacement: PrescribedDisplacement,
+    velocity: PrescribedVelocity,
 }
 
 /// Values that prescribe the displacements of the supported points at the present time.
-struct Place {
+struct PrescribedDisplacement {
     /// Length of the last step, s; 0 at the start.
     step: f64,
     /// The prescribed values (displacements or velocities) at the start and the end of this step.
@@ -36,7 +36,7 @@ struct Place {
 }
 
 /// Time (s) and step (s) for which the velocities and accelerations of the supported points are prescribed.
-struct Guidance {
+struct PrescribedVelocity {
     time: f64,
     step: f64,
     /// Velocity (m/s) and acceleration (m/s²), if they are the same for all points.
@@ -65,11 +65,11 @@ impl Support {
             component,
             motion,
             begin,
-            place: Place {
+            displacement: PrescribedDisplacement {
                 step: 0.0,
                 values: [start(), start()],
             },
-            guidance: Guidance {
+            velocity: PrescribedVelocity {
                 time: 0.0,
                 step: 0.0,
                 same: None,
@@ -80,8 +80,8 @@ impl Support {
 
     /// Prepare the displacements of points at `time` (s). `step` is the length of the last step (s), 0 at the
     /// start.
-    pub fn set_place(&mut self, time: f64, step: f64) {
-        self.place = Place {
+    pub fn set_displacements(&mut self, time: f64, step: f64) {
+        self.displacement = PrescribedDisplacement {
             step,
             values: [time - step, time].map(|time| self.values.at(time)),
         };
@@ -90,7 +90,7 @@ impl Support {
     /// Prepare the velocities of points at `time` (s); `step` is the time step (s).
     pub fn set_velocities(&mut self, time: f64, step: f64) {
         let same = || self.moving([0.0; 3], time, step);
-        self.guidance = Guidance {
+        self.velocity = PrescribedVelocity {
             time,
             step,
             same: (!self.values.varies).then(same),
@@ -147,7 +147,7 @@ impl Supported {
 
     /// Store reactions and displacements for the work of the next step. The arguments are the displacements
     /// (m) and reactions (N/m³) of all points of the part.
-    pub fn remember<const D: usize>(
+    pub fn record_for_work<const D: usize>(
         &mut self,
         supports: &[Support],
         displacement: [&[f64]; D],
@@ -169,26 +169,26 @@ impl Supported {
         part: &mut Part<'_, D>,
     ) {
         let support = &supports[self.support];
-        let Place { step, values: at } = &support.place;
+        let PrescribedDisplacement { step, values: at } = &support.displacement;
         let value = |at: &At, k: usize| support.values.of(at, self.positions[k]);
         let moving = part.component(support.component);
         for (k, point) in self.points.iter().enumerate() {
             let point = usize::from(*point);
-            let place = &mut moving.displacement[point];
+            let displacement = &mut moving.displacement[point];
             match support.motion {
-                Motion::Displacement => *place = value(&at[1], k),
+                Motion::Displacement => *displacement = value(&at[1], k),
                 // Integrate the velocity by the trapezoidal rule, from the displacement before the drift.
                 Motion::Velocity if *step > 0.0 => {
-                    *place = self.moved_from[k];
+                    *displacement = self.moved_from[k];
                     for at in at {
-                        *place += 0.5 * step * value(at, k);
+                        *displacement += 0.5 * step * value(at, k);
                     }
                 }
                 // At the start, the points have their initial displacement.
                 Motion::Velocity => {}
             }
             if *step > 0.0 {
-                moving.velocity[point] = (*place - self.moved_from[k]) / step;
+                moving.velocity[point] = (*displacement - self.moved_from[k]) / step;
             }
         }
     }
@@ -202,7 +202,7 @@ impl Supported {
         part: &mut Part<'_, D>,
     ) -> bool {
         let support = &supports[self.support];
-        let Guidance { time, step, same } = support.guidance;
+        let PrescribedVelocity { time, step, same } = support.velocity;
         let (model, first) = (part.model, part.first);
         self.react(support.component, part, |k, point| {
             let own = || support.moving(self.positions[k], time, step);
@@ -240,7 +240,7 @@ impl Supported {
         for (k, point) in self.points.iter().enumerate() {
             let point = usize::from(*point);
             let (velocity, needed) = wanted(k, point);
-            let other = model.less_damping(first + point, moving.force.at(point), velocity);
+            let other = model.with_damping(first + point, moving.force.at(point), velocity);
             moving.velocity[point] = velocity;
             reaction[point] = needed - other;
             finite &= velocity.is_finite() && reaction[point].is_finite();
@@ -248,8 +248,8 @@ impl Supported {
         finite
     }
 
-    /// Add the work (J) of the support since [`Self::remember`] to the external work of each point; see
-    /// [`Work`].
+    /// Add the work (J) of the support since [`Self::record_for_work`] to the external work of each point;
+    /// see [`Work`].
     pub fn add_work<const D: usize>(
         &self,
         supports: &[Support],

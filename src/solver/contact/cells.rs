@@ -5,8 +5,8 @@
 pub(super) type Cell = [i64; 3];
 
 /// The cell of a position (m), for cells with this edge (m).
-pub(super) fn cell_of(place: [f64; 3], edge: f64) -> Cell {
-    place.map(|x| (x / edge).floor() as i64)
+pub(super) fn cell_of(position: [f64; 3], edge: f64) -> Cell {
+    position.map(|x| (x / edge).floor() as i64)
 }
 
 /// The hash of a cell.
@@ -44,10 +44,13 @@ pub(super) struct Cells {
 
 impl Cells {
     /// Sort positions (m) into cells with this edge (m).
-    pub fn new(places: &[[f64; 3]], edge: f64, dimension: usize) -> Self {
-        let buckets = places.len().next_power_of_two();
+    pub fn new(positions: &[[f64; 3]], edge: f64, dimension: usize) -> Self {
+        let buckets = positions.len().next_power_of_two();
         let mut starts = vec![0_u32; buckets + 1];
-        let cells: Vec<Cell> = places.iter().map(|place| cell_of(*place, edge)).collect();
+        let cells: Vec<Cell> = positions
+            .iter()
+            .map(|position| cell_of(*position, edge))
+            .collect();
         let bucket = |cell: Cell| (hash(cell) as usize) & (buckets - 1);
         for cell in &cells {
             starts[bucket(*cell) + 1] += 1;
@@ -56,7 +59,7 @@ impl Cells {
             starts[k] += starts[k - 1];
         }
         let mut next = starts.clone();
-        let mut entries = vec![([0; 3], 0); places.len()];
+        let mut entries = vec![([0; 3], 0); positions.len()];
         for (index, cell) in cells.into_iter().enumerate() {
             let slot = &mut next[bucket(cell)];
             entries[*slot as usize] = (cell, index as u32);
@@ -72,9 +75,9 @@ impl Cells {
 
     /// Call `visit` with the index of every point in the cell of a position (m) and in the adjacent cells.
     /// The visited points include all points whose distance from the position is at most the edge of a cell.
-    pub fn near(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
+    pub fn near(&self, position: [f64; 3], mut visit: impl FnMut(usize)) {
         let mask = self.starts.len() - 2;
-        for cell in neighbourhood(cell_of(place, self.edge), self.dimension) {
+        for cell in neighbourhood(cell_of(position, self.edge), self.dimension) {
             let bucket = (hash(cell) as usize) & mask;
             let entries = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
             for (other, index) in &self.entries[entries] {
@@ -92,7 +95,7 @@ mod tests {
 
     #[test]
     fn all_points_within_an_edge_are_found_however_far_others_are() {
-        let mut places: Vec<[f64; 3]> = (0..500)
+        let mut positions: Vec<[f64; 3]> = (0..500)
             .map(|k| {
                 let k = f64::from(k);
                 [
@@ -102,15 +105,15 @@ mod tests {
                 ]
             })
             .collect();
-        places.push([1e30, -1e200, 0.0]);
-        let cells = Cells::new(&places, 1.5, 3);
-        for place in &places {
+        positions.push([1e30, -1e200, 0.0]);
+        let cells = Cells::new(&positions, 1.5, 3);
+        for position in &positions {
             let mut found = Vec::new();
-            cells.near(*place, |index| found.push(index));
+            cells.near(*position, |index| found.push(index));
             found.sort_unstable();
             assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "found once");
-            for (index, other) in places.iter().enumerate() {
-                let square: f64 = (0..3).map(|d| (place[d] - other[d]).powi(2)).sum();
+            for (index, other) in positions.iter().enumerate() {
+                let square: f64 = (0..3).map(|d| (position[d] - other[d]).powi(2)).sum();
                 assert!(square > 1.5 * 1.5 || found.contains(&index));
             }
         }

@@ -35,7 +35,7 @@ pub(super) struct Ghost {
     /// Reference position, m.
     pub reference: [f64; 3],
     /// Present position, m.
-    pub place: [f64; 3],
+    pub position: [f64; 3],
 }
 
 /// The points of other ranks that may touch owned points, with their motion.
@@ -43,7 +43,7 @@ pub(super) struct Ghost {
 pub(super) struct Ghosts<const D: usize> {
     /// The points, sorted by owner and then by id.
     pub points: Vec<Ghost>,
-    /// Edge of a square or cube with the volume of each point, m.
+    /// Edge of a line segment, square or cube with the volume of each point, m.
     pub edges: Vec<f64>,
     /// Displacements by component, m.
     pub displacement: Vec<Vec<f64>>,
@@ -120,7 +120,7 @@ fn find(
     let edge = CELL * reach;
     let mut inside: BTreeMap<Cell, Vec<u32>> = BTreeMap::new();
     for (index, point) in own.iter().enumerate() {
-        let cell = cell_of(point.place, edge);
+        let cell = cell_of(point.position, edge);
         inside.entry(cell).or_default().push(index as u32);
     }
     let partners = partners(comm, &inside, dimension);
@@ -132,12 +132,12 @@ fn find(
     }
     let offered = comm.all_to_all(outgoing);
 
-    let places: Vec<[f64; 3]> = own.iter().map(|point| point.place).collect();
-    let cells = Cells::new(&places, reach, dimension);
+    let positions: Vec<[f64; 3]> = own.iter().map(|point| point.position).collect();
+    let cells = Cells::new(&positions, reach, dimension);
     let is_near = |point: &Ghost| {
         let mut is_near = false;
-        cells.near(point.place, |index| {
-            let square = (0..dimension).map(|d| (places[index][d] - point.place[d]).powi(2));
+        cells.near(point.position, |index| {
+            let square = (0..dimension).map(|d| (positions[index][d] - point.position[d]).powi(2));
             is_near |= square.sum::<f64>() <= reach * reach;
         });
         is_near

@@ -65,7 +65,7 @@ pub struct Contact<const D: usize> {
     blocks: usize,
     /// Largest contact distance of any two points, m.
     largest: f64,
-    /// Edge of a square or cube with the volume of the point, for each owned point, m.
+    /// Edge of a line segment, square or cube with the volume of the point, for each owned point, m.
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
@@ -363,10 +363,10 @@ impl<const D: usize> Contact<D> {
             for index in &self.at_rigid[0] {
                 let (block, point) = self.point(model, fields, *index as usize);
                 if let Some(touch) = rigid.touch(block, &point) {
-                    rigid.add_opposite(&mut wrench, point.place(), &touch);
+                    rigid.add_opposite(&mut wrench, point.position(), &touch);
                 }
                 if let Some(demand) = rigid.demand(block, &point, LOOK_AHEAD * end.longest) {
-                    *reach = reach.max(rigid.arm(point.place()));
+                    *reach = reach.max(rigid.arm(point.position()));
                     demands[0].add(demand.stiffness);
                     demands[1].add(demand.damping);
                 }

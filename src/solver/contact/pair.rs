@@ -64,7 +64,7 @@ pub(super) struct ContactPoint<const D: usize> {
     pub velocity: [f64; D],
     /// Volume, m³.
     pub volume: f64,
-    /// Edge of a square or cube with the volume of the point, m.
+    /// Edge of a line segment, square or cube with the volume of the point, m.
     pub edge: f64,
     /// Mass, kg.
     pub mass: f64,
@@ -72,9 +72,9 @@ pub(super) struct ContactPoint<const D: usize> {
 
 impl<const D: usize> ContactPoint<D> {
     /// Present position, m.
-    pub fn place(&self) -> [f64; 3] {
-        let place = std::array::from_fn(|d| self.reference[d] + self.displacement[d]);
-        whole::<D>(place)
+    pub fn position(&self) -> [f64; 3] {
+        let position = std::array::from_fn(|d| self.reference[d] + self.displacement[d]);
+        whole::<D>(position)
     }
 }
 
@@ -161,12 +161,12 @@ impl PairRule {
         second: &ContactPoint<D>,
     ) -> (f64, f64, [f64; D]) {
         let reference: [f64; D] = std::array::from_fn(|d| second.reference[d] - first.reference[d]);
-        let place: [f64; D] = std::array::from_fn(|d| {
+        let vector: [f64; D] = std::array::from_fn(|d| {
             reference[d] + (second.displacement[d] - first.displacement[d])
         });
-        let apart = norm(place);
+        let apart = norm(vector);
         let distance = self.distance([first.edge, second.edge], norm(reference));
-        (distance - apart, apart, place)
+        (distance - apart, apart, vector)
     }
 
     /// Contact stiffness of a pair, N/m.
@@ -189,9 +189,9 @@ impl PairRule {
         second: &ContactPoint<D>,
         (time, most_gap): (f64, f64),
     ) -> Option<Demand> {
-        let (overlap, apart, place) = self.overlap(first, second);
+        let (overlap, apart, vector) = self.overlap(first, second);
         let velocity: [f64; D] = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);
-        let approach = dot(velocity, place) / apart;
+        let approach = dot(velocity, vector) / apart;
         let touches = overlap >= -most_gap && overlap + time * approach.max(0.0) >= 0.0;
         touches.then(|| {
             let mass = first.mass * second.mass / (first.mass + second.mass);
@@ -206,11 +206,11 @@ impl PairRule {
         first: &ContactPoint<D>,
         second: &ContactPoint<D>,
     ) -> Option<Touch<D>> {
-        let (overlap, apart, place) = self.overlap(first, second);
+        let (overlap, apart, vector) = self.overlap(first, second);
         if overlap <= 0.0 || apart == 0.0 {
             return None;
         }
-        let normal = place.map(|component| component / apart);
+        let normal = vector.map(|component| component / apart);
         let stiffness = self.stiffness(first, second);
         let mass = first.mass * second.mass / (first.mass + second.mass);
         let velocity = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);

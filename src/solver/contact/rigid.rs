@@ -209,12 +209,12 @@ impl RigidBody {
         }
     }
 
-    fn kick(&mut self, time: f64) {
+    fn kick(&mut self, duration: f64) {
         if self.mass > 0.0 {
             for d in 0..3 {
                 let force = self.state.contact[d] + self.state.load[d];
-                self.state.velocity[d] += time * (force / self.mass);
-                self.state.angular_momentum[d] += time * self.state.contact[3 + d];
+                self.state.velocity[d] += duration * (force / self.mass);
+                self.state.angular_momentum[d] += duration * self.state.contact[3 + d];
             }
         }
     }
@@ -256,9 +256,9 @@ impl RigidBody {
         self.kick(0.5 * step);
     }
 
-    fn surface(&self, place: [f64; 3]) -> (f64, Vector3<f64>) {
+    fn surface(&self, position: [f64; 3]) -> (f64, Vector3<f64>) {
         let rotation = self.rotation();
-        let seen = Vector3::from(place) - Vector3::from(self.state.position);
+        let seen = Vector3::from(position) - Vector3::from(self.state.position);
         let own = rotation.inverse_transform_vector(&seen);
         let (apart, normal) = distance(&self.problem.shape, own, self.dimension.count());
         (apart, rotation.transform_vector(&normal))
@@ -269,7 +269,7 @@ impl RigidBody {
     /// point's cell, or the distance at the start if this distance is smaller. The overlap is set to 0 if the
     /// point is farther from the surface than half the edge.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
-        let (apart, normal) = self.surface(point.place());
+        let (apart, normal) = self.surface(point.position());
         let half = 0.5 * point.edge;
         if apart >= half {
             return (0.0, normal);
@@ -281,8 +281,8 @@ impl RigidBody {
     }
 
     /// Distance (m) of a position from the surface at the start of the run; negative inside.
-    pub fn start_distance(&self, place: [f64; 3]) -> f64 {
-        let seen = Vector3::from(place) - Vector3::from(self.start);
+    pub fn start_distance(&self, position: [f64; 3]) -> f64 {
+        let seen = Vector3::from(position) - Vector3::from(self.start);
         distance(&self.problem.shape, seen, self.dimension.count()).0
     }
 
@@ -294,8 +294,8 @@ impl RigidBody {
         }
         let stiffness = self.point_stiffness(block, point);
         let mass = self.reduced(point.mass);
-        let (place, velocity) = (point.place(), point.velocity);
-        let arm = Vector3::from(place) - Vector3::from(self.state.position);
+        let (position, velocity) = (point.position(), point.velocity);
+        let arm = Vector3::from(position) - Vector3::from(self.state.position);
         let surface = self.surface_velocity(arm);
         let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
         // [`Response::touch`] needs the normal from the point to the body, which is opposite to the outward
@@ -308,8 +308,8 @@ impl RigidBody {
     }
 
     /// Distance of a position (m) from the centre of the body, m.
-    pub fn arm(&self, place: [f64; 3]) -> f64 {
-        (Vector3::from(place) - Vector3::from(self.state.position)).norm()
+    pub fn arm(&self, position: [f64; 3]) -> f64 {
+        (Vector3::from(position) - Vector3::from(self.state.position)).norm()
     }
 
     /// Add to `sums` the force and torque that a point at a position (m) exerts on the body. `touch` is the
@@ -317,10 +317,10 @@ impl RigidBody {
     pub fn add_opposite<const D: usize>(
         &self,
         sums: &mut WrenchSums,
-        place: [f64; 3],
+        position: [f64; 3],
         touch: &Touch<D>,
     ) {
-        let arm = Vector3::from(place) - Vector3::from(self.state.position);
+        let arm = Vector3::from(position) - Vector3::from(self.state.position);
         let all: [f64; D] =
             std::array::from_fn(|d| touch.repulsion[d] + touch.damping[d] + touch.friction[d]);
         let forces = [all, touch.friction, touch.damping];
@@ -344,12 +344,12 @@ impl RigidBody {
         point: &ContactPoint<D>,
         time: f64,
     ) -> Option<Demand> {
-        let (apart, normal) = self.surface(point.place());
+        let (apart, normal) = self.surface(point.position());
         let gap = apart - 0.5 * point.edge;
         if gap > point.edge {
             return None;
         }
-        let arm = Vector3::from(point.place()) - Vector3::from(self.state.position);
+        let arm = Vector3::from(point.position()) - Vector3::from(self.state.position);
         let velocity = Vector3::from(whole(point.velocity)) - self.surface_velocity(arm);
         let approach = -velocity.dot(&normal);
         let touches = gap <= time * approach.max(0.0);

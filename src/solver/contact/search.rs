@@ -79,9 +79,9 @@ impl<const D: usize> Contact<D> {
         let mut all: Vec<Ghost> = (0..model.owned())
             .map(|point| {
                 let reference = model.position(point);
-                let mut place = reference;
+                let mut position = reference;
                 for d in 0..D {
-                    place[d] += fields.displacement[d][point];
+                    position[d] += fields.displacement[d][point];
                 }
                 Ghost {
                     id: model.ids[point],
@@ -89,21 +89,21 @@ impl<const D: usize> Contact<D> {
                     block: model.block[point].into(),
                     volume: model.volume[point],
                     reference,
-                    place,
+                    position,
                 }
             })
             .collect();
         self.ghosts = Ghosts::within(comm, self.dimension, &all, reach);
         all.extend_from_slice(&self.ghosts.points);
-        let places: Vec<[f64; 3]> = all.iter().map(|point| point.place).collect();
-        let cells = Cells::new(&places, reach, D);
+        let positions: Vec<[f64; 3]> = all.iter().map(|point| point.position).collect();
+        let cells = Cells::new(&positions, reach, D);
         let edge = |index: usize| match index.checked_sub(model.owned()) {
             None => self.edges[index],
             Some(ghost) => self.ghosts.edges[ghost],
         };
         let mut rows = Rows::new(model.owned(), |point, row| {
             let here = &all[point];
-            cells.near(here.place, |index| {
+            cells.near(here.position, |index| {
                 let there = &all[index];
                 let rule = &self.rules[here.block as usize * self.blocks + there.block as usize];
                 let (Some(rule), true) = (rule, index != point) else {
@@ -114,7 +114,7 @@ impl<const D: usize> Contact<D> {
                 };
                 let reference = apart(&here.reference, &there.reference);
                 let distance = rule.distance([edge(point), edge(index)], reference);
-                if apart(&here.place, &there.place) <= distance + skin {
+                if apart(&here.position, &there.position) <= distance + skin {
                     row.push(FoundPair {
                         id: there.id,
                         other: index as u32,

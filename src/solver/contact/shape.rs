@@ -8,13 +8,13 @@ use crate::problem::RigidShape;
 /// normal of the surface. The position is relative to the centre of the shape, in the axes of the shape.
 pub(super) fn distance(
     shape: &RigidShape,
-    place: Vector3<f64>,
+    position: Vector3<f64>,
     dimension: usize,
 ) -> (f64, Vector3<f64>) {
     match shape {
         RigidShape::Ball { radius } => {
-            let length = place.norm();
-            (length - radius, direction(place, length))
+            let length = position.norm();
+            (length - radius, direction(position, length))
         }
         RigidShape::Cylinder {
             axis,
@@ -22,8 +22,8 @@ pub(super) fn distance(
             radius,
         } => {
             let axis = Vector3::from(*axis);
-            let along = place.dot(&axis);
-            let across = place - along * axis;
+            let along = position.dot(&axis);
+            let across = position - along * axis;
             let length = across.norm();
             // The distance is computed as for a box, in the plane through the axis of the cylinder and the
             // position.
@@ -32,14 +32,14 @@ pub(super) fn distance(
             outside(&beyond, &normals)
         }
         RigidShape::Box { half } => {
-            let beyond: [f64; 3] = std::array::from_fn(|d| place[d].abs() - half[d]);
+            let beyond: [f64; 3] = std::array::from_fn(|d| position[d].abs() - half[d]);
             let normals: [Vector3<f64>; 3] =
-                std::array::from_fn(|d| place[d].signum() * Vector3::ith(d, 1.0));
+                std::array::from_fn(|d| position[d].signum() * Vector3::ith(d, 1.0));
             outside(&beyond[..dimension], &normals[..dimension])
         }
         RigidShape::HalfSpace { normal } => {
             let normal = Vector3::from(*normal);
-            (place.dot(&normal), normal)
+            (position.dot(&normal), normal)
         }
     }
 }
@@ -130,22 +130,22 @@ mod tests {
         for shape in &shapes {
             for k in 0..200 {
                 let k = f64::from(k);
-                let place = Vector3::new(
+                let position = Vector3::new(
                     (0.71 * k) % 3.0 - 1.5,
                     (1.13 * k) % 3.0 - 1.5,
                     (1.79 * k) % 3.0 - 1.5,
                 );
-                let (apart, normal) = distance(shape, place, 3);
+                let (apart, normal) = distance(shape, position, 3);
                 assert!((normal.norm() - 1.0).abs() < 1e-12);
                 // `surface` lies on the surface of the shape, and a move along the normal changes the
                 // distance by the length of the move.
-                let surface = place - apart * normal;
+                let surface = position - apart * normal;
                 assert!(
                     distance(shape, surface, 3).0.abs() < 1e-12,
-                    "{shape:?} {place}"
+                    "{shape:?} {position}"
                 );
-                let nearer = distance(shape, place - 0.1 * apart * normal, 3).0;
-                assert!((nearer - 0.9 * apart).abs() < 1e-12, "{shape:?} {place}");
+                let nearer = distance(shape, position - 0.1 * apart * normal, 3).0;
+                assert!((nearer - 0.9 * apart).abs() < 1e-12, "{shape:?} {position}");
             }
         }
     }

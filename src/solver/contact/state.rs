@@ -123,10 +123,10 @@ impl<const D: usize> Contact<D> {
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Count the consecutive steps that contact did not limit. `could_be_longer` says that contact did not
+    /// Count the consecutive steps that contact did not limit. `is_unlimited` says that contact did not
     /// limit the present step; otherwise, reset the count.
-    pub fn count_calm(&mut self, could_be_longer: bool) {
-        self.demand.calm = if could_be_longer {
+    pub fn count_calm(&mut self, is_unlimited: bool) {
+        self.demand.calm = if is_unlimited {
             self.demand.calm + 1
         } else {
             0

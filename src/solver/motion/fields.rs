@@ -562,7 +562,7 @@ impl<const D: usize> Fields<D> {
     #[inline]
     pub fn acting(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let exerted = Exerted::new(&self.internal_force, self.external_force.as_ref(), d);
-        model.less_damping(point, exerted.at(point), self.velocity[d][point])
+        model.with_damping(point, exerted.at(point), self.velocity[d][point])
     }
 
     /// Component `d` of the force density of all forces on an owned point, N/m³; 0 in equilibrium.

@@ -72,17 +72,17 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Call `look` at the first and at the last load step of a stage, until `look` returns a value. Return
-    /// this value. The arguments of `look` are the simulation with the loads and supports of this load step,
+    /// Call `visit` at the first and at the last load step of a stage, until `visit` returns a value. Return
+    /// this value. The arguments of `visit` are the simulation with the loads and supports of this load step,
     /// the pieces, and the time, s.
     ///
-    /// `look` is not called for explicit stages and for stages without loads. It is not called in runs with
+    /// `visit` is not called for explicit stages and for stages without loads. It is not called in runs with
     /// contact either, because contact can hold pieces. Afterwards, the loads and supports of the first stage
     /// at time 0 act again. Collective.
     fn at_load_steps<T>(
         &mut self,
         stage: usize,
-        mut look: impl FnMut(&Self, &Pieces<D>, f64) -> Option<T>,
+        mut visit: impl FnMut(&Self, &Pieces<D>, f64) -> Option<T>,
     ) -> Option<T> {
         let Time { end, method, .. } = self.stages.all[stage].time;
         let load_steps = method.load_steps().filter(|_| self.contact.is_none())?;
@@ -103,7 +103,7 @@ impl<const D: usize> Simulation<'_, D> {
             let pieces = self.find_pieces(is_unloaded);
             result = [first, end].into_iter().find_map(|time| {
                 self.set_stage_loads(stage, time);
-                look(self, &pieces, time)
+                visit(self, &pieces, time)
             });
         }
         self.set_stage_loads(0, 0.0);

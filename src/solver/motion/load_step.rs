@@ -173,8 +173,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Record the last equilibrium, and advance time, loads and supports. With `extrapolates`, the points
     /// repeat their motion of the last load step if the step length has not changed.
     pub(super) fn begin_load_step(&mut self, extrapolates: bool) {
-        self.walk(|part, mut here| {
-            here.before_moving(part);
+        self.walk(|part, mut conditions| {
+            conditions.before_moving(part);
             true
         });
         self.note_equilibrium(extrapolates && !self.clock.is_new_size());
@@ -391,18 +391,18 @@ impl<const D: usize> Simulation<'_, D> {
         if let Some(displacement) = &displacement {
             let factors = self.progress.load_factors.at_equilibrium();
             self.conditions.set_loads(then, factors, true);
-            self.walk(|part, mut here| {
+            self.walk(|part, mut conditions| {
                 let reaction = reaction.as_ref().map(|field| part.of(field));
-                here.find_loads();
-                here.remember(part.of(displacement), reaction);
+                conditions.find_loads();
+                conditions.record_for_work(part.of(displacement), reaction);
                 true
             });
             let factors = self.progress.load_factors.present();
             self.conditions.set_loads(now, factors, true);
         }
-        self.walk(|part, mut here| {
-            here.find_loads();
-            here.add_work(part, work);
+        self.walk(|part, mut conditions| {
+            conditions.find_loads();
+            conditions.add_work(part, work);
             true
         });
         self.fields.equilibrium_displacement = displacement;

@@ -58,14 +58,14 @@ impl<const D: usize> Simulation<'_, D> {
         pieces
     }
 
-    /// Call `look` with each suspected piece, in the order of the smallest point ids of the pieces, until
-    /// `look` returns a value. Return this value. `is_suspect` is called with the local index of a point, and
-    /// must be the same at all points of a piece. Collective.
+    /// Call `visit` with each suspected piece, in the order of the smallest point ids of the pieces, until
+    /// `visit` returns a value. Return this value. `is_suspect` is called with the local index of a point,
+    /// and must be the same at all points of a piece. Collective.
     pub(super) fn first_of_pieces<T>(
         &self,
         pieces: &Pieces<D>,
         is_suspect: impl Fn(usize) -> bool,
-        mut look: impl FnMut(Piece) -> Option<T>,
+        mut visit: impl FnMut(Piece) -> Option<T>,
     ) -> Option<T> {
         let mut suspects: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
         for point in (0..self.model.owned()).filter(|point| is_suspect(*point)) {
@@ -88,7 +88,7 @@ impl<const D: usize> Simulation<'_, D> {
                 points,
                 count,
             };
-            if let Some(result) = look(piece) {
+            if let Some(result) = visit(piece) {
                 return Some(result);
             }
             from = first + 1;

@@ -69,7 +69,7 @@ impl<const D: usize> Simulation<'_, D> {
             Some(self.drift())
         };
         self.evaluate_at_rest();
-        self.look(before);
+        self.update_damping_and_residual(before);
         let forces = self.times.forces.whole() - forces;
         self.times.motion += start.elapsed().saturating_sub(forces);
         if self.is_drifting() {
@@ -78,7 +78,7 @@ impl<const D: usize> Simulation<'_, D> {
             if self.break_or_settle() {
                 self.stop();
                 self.evaluate_at_rest();
-                self.look(None);
+                self.update_damping_and_residual(None);
             }
         } else if self.progress.load_step.residual.is_nan() {
             self.progress.load_step.has_failed = true;
@@ -145,7 +145,7 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// Compute damping and residual from the forces at the new positions. `before` is `None` if the points
     /// start from rest. Collective.
-    fn look(&mut self, before: Option<Before>) {
+    fn update_damping_and_residual(&mut self, before: Option<Before>) {
         let (model, fields) = (&self.model, &self.fields);
         let [power, free, loads, reactions, stiffness] = sums(model, fields, &|point, density| {
             let of = |d: usize| {

@@ -98,8 +98,8 @@ impl<const D: usize> Simulation<'_, D> {
         let names = self.saved_names();
         let lengths = self.forces.saved_lengths(self.model.owned());
         let expected = order.collect(self.comm, &lengths, 1);
-        let fits = self.fits(&names, &expected, saved);
-        agree(self.comm, fits)?;
+        let outcome = self.check_matches(&names, &expected, saved);
+        agree(self.comm, outcome)?;
         let SavedBonds {
             lengths: all,
             bytes,
@@ -123,7 +123,7 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// Check that a saved state has the columns with these names, bond states with these lengths (bytes per
     /// point), and progress of the expected length.
-    fn fits(&self, names: &[String], lengths: &[u32], saved: &Saved) -> Result<()> {
+    fn check_matches(&self, names: &[String], lengths: &[u32], saved: &Saved) -> Result<()> {
         let error = |what: String| Err(Error::run(format!("the checkpoint {what}")));
         let saved_names: Vec<&str> = (saved.columns.iter())
             .map(|column| &column.name[..])

@@ -64,14 +64,14 @@ pub fn length(branches: &[Branch]) -> f64 {
 pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch> {
     let places: Vec<[f64; 3]> = points.iter().map(|point| point.place).collect();
     let bins = Bins::new(&places, reach.link * (1.0 + TOLERANCE));
-    let ways = Ways::new(from, &places, &bins, reach);
-    let mut parts = parts(points, &bins, &ways, reach);
+    let paths = ShortestPaths::new(from, &places, &bins, reach);
+    let mut parts = parts(points, &bins, &paths, reach);
     drop_stubs(&mut parts);
     lines(from, points, &parts, reach)
 }
 
 /// The shortest paths along the band from the start of the crack.
-struct Ways {
+struct ShortestPaths {
     /// Path length of each reached point, m; infinite for other points.
     length: Vec<f64>,
     /// The preceding point on the path; `None` for points where a path begins.
@@ -103,10 +103,10 @@ impl PartialOrd for Next {
     }
 }
 
-impl Ways {
+impl ShortestPaths {
     /// Find the paths by Dijkstra's method, from all points within a section length of the start.
     fn new(from: [f64; 3], places: &[[f64; 3]], bins: &Bins, reach: Reach) -> Self {
-        let mut ways = Self {
+        let mut paths = Self {
             length: vec![f64::INFINITY; places.len()],
             before: vec![None; places.len()],
             order: Vec::new(),
@@ -115,7 +115,7 @@ impl Ways {
         for (point, place) in places.iter().enumerate() {
             let length = distance_squared(from, *place).sqrt();
             if length <= reach.section_length * (1.0 + TOLERANCE) {
-                ways.length[point] = length;
+                paths.length[point] = length;
                 open.push(Next { length, point });
             }
         }
@@ -124,16 +124,16 @@ impl Ways {
             if std::mem::replace(&mut is_done[point], true) {
                 continue;
             }
-            ways.order.push(point);
+            paths.order.push(point);
             bins.within(places[point], |other, squared| {
                 let other = other as usize;
-                if ways.length[other] <= length {
+                if paths.length[other] <= length {
                     return;
                 }
                 let through = length + squared.sqrt();
-                if through < ways.length[other] {
-                    ways.length[other] = through;
-                    ways.before[other] = Some(point);
+                if through < paths.length[other] {
+                    paths.length[other] = through;
+                    paths.before[other] = Some(point);
                     open.push(Next {
                         length: through,
                         point: other,
@@ -141,7 +141,7 @@ impl Ways {
                 }
             });
         }
-        ways
+        paths
     }
 }
 
@@ -156,21 +156,21 @@ struct Part {
 }
 
 /// Divide the points into parts. Each part comes after its parent.
-fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part> {
+fn parts(points: &[Damaged], bins: &Bins, paths: &ShortestPaths, reach: Reach) -> Vec<Part> {
     // All points where paths begin are in section 0, including those at exactly one section length.
-    let section = |point: usize| match ways.before[point] {
+    let section = |point: usize| match paths.before[point] {
         None => 0,
-        Some(_) => (ways.length[point] / reach.section_length) as usize,
+        Some(_) => (paths.length[point] / reach.section_length) as usize,
     };
     let mut part_of: Vec<Option<usize>> = vec![None; points.len()];
     let mut parts: Vec<Part> = Vec::new();
-    for first in &ways.order {
+    for first in &paths.order {
         if part_of[*first].is_some() {
             continue;
         }
         // The point with the shortest path in a part is preceded by a point of an earlier section, or by
         // none.
-        let parent = ways.before[*first].and_then(|before| part_of[before]);
+        let parent = paths.before[*first].and_then(|before| part_of[before]);
         let number = parts.len();
         part_of[*first] = Some(number);
         let mut members = vec![*first];
@@ -179,7 +179,7 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
             next += 1;
             bins.within(points[point].place, |other, _| {
                 let other = other as usize;
-                let is_free = part_of[other].is_none() && ways.length[other].is_finite();
+                let is_free = part_of[other].is_none() && paths.length[other].is_finite();
                 if is_free && section(other) == section(point) {
                     part_of[other] = Some(number);
                     members.push(other);
@@ -187,7 +187,7 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
             });
         }
         members.sort_unstable();
-        let lengths = members.iter().map(|member| ways.length[*member]);
+        let lengths = members.iter().map(|member| paths.length[*member]);
         parts.push(Part {
             parent,
             farthest: lengths.fold(0.0, f64::max),

@@ -129,7 +129,7 @@ impl ContactWatch {
 
     /// Find the nearest two points of different bodies; `None` if no two points are too near, see
     /// [`Contact`]. The result is the same on all ranks. Collective.
-    pub fn look<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
+    pub fn find_contact<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
         let meetings = self.meetings(simulation);
         if meetings.is_empty() {
             return None;

@@ -128,7 +128,9 @@ impl CrackSurface {
             }
         }
         let mut columns = gradient.each_mut().map(|column| &mut column[..]);
-        simulation.forces.bring_all(simulation.comm, &mut columns);
+        simulation
+            .forces
+            .update_ghosts_of_all(simulation.comm, &mut columns);
         let gradient = |point: usize| Vector::from_fn(|d, _| gradient[d][point]);
         let (model, comm) = (&simulation.model, simulation.comm);
         let places: Vec<[f64; 3]> = damaged.iter().map(|point| model.position(*point)).collect();
@@ -208,7 +210,9 @@ impl CrackSurface {
         for point in self.points.iter().map(|point| *point as usize) {
             damage[point] = snapshot.damage(&simulation.undeformed.family_volume, point);
         }
-        simulation.forces.bring(simulation.comm, &mut damage);
+        simulation
+            .forces
+            .update_ghosts_of(simulation.comm, &mut damage);
         let in_set = |damage: f64| (!damage.is_nan()).then_some(damage);
         damage.into_iter().map(in_set).collect()
     }

@@ -247,12 +247,12 @@ impl HistoryObserver {
 
     /// Read the crack length of each tracked tip from earlier rows. The next speeds of the tips depend on
     /// these lengths.
-    pub fn recall(&mut self, rows: &[Vec<f64>]) {
+    pub fn record_past(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
             for tip in &mut self.tips {
                 if let (Some(time), Some(length)) = (value("time"), value(&length_of(tip.name()))) {
-                    tip.recall(time, length);
+                    tip.record_past(time, length);
                 }
             }
         }
@@ -363,8 +363,8 @@ impl HistoryObserver {
                 - simulation.progress.density_scale_energy,
         };
         // Refinements add intact bonds, and remove some if horizons become shorter.
-        let there_were = first_intact as i64 + simulation.progress.refined.bonds;
-        let broken = (there_were - intact as i64) as u64 / 2;
+        let started_intact = first_intact as i64 + simulation.progress.refined.bonds;
+        let broken = (started_intact - intact as i64) as u64 / 2;
         let most_broken = std::mem::take(&mut simulation.progress.step_control.most_broken);
         let support_forces = sums[directed].chunks_exact(D).zip(&self.support_forces);
         let support_forces = support_forces.map(|(force, (_, direction))| {

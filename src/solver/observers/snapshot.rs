@@ -8,14 +8,14 @@ use crate::elastic::Isotropic;
 use crate::material::{PlasticState, determinant};
 use crate::problem::Field;
 use crate::solver::Simulation;
-use crate::solver::bonds::Stored;
+use crate::solver::bonds::BondSums;
 use crate::solver::motion::Fields;
 use crate::solver::palette_column::PaletteColumn;
 
 /// Bond quantities at one time, computed once for all fields and the history.
 pub struct Snapshot {
     /// Bond quantities of the owned points.
-    pub stored: Stored,
+    pub stored: BondSums,
 }
 
 impl Snapshot {
@@ -114,7 +114,7 @@ impl Snapshot {
             }
             Field::Stress => {
                 let mut stress = simulation.forces.stress(model);
-                across(simulation, &mut stress);
+                set_out_of_plane_stress(simulation, &mut stress);
                 rows(&stress, count, 6)
             }
             Field::CauchyStress => {
@@ -177,11 +177,11 @@ fn cauchy_stress<const D: usize>(
         let thermal = 1.0 + free_stretch(simulation, point);
         let gradient = gradient / thermal;
         let in_plane = determinant(&gradient);
-        let growth = match simulation.problem.dimension {
+        let volume_ratio = match simulation.problem.dimension {
             Dimension::PlaneStress { .. } => {
                 let plastic = plastic_state(&simulation.fields, point);
                 let (forces, model) = (&simulation.forces, &simulation.model);
-                match forces.stretch_across(model, point, &gradient, &plastic) {
+                match forces.out_of_plane_stretch(model, point, &gradient, &plastic) {
                     Some(stretch) => in_plane * stretch,
                     None => libm::pow(in_plane, (1.0 - 2.0 * ratio) / (1.0 - ratio)),
                 }
@@ -192,10 +192,14 @@ fn cauchy_stress<const D: usize>(
             } => libm::pow(in_plane, 1.0 - 2.0 * ratio),
             _ => in_plane,
         };
-        let growth = growth * thermal.powi(3);
+        let volume_ratio = volume_ratio * thermal.powi(3);
         // The volume ratio of an inverted family has no meaning, so 1 is used.
-        let growth = if growth > 0.0 { growth } else { 1.0 };
-        stress.iter_mut().for_each(|entry| *entry /= growth);
+        let volume_ratio = if volume_ratio > 0.0 {
+            volume_ratio
+        } else {
+            1.0
+        };
+        stress.iter_mut().for_each(|entry| *entry /= volume_ratio);
     }
     kirchhoff
 }
@@ -205,9 +209,9 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     let mut rows = Vec::with_capacity(6 * gradients.len());
     for (point, gradient) in gradients.iter().enumerate() {
-        let across = stretch_across(simulation, point, gradient);
+        let out_of_plane = out_of_plane_stretch(simulation, point, gradient);
         // The strain is computed from F − I, so that small strains lose no digits.
-        let mut change = Matrix3::identity() * (across - 1.0);
+        let mut change = Matrix3::identity() * (out_of_plane - 1.0);
         change
             .view_mut((0, 0), (D, D))
             .copy_from(&(gradient - SMatrix::identity()));
@@ -223,31 +227,31 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
 
 /// Stretch ratio (deformed over reference length) of an owned point perpendicular to the plane or bar, for
 /// this deformation gradient. The ratio is 1 in plane strain, under uniaxial strain, and in 3-D.
-fn stretch_across<const D: usize>(
+fn out_of_plane_stretch<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
     gradient: &SMatrix<f64, D, D>,
 ) -> f64 {
     let thermal = 1.0 + free_stretch(simulation, point);
     let elastic_gradient = gradient / thermal;
-    let in_setting = determinant(&elastic_gradient);
+    let in_plane = determinant(&elastic_gradient);
     // The area ratio of an inverted family has no meaning, so 1 is used.
-    let in_setting = if in_setting > 0.0 { in_setting } else { 1.0 };
+    let in_plane = if in_plane > 0.0 { in_plane } else { 1.0 };
     let ratio = || elastic(simulation, point).poisson_ratio;
-    let across = match simulation.problem.dimension {
+    let out_of_plane = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
             let plastic = plastic_state(&simulation.fields, point);
             let (forces, model) = (&simulation.forces, &simulation.model);
-            let by_law = forces.stretch_across(model, point, &elastic_gradient, &plastic);
-            by_law.unwrap_or_else(|| libm::pow(in_setting, -ratio() / (1.0 - ratio())))
+            let by_law = forces.out_of_plane_stretch(model, point, &elastic_gradient, &plastic);
+            by_law.unwrap_or_else(|| libm::pow(in_plane, -ratio() / (1.0 - ratio())))
         }
         Dimension::Line {
             constraint: Constraint::UniaxialStress,
             ..
-        } => libm::pow(in_setting, -ratio()),
+        } => libm::pow(in_plane, -ratio()),
         Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => return 1.0,
     };
-    across * thermal
+    out_of_plane * thermal
 }
 
 /// Elastic constants of the body of an owned point.
@@ -256,10 +260,10 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
     simulation.problem.block(block).body.material.elastic
 }
 
-/// Trace of the 3-D strain of an owned point, from `in_setting`, the trace in the plane or along the bar. In
+/// Trace of the 3-D strain of an owned point, from `in_plane`, the trace in the plane or along the bar. In
 /// plane stress, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx. Thermal
 /// strain is added.
-fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_setting: f64) -> f64 {
+fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_plane: f64) -> f64 {
     let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
             let ratio = elastic(simulation, point).poisson_ratio;
@@ -270,11 +274,11 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_settin
             ..
         } => 1.0 - 2.0 * elastic(simulation, point).poisson_ratio,
         Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => {
-            return in_setting;
+            return in_plane;
         }
     };
     let free = free_stretch(simulation, point);
-    share * (in_setting - D as f64 * free) + 3.0 * free
+    share * (in_plane - D as f64 * free) + 3.0 * free
 }
 
 /// Thermal stretch of an owned point in 3-D, in plane stress, or in a bar that can expand sideways; 0 without
@@ -314,13 +318,16 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
 /// Set the stress perpendicular to the plane or bar, if the strain in this direction is 0. In plane strain,
 /// zz is the value of the law, or ν (xx + yy) if the law computes no value. Under uniaxial strain, yy = zz =
 /// ν/(1 − ν) xx. Temperature adds −E α ΔT in plane strain, and −E α ΔT/(1 − ν) under uniaxial strain.
-fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
+fn set_out_of_plane_stress<const D: usize>(
+    simulation: &mut Simulation<'_, D>,
+    stress: &mut [Vec<f64>; 6],
+) {
     let [xx, yy, zz, ..] = stress;
     let by_law = match simulation.problem.dimension {
         Dimension::PlaneStrain { .. } => {
             let fields = &simulation.fields;
             let plastic = |point| plastic_state(fields, point);
-            (simulation.forces).stress_across(&simulation.model, plastic)
+            (simulation.forces).out_of_plane_stress(&simulation.model, plastic)
         }
         _ => Vec::new(),
     };

@@ -89,7 +89,7 @@ impl Tip {
     }
 
     /// Record the length (m) of the crack in an earlier row, and the time (s) of this row.
-    pub fn recall(&mut self, time: f64, length: f64) {
+    pub fn record_past(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);
     }
 }

@@ -35,9 +35,9 @@ pub use trigger::is_possible;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Regridded {
     /// Number of points that were created.
-    pub born: u64,
+    pub created: u64,
     /// Number of points that were removed.
-    pub left: u64,
+    pub removed: u64,
 }
 
 /// Total changes by all refinements since the start; the same on all ranks.
@@ -123,8 +123,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         let mut grids = self.grids.clone();
         let refined = grids.refine(&wanted.finer);
-        let left = grids.coarsen(&wanted.coarser);
-        if !refined && left.is_empty() {
+        let removed = grids.coarsen(&wanted.coarser);
+        if !refined && removed.is_empty() {
             return Ok(None);
         }
         let facets = Facets::new(self);
@@ -133,25 +133,25 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 facets.lie_between(&facets.near(a), a, b)
             });
         }
-        let (energy, bonds) = self.held(&snapshot);
+        let (energy, bonds) = self.energy_and_bonds(&snapshot);
         drop(snapshot);
         let before = self.model.total;
-        self.regrid(grids, &left, &facets)?;
+        self.regrid(grids, &removed, &facets)?;
         let snapshot = Snapshot::new(self);
-        let (new_energy, new_bonds) = self.held(&snapshot);
+        let (new_energy, new_bonds) = self.energy_and_bonds(&snapshot);
         self.progress.refined.energy += new_energy - energy;
         self.progress.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
-        let left = left.len() as u64;
+        let removed = removed.len() as u64;
         Ok(Some(Regridded {
-            born: self.model.total + left - before,
-            left,
+            created: self.model.total + removed - before,
+            removed,
         }))
     }
 
     /// Sum kinetic and strain energy (J) over all ranks, and count the intact bonds; each bond counts twice.
     /// Collective.
-    fn held(&self, snapshot: &Snapshot) -> (f64, u64) {
+    fn energy_and_bonds(&self, snapshot: &Snapshot) -> (f64, u64) {
         let sums = point_sums(self, snapshot);
         // Both energies are in one sum, which is rounded once.
         let mut energy = [sums[0].clone()];
@@ -160,14 +160,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (energy, comm::total(self.comm, snapshot.intact()))
     }
 
-    /// Continue the run on other grids, with the state of all points and bonds. `left` are the nodes that the
-    /// other grids no longer have. Collective.
+    /// Continue the run on other grids, with the state of all points and bonds. `removed` are the nodes that
+    /// the other grids no longer have. Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
     /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
     /// are freed.
-    fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
+    fn regrid(&mut self, grids: Grids<'a>, removed: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
         let GridState {
@@ -175,7 +175,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             width,
             lengths,
             broken,
-        } = self.state_on(&grids, left, &pieces);
+        } = self.state_on(&grids, removed, &pieces);
         self.release();
         let mut other = self.on(grids, pieces)?;
         let order = other.id_order();
@@ -234,10 +234,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Compute the state of the points of new grids from the present state. `pieces` are the points of the
-    /// new grids that this rank creates, and `left` are the present nodes that are removed. Collective.
-    fn state_on(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> GridState {
+    /// new grids that this rank creates, and `removed` are the present nodes that are removed. Collective.
+    fn state_on(&mut self, grids: &Grids<'_>, removed: &[NodeKey], pieces: &[Point]) -> GridState {
         let comm = self.comm;
-        let past = Past::new(self, grids, left);
+        let past = Past::new(self, grids, removed);
         let (ids, rows) = past.rows(self, grids, pieces);
         let mut all_broken = self.broken();
         let (mut own, mut own_lengths) = (Vec::new(), vec![0; ids.len()]);
@@ -293,7 +293,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .collect();
         for column in [&mut was, &mut same] {
             column.resize(model.volume.len(), 0.0);
-            self.forces.bring(self.comm, column);
+            self.forces.update_ghosts_of(self.comm, column);
         }
         let ends = lengths.iter().scan(0, |end, length| {
             *end += *length as usize;

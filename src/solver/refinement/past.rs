@@ -20,17 +20,17 @@ pub struct Past {
     /// level-0 cells of [`Grids::changed`], before or after the refinement.
     at: FxHashMap<(usize, GridIndex), usize>,
     /// Whether each local point is removed.
-    leaves: Vec<bool>,
+    is_removed: Vec<bool>,
 }
 
 impl Past {
-    /// Collect the state before the nodes `left` are removed. Each node consists of its body, its canonical
-    /// level, and its grid index in steps of the finest level. Nodes of the finest level must come first. All
-    /// ranks pass the same nodes. Collective.
+    /// Collect the state before the nodes `removed` are removed. Each node consists of its body, its
+    /// canonical level, and its grid index in steps of the finest level. Nodes of the finest level must come
+    /// first. All ranks pass the same nodes. Collective.
     pub fn new<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
-        left: &[NodeKey],
+        removed: &[NodeKey],
     ) -> Self {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let model = &simulation.model;
@@ -52,7 +52,7 @@ impl Past {
         births.push(Birth::FoundAnew);
         for column in &mut columns {
             column.resize(local, 0.0);
-            simulation.forces.bring(comm, column);
+            simulation.forces.update_ghosts_of(comm, column);
         }
         // The parents of new and removed points lie in level-0 cells in which the grid differs from an
         // unrefined grid, before or after the refinement.
@@ -74,26 +74,26 @@ impl Past {
             columns,
             births,
             at,
-            leaves: vec![false; local],
+            is_removed: vec![false; local],
         };
-        if !left.is_empty() {
-            past.leave(simulation, grids, left);
+        if !removed.is_empty() {
+            past.return_to_parents(simulation, grids, removed);
         }
         past
     }
 
     /// Add the values of removed points to their parents, so that volume, mass, momentum and energies
     /// are conserved. Collective.
-    fn leave<const D: usize>(
+    fn return_to_parents<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
-        left: &[NodeKey],
+        removed: &[NodeKey],
     ) {
         let comm = simulation.comm;
         let owned = simulation.model.owned();
         let mut volume: Vec<f64> = simulation.model.volume.iter().collect();
-        for level in left.chunk_by(|a, b| a[1] == b[1]) {
+        for level in removed.chunk_by(|a, b| a[1] == b[1]) {
             let near: Vec<(usize, Vec<usize>)> = level
                 .iter()
                 .filter_map(|pick| self.with_parents(grids, pick))
@@ -125,21 +125,21 @@ impl Past {
                 for ((value, gain), volume) in column.iter_mut().zip(gain).zip(&grown) {
                     *value += gain / volume;
                 }
-                simulation.forces.bring(comm, column);
+                simulation.forces.update_ghosts_of(comm, column);
             }
             volume = grown;
-            simulation.forces.bring(comm, &mut volume);
+            simulation.forces.update_ghosts_of(comm, &mut volume);
         }
-        for [body, _, x, y, z] in left {
+        for [body, _, x, y, z] in removed {
             if let Some(point) = self.at.get(&(*body as usize, [*x, *y, *z])) {
-                self.leaves[*point] = true;
+                self.is_removed[*point] = true;
             }
         }
     }
 
     /// The owned points that are not removed.
     pub fn staying(&self, owned: usize) -> impl Iterator<Item = usize> {
-        (0..owned).filter(|point| !self.leaves[*point])
+        (0..owned).filter(|point| !self.is_removed[*point])
     }
 
     /// Local indices of a node and of its parents; `None` if this rank does not have all of these points.

@@ -59,7 +59,7 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
                  grid; check that `horizon` is in metres",
                 block.level
             );
-            return Err(Error::input(message).at(&problem.places.horizon));
+            return Err(Error::input(message).at(&problem.spans.horizon));
         }
     }
     let mut initials = problem.initials.iter();
@@ -139,25 +139,25 @@ impl<'a, const D: usize> Simulation<'a, D> {
         // Without coarsening, points that cannot be refined further are not checked.
         let matters =
             |block, position| trigger.coarsen_after.is_some() || pick(block, position).is_some();
-        let seen = self.seen(&self.sources(|point| triggers[point]), matters);
-        let finer = self.picks(&seen, pick);
+        let near_trigger = self.near_any(&self.sources(|point| triggers[point]), matters);
+        let finer = self.picks(&near_trigger, pick);
         let mut coarser = Vec::new();
         if let Some(limit) = trigger.coarsen_after {
-            let is_torn =
+            let is_damaged =
                 |point| snapshot.damage(&self.undeformed.family_volume, point) > LEAST_DAMAGE;
-            let at_torn = self.seen(&self.sources(is_torn), |_, _| true);
+            let near_damage = self.near_any(&self.sources(is_damaged), |_, _| true);
             let now = self.clock.time();
             let last = self.fields.last_seen.iter_mut().flatten();
-            let silent = last
-                .zip(seen.iter().zip(at_torn))
-                .map(|(last, (seen, at_torn))| {
-                    if *seen || at_torn {
+            let to_coarsen = last.zip(near_trigger.iter().zip(near_damage)).map(
+                |(last, (near_trigger, near_damage))| {
+                    if *near_trigger || near_damage {
                         *last = now;
                     }
                     now - *last >= limit
-                });
-            let silent: Vec<bool> = silent.collect();
-            coarser = self.picks(&silent, |block, position| {
+                },
+            );
+            let to_coarsen: Vec<bool> = to_coarsen.collect();
+            coarser = self.picks(&to_coarsen, |block, position| {
                 self.grids.coarsening(self.problem.body_of(block), position)
             });
         }
@@ -222,7 +222,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Mark the owned points within the horizon of a source. Only points for which `matters(block, position)`
     /// is true are checked.
-    fn seen(&self, sources: &[Source], matters: impl Fn(usize, [f64; 3]) -> bool) -> Vec<bool> {
+    fn near_any(&self, sources: &[Source], matters: impl Fn(usize, [f64; 3]) -> bool) -> Vec<bool> {
         let model = &self.model;
         let longest = sources
             .iter()
@@ -233,18 +233,18 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         let places: Vec<[f64; 3]> = sources.iter().map(|source| source.position).collect();
         let bins = Bins::new(&places, longest * (1.0 + 1e-9));
-        let is_seen = |point: usize| {
+        let is_near = |point: usize| {
             let position = model.position(point);
             if !matters(usize::from(model.block[point]), position) {
                 return false;
             }
-            let mut seen = false;
+            let mut is_within = false;
             bins.within(position, |source, square| {
                 let horizon = sources[source as usize].horizon * (1.0 + 1e-9);
-                seen |= square <= horizon * horizon;
+                is_within |= square <= horizon * horizon;
             });
-            seen
+            is_within
         };
-        (0..model.owned()).map(is_seen).collect()
+        (0..model.owned()).map(is_near).collect()
     }
 }

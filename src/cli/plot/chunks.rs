@@ -1,4 +1,4 @@
-//! Reading of all points of an output, in blocks of consecutive points.
+//! Reading of all points of an output, in chunks of consecutive points.
 
 use std::ops;
 
@@ -6,7 +6,7 @@ use fissure::error::Result;
 use fissure::output::ResultReader;
 
 /// Number of points that are read at once, to limit the memory of a picture.
-const BLOCK: usize = 1 << 18;
+const CHUNK: usize = 1 << 18;
 
 /// Largest difference of coordinates that count as equal, as a fraction of the extent of the body.
 /// Coordinates of points in one row of a lattice differ by round-off.
@@ -16,10 +16,10 @@ const SAME_COORDINATE: f64 = 1e-9;
 /// constant times n^1.5; see [`scattered_bodies`].
 const MOST_COMBINATIONS: f64 = 4.0;
 
-/// Divide `points` points into ranges of at most [`BLOCK`] points.
-pub fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
-    let block = move |first: usize| first..(first + BLOCK).min(points);
-    (0..points).step_by(BLOCK).map(block)
+/// Divide `points` points into ranges of at most [`CHUNK`] points.
+pub fn chunks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
+    let chunk = move |first: usize| first..(first + CHUNK).min(points);
+    (0..points).step_by(CHUNK).map(chunk)
 }
 
 /// Test whether all values of a field are 0 at output `index`.
@@ -27,7 +27,7 @@ pub fn blocks(points: usize) -> impl Iterator<Item = ops::Range<usize>> {
 /// # Errors
 /// If the result is damaged.
 pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool> {
-    for points in blocks(result.points(index)) {
+    for points in chunks(result.points(index)) {
         let values = result.field_of(field, index, points)?;
         if values.iter().any(|value| *value != 0.0) {
             return Ok(false);
@@ -56,7 +56,7 @@ pub fn scattered_bodies(
     }
     // Number of points of each body. The field `block` contains the number of the body.
     let mut points_of: Vec<usize> = Vec::new();
-    for points in blocks(result.points(index)) {
+    for points in chunks(result.points(index)) {
         for body in result.field_of("block", index, points)? {
             let body = body as usize;
             points_of.resize(points_of.len().max(body + 1), 0);
@@ -68,7 +68,7 @@ pub fn scattered_bodies(
         // Store the coordinates of one direction at a time, to limit the memory.
         let of_body = points_of.iter().map(|points| Vec::with_capacity(*points));
         let mut along: Vec<Vec<f64>> = of_body.collect();
-        for points in blocks(result.points(index)) {
+        for points in chunks(result.points(index)) {
             let bodies = result.field_of("block", index, points.clone())?;
             let positions = result.positions_of(index, points)?;
             for (position, body) in positions.iter().zip(&bodies) {

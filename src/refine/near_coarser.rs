@@ -5,7 +5,7 @@ use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
 /// Test for coarser nodes within a distance of a node of a given level.
-pub struct AtCoarser<'a> {
+pub struct NearCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
     /// Indices, in spacings of the level, at which the refinement of coarser levels creates nodes in addition
@@ -19,7 +19,7 @@ pub struct AtCoarser<'a> {
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
-impl<'a> AtCoarser<'a> {
+impl<'a> NearCoarser<'a> {
     /// Create the test for a level above 0 with the spacing `edges` and the radius `reach`, in the same
     /// unit.
     pub fn new(pattern: &'a Pattern, level: u32, edges: [f64; 3], reach: f64) -> Self {
@@ -96,8 +96,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Same as [`AtCoarser::has`], one index at a time.
-    fn is_at_coarser(
+    /// Same as [`NearCoarser::has`], one index at a time.
+    fn is_near_coarser(
         pattern: &Pattern,
         body: &impl Fn(GridIndex) -> bool,
         (level, centre): (u32, GridIndex),
@@ -126,12 +126,12 @@ mod tests {
                 pattern.refine(&body, level, index);
             }
             for level in 1..=3 {
-                let at_coarser = AtCoarser::new(&pattern, level, [1.0; 3], reach as f64);
+                let near_coarser = NearCoarser::new(&pattern, level, [1.0; 3], reach as f64);
                 let end = 5 << level;
                 for index in between([-end, -end, 0], [end, end, 0]) {
                     if pattern.exists(&body, level, index) {
-                        let expected = is_at_coarser(&pattern, &body, (level, index), reach);
-                        prop_assert_eq!(at_coarser.has(&body, index), expected);
+                        let expected = is_near_coarser(&pattern, &body, (level, index), reach);
+                        prop_assert_eq!(near_coarser.has(&body, index), expected);
                     }
                 }
             }

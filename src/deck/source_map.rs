@@ -7,41 +7,41 @@ use toml::de::{DeTable, DeValue};
 
 /// The files of a merged deck, and the byte ranges of the merged text that come from each file.
 #[derive(Debug)]
-pub struct Origins {
+pub struct SourceMap {
     /// Paths and texts: the deck and its overlays.
     files: Vec<(PathBuf, String)>,
-    pieces: Vec<Piece>,
+    ranges: Vec<MappedRange>,
 }
 
-/// A byte range of the merged text (`changed`) that comes from a file.
+/// A byte range of the merged text (`merged`) that comes from a file.
 #[derive(Debug)]
-struct Piece {
-    changed: Range<usize>,
+struct MappedRange {
+    merged: Range<usize>,
     /// Index of the file.
     file: usize,
     /// Byte range in this file.
-    place: Range<usize>,
+    in_file: Range<usize>,
     /// Whether both byte ranges have equal content.
     is_equal: bool,
 }
 
-impl Origins {
+impl SourceMap {
     /// Locate the keys and values of the merged text `text` in `files`; later files take precedence.
     pub fn new(text: &str, files: Vec<(PathBuf, String)>) -> Self {
-        let mut pieces = Vec::new();
-        if let Ok(changed) = DeTable::parse(text) {
+        let mut ranges = Vec::new();
+        if let Ok(merged) = DeTable::parse(text) {
             for (file, (_, of_file)) in files.iter().enumerate() {
                 if let Ok(table) = DeTable::parse(of_file) {
                     let mut search = Search {
                         texts: [text, of_file],
                         file,
-                        pieces: &mut pieces,
+                        ranges: &mut ranges,
                     };
-                    search.tables(changed.get_ref(), table.get_ref());
+                    search.tables(merged.get_ref(), table.get_ref());
                 }
             }
         }
-        Self { files, pieces }
+        Self { files, ranges }
     }
 
     /// Return the source of the range `span` of the merged text: the path and the text of a file, and a byte
@@ -61,19 +61,19 @@ impl Origins {
             return Some((path, deck, deck.len()..deck.len()));
         }
         let around =
-            |piece: &&Piece| piece.changed.start <= span.start && span.end <= piece.changed.end;
-        let pieces = self.pieces.iter().rev().filter(around);
-        let Piece {
-            changed,
+            |range: &&MappedRange| range.merged.start <= span.start && span.end <= range.merged.end;
+        let ranges = self.ranges.iter().rev().filter(around);
+        let MappedRange {
+            merged,
             file,
-            place,
+            in_file,
             is_equal,
-        } = pieces.min_by_key(|piece| piece.changed.len())?;
+        } = ranges.min_by_key(|range| range.merged.len())?;
         let (path, text) = &self.files[*file];
-        if changed == span {
-            return Some((path, text, place.clone()));
+        if merged == span {
+            return Some((path, text, in_file.clone()));
         }
-        let begin = place.start + (span.start - changed.start);
+        let begin = in_file.start + (span.start - merged.start);
         is_equal.then(|| (path, &text[..], begin..begin + span.len()))
     }
 }
@@ -83,25 +83,25 @@ struct Search<'a> {
     /// The merged text and the text of the file.
     texts: [&'a str; 2],
     file: usize,
-    pieces: &'a mut Vec<Piece>,
+    ranges: &'a mut Vec<MappedRange>,
 }
 
 impl Search<'_> {
-    fn add(&mut self, changed: Range<usize>, place: Range<usize>) {
-        self.pieces.push(Piece {
-            is_equal: self.is_equal(&changed, &place),
-            changed,
+    fn add(&mut self, merged: Range<usize>, in_file: Range<usize>) {
+        self.ranges.push(MappedRange {
+            is_equal: self.is_equal(&merged, &in_file),
+            merged,
             file: self.file,
-            place,
+            in_file,
         });
     }
 
-    fn is_equal(&self, changed: &Range<usize>, place: &Range<usize>) -> bool {
-        self.texts[0].get(changed.clone()) == self.texts[1].get(place.clone())
+    fn is_equal(&self, merged: &Range<usize>, in_file: &Range<usize>) -> bool {
+        self.texts[0].get(merged.clone()) == self.texts[1].get(in_file.clone())
     }
 
-    fn tables(&mut self, changed: &DeTable, of_file: &DeTable) {
-        for (key, value) in changed {
+    fn tables(&mut self, merged: &DeTable, of_file: &DeTable) {
+        for (key, value) in merged {
             let Some((known, of_file)) = of_file.get_key_value(key.get_ref().as_ref()) else {
                 continue;
             };
@@ -111,24 +111,22 @@ impl Search<'_> {
         }
     }
 
-    fn values(&mut self, [changed, of_file]: [&DeValue; 2], [span, place]: [Range<usize>; 2]) {
-        match (changed, of_file) {
-            (DeValue::Table(changed), DeValue::Table(of_file)) => {
-                self.add(span, place);
-                self.tables(changed, of_file);
+    fn values(&mut self, [merged, of_file]: [&DeValue; 2], [span, in_file]: [Range<usize>; 2]) {
+        match (merged, of_file) {
+            (DeValue::Table(merged), DeValue::Table(of_file)) => {
+                self.add(span, in_file);
+                self.tables(merged, of_file);
             }
-            (DeValue::Array(changed), DeValue::Array(of_file))
-                if changed.len() == of_file.len() =>
-            {
-                if self.is_equal(&span, &place) {
-                    self.add(span, place);
+            (DeValue::Array(merged), DeValue::Array(of_file)) if merged.len() == of_file.len() => {
+                if self.is_equal(&span, &in_file) {
+                    self.add(span, in_file);
                 }
-                for (changed, of_file) in changed.iter().zip(of_file.iter()) {
-                    let spans = [changed.span(), of_file.span()];
-                    self.values([changed.get_ref(), of_file.get_ref()], spans);
+                for (merged, of_file) in merged.iter().zip(of_file.iter()) {
+                    let spans = [merged.span(), of_file.span()];
+                    self.values([merged.get_ref(), of_file.get_ref()], spans);
                 }
             }
-            _ if self.is_equal(&span, &place) => self.add(span, place),
+            _ if self.is_equal(&span, &in_file) => self.add(span, in_file),
             _ => {}
         }
     }
