@@ -53,8 +53,8 @@ impl Dimension {
         }
     }
 
-    /// Return the edge (m) of the line segment, square or cube with this volume (m³). The volume is the
-    /// length, area or volume of this shape times [`Self::out_of_plane_measure`].
+    /// Return the edge (m) of the line segment, square or cube that represents a `volume` (m³). `volume` is
+    /// the length, area or volume of this shape, multiplied by [`Self::out_of_plane_measure`].
     pub fn edge(self, volume: f64) -> f64 {
         let extent = volume / self.out_of_plane_measure();
         libm::pow(extent, 1.0 / self.count() as f64)

@@ -1,4 +1,4 @@
-//! Isotropic elastic constants, computed from any two.
+//! Isotropic elastic constants, computed from any two of them.
 
 /// An elastic constant that a deck can give.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,8 +25,9 @@ pub struct Isotropic {
 }
 
 impl Isotropic {
-    /// Compute the solid from two constants in any order. `None` if both are the same constant, if the values
-    /// do not determine a stable solid (E > 0 and −1 < ν < 1/2), or if λ + 2G is not finite.
+    /// Compute the solid from two constants in any order. Return `None` if `a` and `b` are values of the same
+    /// constant, if they do not determine a stable solid (E > 0 and −1 < ν < 1/2), or if λ + 2G is not
+    /// finite.
     pub fn from_two(a: (Constant, f64), b: (Constant, f64)) -> Option<Self> {
         use Constant::{Bulk, Lame, Poisson, Shear, Young};
         let order = |constant| match constant {

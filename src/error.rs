@@ -47,7 +47,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 const EXCERPT: usize = 40;
 
 /// Format a user's text for a message: in backticks, with escaped control characters. A text of more than
-/// `EXCERPT` characters is cut after these characters, and `…` is appended.
+/// `EXCERPT` characters is cut after the first `EXCERPT` characters, and `…` is appended.
 pub fn excerpt(text: &str) -> String {
     let escape = |c: char| {
         if c.is_control() {

@@ -53,17 +53,17 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory and swap that the control groups of this process leave, bytes: the smallest of the
-/// amounts that are left in the group of the process and in the groups above it. `None` if none of these
-/// groups has a limit, or on systems without control groups of version 2.
+/// Return the memory and swap that the control groups of this process leave, bytes. This is the smallest
+/// amount that is left in the group of the process or in a group above it. `None` if none of these groups has
+/// a limit, or on systems without control groups of version 2.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
     left_in_groups(Path::new("/sys/fs/cgroup"), Path::new(path))
 }
 
-/// Return the smallest amount of memory and swap (bytes) that is left in the control group `path` below
-/// `root`, and in the groups above it. `None` if none of these groups has a limit.
+/// Return the smallest amount of memory and swap (bytes) that is left in one of these control groups: `path`
+/// below `root`, and the groups above it. `None` if none of these groups has a limit.
 fn left_in_groups(root: &Path, path: &Path) -> Option<u64> {
     let groups = path.ancestors().map(|group| root.join(group));
     groups.filter_map(|group| left_in_group(&group)).min()

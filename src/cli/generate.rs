@@ -9,7 +9,7 @@ use fissure::error::Result;
 
 use super::{CommandLine, Verbosity, file_error, outln, print};
 
-/// Print the JSON Schema of decks; editors use the schema to complete keys and mark errors.
+/// Print the JSON Schema of decks, which lets editors complete keys and mark errors.
 #[derive(Args)]
 #[command(after_help = "\
 Example:

@@ -344,7 +344,7 @@ fn tip(
     })
 }
 
-/// Width of the layer inside the faces of the box of a J integral, in horizons.
+/// Width of a layer along the inner side of each face of the box of a J integral, in horizons.
 const LAYER: f64 = 1.0;
 
 fn j_integral(
@@ -387,7 +387,8 @@ fn j_integral(
     })
 }
 
-/// Largest absolute value of the cosine of the angle between the crack front and the direction of growth.
+/// Largest |cos φ| that counts as perpendicular; φ is the angle between the crack front and the direction of
+/// growth.
 const LARGEST_COSINE: f64 = 1e-6;
 
 /// Return the direction of the crack front for a J integral in 3-D, `None` in plane problems.

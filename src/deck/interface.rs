@@ -22,8 +22,8 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 ///
 /// # Errors
 /// On bonded bodies whose laws exert forces in different directions, and on an invalid or repeated pair. Also
-/// on a rule or strength that the material laws of a pair do not allow. The solver checks whether the laws
-/// allow the damage law of a pair.
+/// on a rule or strength that the material laws of a pair do not allow. The solver checks whether the
+/// material laws allow the damage law of a pair.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -254,8 +254,8 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
 }
 
 /// Check that the bodies allow a rule that needs one micromodulus for both ends of a bond (any rule but
-/// `own`). Return an error unless both bodies have the same bond-based law, without a function of the bond
-/// length.
+/// `own`). Return an error unless both bodies have the same bond-based law, and no key of the law is given as
+/// a function of the bond length.
 fn one_micromodulus(
     scope: &Scope,
     key: &str,

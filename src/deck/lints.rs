@@ -14,8 +14,8 @@ use crate::message::format_number;
 use crate::points::{BodyPoints, file};
 use crate::problem::{PointSource, Problem, Selector, changes_density_scale};
 
-/// Return a warning for each probable mistake. `scope` must be the scope of the validation, which records
-/// the names that the deck uses.
+/// Return a warning for each probable mistake. `scope` must be the scope that was used for the validation:
+/// it has recorded the names that the deck uses.
 ///
 /// # Errors
 /// If the deck cannot be serialized for the search of unused parameters.
@@ -96,8 +96,8 @@ fn not_read(key: &str, ignored: &[&str], span: &Range<usize>) -> Option<Warning>
     (!ignored.is_empty()).then(warning)
 }
 
-/// Return a warning for each unused table. Sections whose tables have an effect without a reference to them
-/// are not checked.
+/// Return a warning for each unused table. Tables that have an effect even if no other section refers to
+/// them, such as bodies, are not checked.
 fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let used = scope.used.borrow();
     let mut tables = deck.named_tables();
@@ -133,7 +133,7 @@ fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
     Ok(unused.map(warning).collect())
 }
 
-/// Add to `names` the names in all strings of a value. Each string is parsed as an expression; strings that
+/// Add the names in all strings of a value to `names`. Each string is parsed as an expression; strings that
 /// are not expressions are skipped.
 fn names_in(value: &Value, names: &mut IndexSet<String>) {
     match value {

@@ -52,13 +52,14 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Deck {
     source: Source,
     grammar: grammar::Deck,
-    /// Copy of `grammar` with numbers in place of horizons that contain the mean spacing; `None` if the deck
-    /// has no such horizons. The copy is made only once, because meshes and point files may have to be read.
+    /// Copy of `grammar` with numbers in place of horizons that depend on the mean spacing of points; `None`
+    /// if the deck has no such horizons. The copy is made only once, because meshes and point files may have
+    /// to be read.
     with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
-/// Read a deck. `set` has pairs of a name and a value or expression. The name is a parameter, a key with its
-/// section (`time.safety`), or a key outside of all sections (`thickness`).
+/// Read a deck. Each entry of `set` has two parts: a name, and a value or expression. The name is a
+/// parameter, a key with its section (`time.safety`), or a key outside of all sections (`thickness`).
 ///
 /// # Errors
 /// If the file cannot be read, its text does not follow the grammar, or an entry of `set` has an unknown name
@@ -129,7 +130,7 @@ impl Deck {
 
     /// Validate the deck in a single process, and return its problem with the warnings about the deck.
     ///
-    /// If a horizon contains the mean spacing of points, this process reads all files of these points;
+    /// If a horizon depends on the mean spacing of points, the process reads all files of these points.
     /// [`Self::problem_on`] shares this work between ranks.
     ///
     /// # Errors
@@ -156,7 +157,8 @@ impl Deck {
         Ok(problem)
     }
 
-    /// Return the parsed deck, with numbers in place of horizons that contain the mean spacing. Collective.
+    /// Return the parsed deck, with numbers in place of horizons that depend on the mean spacing of points.
+    /// Collective.
     fn with_horizons(&self, scope: &mut Scope, comm: &dyn Communicator) -> Result<&grammar::Deck> {
         let known = self.with_horizons.get();
         // Ranks may be threads that share this deck, so some ranks may find the result of other ranks here.
@@ -171,8 +173,8 @@ impl Deck {
         Ok(found.as_ref().unwrap_or(&self.grammar))
     }
 
-    /// Return the deck as TOML with every default written out. The paths of files of tables are replaced by
-    /// the rows of the tables. Horizons that contain the mean spacing of points are replaced by their values.
+    /// Return the deck as TOML with every default written out. Tables contain their rows instead of the path
+    /// of a file. Horizons that depend on the mean spacing of points are replaced by their values.
     ///
     /// # Errors
     /// If the deck is invalid, as in [`Self::problem`], or cannot be serialized.

@@ -40,7 +40,7 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
 /// Check that a name can be part of a column name; `key` and `place` locate the name for the error.
 ///
 /// # Errors
-/// On a name with `/`, `.` or `,`. These characters separate columns and the parts of the names of columns.
+/// On a name with `/`, `.` or `,`. These characters separate columns, or the parts of a column name.
 pub fn suits_a_column<T>(scope: &Scope, key: &str, name: &str, place: &Spanned<T>) -> Result<()> {
     if name.contains(['/', '.', ',']) {
         let message = format!(

@@ -1,4 +1,4 @@
-//! Validation of the content and interval of results, of checkpoints, and of rebalancing.
+//! Validation of the results (content and interval), the checkpoints and the rebalancing.
 
 use super::grammar::{self, Balance, Deck};
 use super::resolve::{Scope, find};
@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem;
 
-/// Part of the new names of result files that a restart renames. Names of further results must not contain
-/// this part, so that no new result replaces a renamed file.
+/// Text that marks old result files: a restart renames these files, and their new names contain this text.
+/// Names of further results must not contain this text, so that no new result replaces a renamed file.
 const SET_ASIDE: &str = "until_step_";
 
 /// Validate the main result; `end` is the end of the run, s.

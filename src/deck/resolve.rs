@@ -77,7 +77,8 @@ impl<'a> Scope<'a> {
         self.source.error(span, message)
     }
 
-    /// Return the index of the table `name` in `names`, the tables of `section`, and mark the table as used.
+    /// Return the index of the table `name` in `names`, and mark the table as used. `names` are the known
+    /// names of `section`.
     ///
     /// # Errors
     /// On an unknown name.
@@ -101,7 +102,8 @@ impl<'a> Scope<'a> {
         Ok(value.expect("an expression without variables is a constant"))
     }
 
-    /// Return a whole number; a number of 2⁶³ or more, the limit of TOML integers, is an error.
+    /// Return a whole number. A number of 2⁶³ or more is an error, because it exceeds the limit of TOML
+    /// integers.
     pub fn whole(&self, number: &Spanned<u64>, key: &str) -> Result<u64> {
         let (value, most) = (*number.get_ref(), i64::MAX);
         if value <= most as u64 {

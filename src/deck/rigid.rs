@@ -13,9 +13,9 @@ use crate::problem::{self, RigidMotion, RigidShape, Shape};
 /// Validate rigid bodies.
 ///
 /// # Errors
-/// On a missing or surplus shape, and on a shape that cannot be rigid. On keys of free bodies for a driven
-/// body, and on `motion` for a free body. On a free half space, on a free body or friction in a relaxation,
-/// and on numbers out of range.
+/// On a missing or surplus shape, and on a shape that cannot be rigid. If a driven body has a key that is
+/// only for free bodies, or a free body has the key `motion`. On a free half space, on a free body or
+/// friction in a relaxation, and on numbers out of range.
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies

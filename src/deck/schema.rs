@@ -7,8 +7,9 @@ use super::grammar::Deck;
 
 /// Return the JSON Schema (draft 7) of decks, generated from the grammar.
 ///
-/// The schema covers keys, types of values and allowed words. Rules about several values, such as names of
-/// sets, are checked only by [`read`](super::read) and [`Deck::problem`](super::Deck::problem).
+/// The schema covers keys, types of values and allowed words. Rules about several values, for example that
+/// the deck has a set with a given name, are not part of the schema. Only [`read`](super::read) and
+/// [`Deck::problem`](super::Deck::problem) check these rules.
 pub fn schema() -> Value {
     let generator = SchemaSettings::draft07().into_generator();
     let mut schema = generator.into_root_schema_for::<Deck>().to_value();
@@ -19,8 +20,8 @@ pub fn schema() -> Value {
     schema
 }
 
-/// Rewrite two constructs that editors handle badly, everywhere in a schema: the type `null`, which TOML
-/// lacks, and choices of tables.
+/// Rewrite two constructs in all parts of a schema, because editors handle them badly: the type `null`, which
+/// TOML lacks, and choices of tables.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Array(entries) => entries.iter_mut().for_each(tidy),
@@ -54,8 +55,9 @@ fn remove_null(schema: &mut Value) {
     }
 }
 
-/// Join a choice of tables with one key each into one table that has exactly one of the keys. Editors can
-/// then complete the keys, and the messages of editors point to the key with the mistake.
+/// Replace a choice between several tables, each with one key, by a single table that must have exactly one
+/// of these keys. Editors can then complete the keys, and the messages of editors point to the key with the
+/// mistake.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {
         let mut properties = serde_json::Map::new();

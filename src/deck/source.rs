@@ -46,7 +46,8 @@ impl Source {
         }
     }
 
-    /// Create a source from a text merged from `files`, the deck first. Errors name the lines of these files.
+    /// Create a source from a text that was merged from `files`; the first file is the deck. Errors name the
+    /// lines of these files.
     pub(super) fn changed(text: String, files: Vec<Self>) -> Self {
         let files: Vec<_> = files
             .into_iter()

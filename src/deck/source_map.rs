@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 /// The files of a merged deck, and the byte ranges of the merged text that come from each file.
 #[derive(Debug)]
 pub struct SourceMap {
-    /// Paths and texts: the deck and its overlays.
+    /// Path and text of each file: the deck, then its overlays.
     files: Vec<(PathBuf, String)>,
     ranges: Vec<MappedRange>,
 }
@@ -21,7 +21,7 @@ struct MappedRange {
     file: usize,
     /// Byte range in this file.
     in_file: Range<usize>,
-    /// Whether both byte ranges have equal content.
+    /// Whether the byte ranges `merged` and `in_file` have equal content.
     is_equal: bool,
 }
 

@@ -198,7 +198,7 @@ fn from_file(
         .map_err(|(row, message)| at(lines.get(row).copied().unwrap_or(header.line), message))
 }
 
-/// Return the indices in `names` of the columns of time and value.
+/// Return the index of the time column and the index of the value column in `names`.
 fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usize; 2], String> {
     let find = |wanted: &str| {
         let missing = || {

@@ -75,8 +75,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
 /// Validate the stages of the run, whose time axis is `whole`.
 ///
 /// # Errors
-/// On a missing or invalid end of a stage, an unknown name, an invalid number, a stage with both `on` and
-/// `off`, and a key of a method that the stage does not use.
+/// On a missing or invalid end of a stage, an unknown name, or an invalid number. If a stage has both `on`
+/// and `off`, or a key of a method that the stage does not use.
 pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;

@@ -1,4 +1,5 @@
-//! Errors of the TOML parser in terms of the deck: the key, the expected value and the given value.
+//! Translation of errors of the TOML parser into errors about the deck, with the key, the expected value and
+//! the given value.
 
 use std::ops::Range;
 
@@ -232,7 +233,7 @@ fn label(path: &[String]) -> String {
     [header, keys.to_vec()].concat().join(" ")
 }
 
-/// Return the names of the variants of a grammar enum, read from a deserialization error.
+/// Return the names of all variants of a grammar enum. A deserialization error lists these names.
 fn kinds<'de, T: Deserialize<'de>>() -> Vec<String> {
     let nameless: StrDeserializer<NameError> = "".into_deserializer();
     let message = T::deserialize(nameless)

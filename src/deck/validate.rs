@@ -127,8 +127,8 @@ pub fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
     })
 }
 
-/// Return the edges of a lattice cell, m; edges in directions beyond the dimension are 1. An edge above the
-/// horizon (m) is an error.
+/// Return the edges of a lattice cell, m; edges in directions beyond the dimension are 1. An edge longer than
+/// the horizon (m) is an error.
 pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -> Result<[f64; 3]> {
     let written = match edges.get_ref() {
         Edges::Same(edge) => vec![Spanned::new(edges.span(), edge.clone()); scope.dimension],

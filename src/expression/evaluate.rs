@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::{Table, Variable};
 
-/// Largest absolute integer exponent for which a power is computed by multiplication.
+/// Largest absolute value of an integer exponent for which a power is computed by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
 
 /// Stack size, in values, that is enough for nearly all expressions. Setting a small stack to zero is cheap.
 const SHALLOW_STACK: usize = 16;
 
-/// Stack size, in values, for the most deeply nested expression. A level of nesting holds at most two pending
-/// operands, the first two of three arguments.
+/// Stack size, in values, for the most deeply nested expression. A level of nesting has at most two pending
+/// operands: the first two arguments of a function with three arguments.
 const DEEP_STACK: usize = 2 * super::parse::DEEPEST_NESTING + 1;
 
 /// One step of postfix code.
@@ -280,7 +280,8 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
 }
 
 /// Return true if the operations of the code show that its value is always 0 or 1, as for a comparison. The
-/// values of constants and variables are not combined, so the function returns false for `0*x`, for example.
+/// function does not compute with the values of constants and variables, so it returns false for `0*x`, for
+/// example.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);

@@ -1,11 +1,11 @@
-//! Change of an expression's value over a time interval, for most operations without cancellation.
+//! Change of an expression's value over a time interval, computed without cancellation for most operations.
 //!
 //! The difference of two computed values of size |u| has a round-off of ε|u|, where ε is the machine epsilon.
 //! Dividing a second difference of such values by the square of a small step amplifies this error. In this
 //! module, most operations compute the change of their result from the changes of their operands. The
 //! round-off of these operations is therefore ε times the size of the change. For example, the change of sin
-//! from a to b is 2 cos((a + b)/2) sin((b − a)/2). The other operations, such as `tan` and `atan2`, subtract
-//! two values.
+//! from a to b is 2 cos((a + b)/2) sin((b − a)/2). For the other operations, such as `tan` and `atan2`, the
+//! change is the difference of two computed values.
 
 use std::sync::Arc;
 

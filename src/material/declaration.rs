@@ -10,7 +10,7 @@ use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
-/// Declaration of a law under one name in decks.
+/// Declaration of a law for one of its names in decks.
 pub struct Declaration {
     /// Name of the law in decks.
     pub name: &'static str,
@@ -21,8 +21,8 @@ pub struct Declaration {
     /// Whether Poisson's ratio is free, so that the deck gives two elastic constants. Otherwise the ratio is
     /// that of [bond-based laws](Dimension::bond_based_poisson_ratio).
     pub any_poisson_ratio: bool,
-    /// Message for a 1-D deck with this law: the law has no 1-D form, and the alternative if there is one.
-    /// `None` if the law has a 1-D form.
+    /// Error message for a 1-D deck with this law. It says that the law has no 1-D form, and names an
+    /// alternative law if there is one. `None` if the law has a 1-D form.
     pub no_line: Option<&'static str>,
     /// Whether forces act along ξ and are linear in the displacements, so that the law holds for small
     /// rotations only.
@@ -33,7 +33,7 @@ pub struct Declaration {
     /// combination is allowed.
     pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
     /// Return the elastic constants that follow from the law's own keys, if the deck gives these keys. Such a
-    /// deck must give no other elastic constants. The field is `None` if no such keys exist.
+    /// deck must give no other elastic constants. The field is `None` if the law has no such keys.
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
     /// Whether the energy criterion can break bonds of this law.
     pub breaks_by_energy: bool,
@@ -45,8 +45,8 @@ pub struct Declaration {
     /// Return the stretch at which the law itself breaks its bonds; bodies of such a law have no damage law.
     /// The field is `None` for laws without such a stretch.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
-    /// Whether the law breaks bonds because of their history, in addition to a damage law. Bonds of such a
-    /// law also break without a damage law.
+    /// Whether the law breaks bonds because of their history. Bonds of such a law also break in a body
+    /// without a damage law. A damage law can break further bonds.
     pub wears_out: bool,
     /// Return the error message for a horizon that is not allowed. The field is `None` if every horizon is
     /// allowed.
@@ -56,7 +56,8 @@ pub struct Declaration {
     pub scales_thresholds: fn(&Values) -> bool,
     /// Create the law from the constants of one body.
     pub build: fn(&Given) -> Built,
-    /// Examples for the tests. Each example has keys in addition to density and Young's modulus.
+    /// Examples for the tests. Each example lists the keys that a test deck gives for the law, except density
+    /// and Young's modulus.
     pub examples: &'static [&'static str],
 }
 
@@ -115,7 +116,7 @@ pub struct Invariants {
     /// Forces are the gradient of the strain energy. This holds neither for laws that dissipate energy nor
     /// for `stress = "willberg2022"`.
     pub conservative: bool,
-    /// If a motion is rotated, its forces rotate with it. This does not apply to
+    /// If a motion is rotated, the forces rotate with the motion. This is false for
     /// [linear](Declaration::linear) laws, whose forces keep the direction of ξ.
     pub objective: bool,
     /// The internal forces of a body have no resultant moment.
@@ -164,7 +165,7 @@ pub enum Kind {
     Number {
         /// The allowed range.
         range: Range<f64>,
-        /// The range in words that follow "must be".
+        /// The range in words; error messages write these words after "must be".
         words: &'static str,
         /// Default; `None` if the key is required.
         default: Option<f64>,
@@ -173,7 +174,7 @@ pub enum Kind {
     Optional {
         /// The allowed range.
         range: Range<f64>,
-        /// The range in words that follow "must be".
+        /// The range in words; error messages write these words after "must be".
         words: &'static str,
     },
     /// One of these words; the default is the first word.
@@ -322,8 +323,8 @@ pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
 pub struct Built {
     /// The law that the loops over bonds call.
     pub law: AnyLaw,
-    /// Influence function of the bond's length (m): factor on the bond in all sums of a point. `None` if
-    /// this factor is 1 for all bonds.
+    /// Influence function of the bond's length (m). The contribution of a bond to any sum of a point is
+    /// multiplied by this function. `None` if the function is 1 for all bonds.
     pub influence: Option<Box<dyn Fn(f64) -> f64 + Sync>>,
 }
 

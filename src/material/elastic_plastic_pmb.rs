@@ -1,8 +1,9 @@
-//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) Y/|Y|, with the micromodulus c and the
-//! plastic stretch s_p of the bond. s_p changes so that |s − s_p| never exceeds the yield stretch s_y.
+//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) Y/|Y|, with the micromodulus c, and the
+//! stretch s and the plastic stretch s_p of the bond. s_p changes so that |s − s_p| never exceeds the yield
+//! stretch s_y.
 //!
 //! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005). The slope of
-//! unloading is c, as in loading.
+//! the force over the stretch is c during unloading, as in elastic loading.
 //! The elastic energy of a bond is c (s − s_p)² |ξ|/2. Plastic flow by Δs_p dissipates c s_y |Δs_p| |ξ|.
 
 use super::bond::Weights;
@@ -57,8 +58,8 @@ fn build(given: &Given) -> Built {
 /// dissipates the same energy as breaking an elastic bond at s_e. Here s_e is the critical stretch of `pmb`
 /// for this fracture energy.
 ///
-/// The energy is c s_y (s0 − s_y/2) |ξ| if s0 > s_y, and c s_e² |ξ|/2 for the elastic bond. Therefore
-/// s0 = s_e²/(2 s_y) + s_y/2 if s_e > s_y; otherwise s0 = s_e.
+/// If s0 > s_y, the bond dissipates c s_y (s0 − s_y/2) |ξ|. The elastic bond dissipates c s_e² |ξ|/2.
+/// Therefore s0 = s_e²/(2 s_y) + s_y/2 if s_e > s_y; otherwise s0 = s_e.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let elastic = bond_based_critical_stretch(given, energy);
     let limit = given.values.number(YIELD_STRETCH.name);

@@ -1,14 +1,15 @@
-//! Surface correction by axes. The factor of a point for a bond is the radius of an ellipsoid in the
-//! direction of the bond.
+//! Surface correction from extensions along the coordinate axes. The factor of a point for a bond is the
+//! radius of an ellipsoid in the direction of the bond.
 //!
 //! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. Consider a unit extension along a coordinate axis a. The
 //! factor g_a scales a sum over the family of a point to the value that this sum has in the solid. A bond of
 //! direction n has the factor g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
 //!
-//! In the sources, a bond has the ellipsoid of the mean semi-axes of both ends. Here each end has its own
-//! ellipsoid, because the force state of a point depends on the numbers of this point only. In bond-based
-//! laws, a bond then has the mean of both radii. The difference from the sources is of second order in the
-//! difference of the semi-axes.
+//! In the sources, a bond has one ellipsoid, and each semi-axis is the mean of the values at both ends. Here
+//! each end has its own ellipsoid, because the force state of a point depends on the numbers of this point
+//! only. In bond-based laws, the factor of a bond is then the mean of the radii at both ends. If the
+//! semi-axes at the ends differ, this factor deviates from the sources by a term of second order in the
+//! difference.
 //!
 //! The factors depend on the coordinate axes, so they are not exact for extensions along other directions.
 
@@ -22,12 +23,12 @@ use crate::lanes::Lanes;
 /// plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
-/// Diagonal entry of the tensor of a point without bonds of its own. The radii are then nearly 0, so this end
-/// contributes nothing to bonds with points of a larger horizon.
+/// Diagonal entry of the tensor of a point without bonds within its own horizon. The radii of this point are
+/// nearly 0, so it contributes nothing to its bonds with points of a larger horizon.
 pub const WITHOUT_BONDS: f64 = 1e300;
 
-/// Return the semi-axis g_a, the ratio of the value in the solid, `wanted`, to the value of the family,
-/// `found`; at most [`LARGEST`].
+/// Return the semi-axis g_a = `wanted`/`found`, at most [`LARGEST`]. `wanted` is the value of the sum in the
+/// solid, and `found` is the value of the family.
 pub fn semi_axis(wanted: f64, found: f64) -> f64 {
     if found * LARGEST > wanted {
         wanted / found
@@ -36,7 +37,7 @@ pub fn semi_axis(wanted: f64, found: f64) -> f64 {
     }
 }
 
-/// Return the tensor T of [`radius`], for an ellipsoid with the semi-axes `scale` g_a.
+/// Return the tensor T of [`radius`], for an ellipsoid with the semi-axes g_a times `scale`.
 pub fn tensor<const D: usize>(semi_axes: [f64; D], scale: f64) -> SMatrix<f64, D, D> {
     let entries = semi_axes.map(|axis| (scale * axis).powi(-2));
     SMatrix::from_fn(|a, b| if a == b { entries[a] } else { 0.0 })

@@ -13,7 +13,7 @@
 //! factor.
 //!
 //! The law stores the used life 1 − λ. The number of cycles in a time step is the length of the step times
-//! [`FatiguePmb::cycles_per_second`]; all these cycles have the stretch that the bond has at the end of the
+//! [`FatiguePmb::cycles_per_second`]. For all these cycles, s is the stretch of the bond at the end of the
 //! step. λ does not change the force of an intact bond.
 //!
 //! The law of SAND2014-18590 has separate constants A and m for the nucleation of cracks (phase I) and for

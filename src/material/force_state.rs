@@ -71,7 +71,7 @@ impl<const D: usize> ForceState<D> for Along {
         self.0 * bond.deformed[a] * bond.deformed[b]
     }
 
-    /// Return ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x) and the symbols of `bond.rs`. For
+    /// Return ½ t |Y| (|Y| − |ξ|). With x and P = P(x) of `bond.rs`, |Y| (|Y| − |ξ|) = |ξ|² P (1 + x). For
     /// linear laws, return ½ t ξ·η.
     #[inline(always)]
     fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 0]) -> Lanes {

@@ -1,4 +1,5 @@
-//! Linear microelastic material: the force density of a bond per volume is f = C η with C = λ(|ξ|) ξ⊗ξ.
+//! Linear microelastic material: the force density of a bond, per volume of point j, is f = C η with
+//! C = λ(|ξ|) ξ⊗ξ.
 //!
 //! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ is the linearisation of the prototype microelastic
 //! material with the micromodulus c.
@@ -77,7 +78,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     /// Factor on the micromodulus.
     type Point = [Lanes; 1];
     type BondHistory = [Lanes; 0];
-    /// Σ |ξ| Ṽ, m⁴.
+    /// Σ ω|ξ| Ṽ.
     type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 0];
     type Force = Along;
@@ -92,7 +93,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
         [length]
     }
 
-    /// Set the factor to 1, or to the surface correction 4 W₁ / (c Σ |ξ| Ṽ).
+    /// Set the factor to 1, or to the surface correction 4 W₁ / (c Σ ω|ξ| Ṽ).
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         numbers[0] = match self.corrected_to {
             Some(energy) if sums[0] > 0.0 => 4.0 * energy / (self.micromodulus * sums[0]),

@@ -1,5 +1,5 @@
 //! Material laws. A law computes forces and energies of bonds, eight bonds at a time. Laws do not depend on
-//! decks, points, ranks and fields.
+//! decks, points, ranks or fields.
 //!
 //! The force density that a bond exerts on point i, per volume of point j, is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling
 //! et al. 2007). The force state T_i depends on three inputs:
@@ -11,7 +11,8 @@
 //! A law declares the counts of its point numbers and history values, and computes these values. An *end* of
 //! a bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
 //! cracks. The *initial* family of a point contains the bonds over which step 1 of [`Law`] sums, before any
-//! bond breaks. Y = ξ + η is the deformed bond, ω the influence function, and Ṽ the corrected volume of j.
+//! bond breaks. ξ is the undeformed bond, η the relative displacement of its ends, and Y = ξ + η the deformed
+//! bond. ω is the influence function, and Ṽ the corrected volume of j.
 
 mod any;
 pub mod bond;
@@ -116,8 +117,8 @@ pub trait Described {
     fn described(&self) -> Vec<(&'static str, Property)>;
 }
 
-/// A material law. It computes the numbers of a point from the bonds of the point, and the force states of
-/// bonds.
+/// A material law. It computes the numbers of each point from the bonds of the point. It also computes the
+/// force states of bonds.
 ///
 /// The loops over the bonds multiply the results of the law by ω and Ṽ, so the law contains neither factor.
 /// The loops call a law in these steps:
@@ -192,9 +193,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// is computed only in evaluations that store the history.
     const FORCE_READS_HISTORY: bool = true;
 
-    /// Whether the out-of-plane stress of a point is the mean of the stresses of its bonds. The sum of
-    /// [`Self::out_of_plane_bond_stress`] then replaces the value of [`Self::out_of_plane_stress`], unless
-    /// this value is `None`.
+    /// Whether the out-of-plane stress of a point is the mean of the stresses of its bonds. If so, the caller
+    /// computes the mean as the sum of [`Self::out_of_plane_bond_stress`]. This sum replaces the value of
+    /// [`Self::out_of_plane_stress`], unless this value is `None`.
     const HAS_OUT_OF_PLANE_BOND_STRESS: bool = false;
 
     /// Return the contribution of an undeformed bond to the sums over the initial family.
@@ -317,7 +318,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Compute the stress of a point, for laws with a deformation gradient per point. `None` for all other
     /// laws, and if the point carries no stress. The arguments are the sums of the first pass, the point
-    /// numbers, and the plastic state before or after the plastic flow of the step.
+    /// numbers, and the plastic state. The plastic state may already include the plastic flow of the step.
     fn family_stress(
         &self,
         _sums: &[f64],
@@ -383,8 +384,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Test whether a point carries no force. This is so if its intact bonds are too few or too stiff, or if
-    /// the law has no stress at the deformation of the point or of one of its bonds.
+    /// Test whether a point carries no force. This has three possible causes: the shape tensor of the intact
+    /// bonds is nearly singular; the intact part of the family is too stiff; or the law has no stress at the
+    /// deformation of the point or of one of its bonds.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
@@ -404,8 +406,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return one bit per bond, set if the bond breaks because of its history at one end. The bit counts only
-    /// if the force state of this end acts on the bond. Such bonds also break without a damage law. The bits
-    /// are checked in each force evaluation that stores the history.
+    /// if the force state of this end acts on the bond. The bond also breaks if its body has no damage law.
+    /// The bits are checked in each force evaluation that stores the history.
     #[inline(always)]
     fn is_worn_out<S: Simd>(&self, _simd: S, _history: &Self::BondHistory) -> u8 {
         0
@@ -425,8 +427,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Return the energy per bond of a point, divided by the energy per bond in an untruncated family at the
     /// same strain. `_sums` are the sums of [`Self::reference_contribution`].
     ///
-    /// Laws that give truncated families the energy density of untruncated families return more than 1 for
-    /// truncated families. All other laws return 1.
+    /// Some laws give a truncated family the same energy density as an untruncated family. For truncated
+    /// families, these laws return more than 1. All other laws return 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }

@@ -26,8 +26,8 @@ pub fn multiplicity(exponents: [usize; 3]) -> f64 {
     (all / exponents.map(factorial).iter().product::<usize>()) as f64
 }
 
-/// Write `factor` times the monomials of a degree in the components of `base` to `sums`. Monomials with a
-/// component beyond the `D` components of `base` are not written.
+/// Write to `sums` the monomials of a degree in the components of `base`, multiplied by `factor`. Monomials
+/// with a component beyond the `D` components of `base` are not written.
 #[inline(always)]
 pub fn write_monomials<const D: usize>(
     degree: usize,

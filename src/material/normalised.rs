@@ -90,9 +90,9 @@ fn printed_micromodulus(given: &Given) -> f64 {
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
 
-/// Return the critical stretch for a fracture energy (J/m²). For `form = "diehl2016"`, the critical stretch
-/// follows in the plane from eq. 16–17, and in space from the energy of all bonds across a plane. For
-/// `form = "energy"`, the result is the critical stretch of `pmb`.
+/// Return the critical stretch for a fracture energy (J/m²). For `form = "diehl2016"` in 2-D, the critical
+/// stretch follows from eq. 16–17 of Diehl & Schweitzer 2016. For this form in 3-D, it follows from the
+/// energy of all bonds across a plane. For `form = "energy"`, the result is the critical stretch of `pmb`.
 fn critical_stretch(given: &Given, energy: f64) -> f64 {
     if !as_printed(given) {
         return bond_based_critical_stretch(given, energy);
@@ -108,8 +108,8 @@ fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 impl Normalised {
-    /// Create the law that is normalised to the classical energy density of the solid with the Poisson
-    /// ratio of bond-based laws.
+    /// Create the law with the classical energy density W₁. W₁ is computed for the Poisson ratio of
+    /// bond-based laws.
     pub(super) fn classical(given: &Given) -> Self {
         Self {
             energy: Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus),

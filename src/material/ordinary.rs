@@ -2,8 +2,8 @@
 //!
 //! Silling, Epton, Weckner, Xu & Askari 2007; the plane forms follow Le, Chan & Schwartz 2014.
 //! In d dimensions, the law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension e = |Y| − |ξ|, the
-//! dilatation θ = (d/m) Σ ω|ξ|eṼ and the deviatoric extension e_d = e − θ|ξ|/d. The force state along the
-//! bond t (N/m⁶) and the strain energy density W (J/m³) are
+//! dilatation θ = (d/m) Σ ω|ξ|eṼ and the deviatoric extension e_d = e − θ|ξ|/d. The force state t along
+//! the bond (N/m⁶) and the strain energy density W (J/m³) are
 //!
 //! t = (d k′θ/m) ω|ξ| + (A/m) ω e_d, W = ½ k′θ² + ½ (A/m) Σ ω e_d² Ṽ.
 //!

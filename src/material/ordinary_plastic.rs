@@ -2,7 +2,8 @@
 //! a yield value.
 //!
 //! Mitchell 2011, SAND2011-3166. Each bond has a plastic extension e_p per end. Energy and force are those of
-//! [`Ordinary`] at the elastic extensions e − e_p, with the symbols of `ordinary.rs`:
+//! [`Ordinary`], with the elastic extension e − e_p instead of e. With the symbols of `ordinary.rs`, the
+//! energy W and the dilatation θ are
 //!
 //! W = ½ κθ² + ½ (A/m) Σ ω (e − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (e − e_p) Ṽ.
 //!
@@ -14,9 +15,9 @@
 //! (1 − r) e_d.
 //!
 //! Plastic flow preserves volume, so Σ ω|ξ| e_p Ṽ = 0. Therefore the law equals Mitchell's law until bonds of
-//! the family break. After that, the sum over the remaining bonds is not 0. Mitchell computes θ from the
-//! total extension e. The force would then not be the derivative of the energy: the plastic extensions would
-//! expand the family, and breaking bonds would add energy.
+//! the family break. After that, Σ ω|ξ| e_p Ṽ of the remaining bonds is not 0. Mitchell computes θ from the
+//! total extension e. With this θ, the force on the remaining bonds would not be the derivative of the
+//! energy: the plastic extensions would expand the family, and breaking bonds would add energy.
 //!
 //! ψ₀ is calibrated in pure shear: the point yields when the equivalent stress of von Mises reaches σ_y. A
 //! deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent stress
@@ -39,7 +40,7 @@ use crate::lanes::{IsaSet, Lanes};
 pub struct OrdinaryPlastic {
     elastic: Ordinary,
     /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by the weighted volume m.
-    /// `untruncated_weighted_volume` determines which m.
+    /// `untruncated_weighted_volume` determines which m is used.
     strength: f64,
     /// m of an untruncated family (m⁵), if this m determines the yield value of all points. `None` if the m
     /// of each point determines the yield value of the point.

@@ -149,8 +149,8 @@ impl Relaxation {
         }
     }
 
-    /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from the same
-    /// values before the step. `deviatoric` is e_d/|ξ| after the step. Without relaxation, a bond has the
+    /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these three
+    /// quantities before the step. `deviatoric` is e_d/|ξ| after the step. Without relaxation, a bond has the
     /// energy ½ `factor` (e_d/|ξ|)², J/m⁶.
     #[inline(always)]
     pub(super) fn after(

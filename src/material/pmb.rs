@@ -25,7 +25,7 @@ pub struct Pmb {
 
 impl Pmb {
     /// Create the law from Young's modulus E (Pa) and the horizon δ (m). In the table, h is the thickness
-    /// (m), and A the cross-section (m²).
+    /// (m), and A is the cross-section (m²).
     ///
     /// | dimension | c | source |
     /// |---|---|---|
@@ -57,7 +57,7 @@ impl Pmb {
         Self::new(given.dimension, given.elastic.youngs_modulus, given.horizon)
     }
 
-    /// Return the classical energy density W₁ at unit isotropic stretch (J/m³), with the Poisson ratio of
+    /// Return the classical energy density W₁ (J/m³) at unit isotropic stretch. Poisson's ratio ν is that of
     /// bond-based laws.
     ///
     /// W₁ is 9K/2 = 3E in 3-D, E/(1−ν) in plane stress and E/((1+ν)(1−2ν)) in plane strain. In 1-D, W₁ is E/2

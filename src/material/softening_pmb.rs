@@ -1,9 +1,9 @@
 //! Softening microelastic material. In tension f = c (1 − d) s Y/|Y| with the micromodulus c, where the
 //! damage variable d depends on the largest past stretch κ. In compression f = c s Y/|Y|.
 //!
-//! On first loading |f|/c is F(κ), and 1 − d = F(κ)/κ. F is κ up to the strength stretch s0, and then falls
-//! from s0 to 0 at the critical stretch sc. Unloading follows the straight line to the origin. Damage does
-//! not act in compression, because the faces of a crack close.
+//! On first loading |f|/c is F(κ), and 1 − d = F(κ)/κ. Up to the strength stretch s0, F(κ) is κ. Beyond s0, F
+//! decreases, and it is 0 at the critical stretch sc. Unloading follows the straight line to the origin.
+//! Damage does not act in compression, because the faces of a crack close.
 //!
 //! | curve | F between s0 and sc |
 //! |---|---|
@@ -17,8 +17,8 @@
 //! of the bonds.
 //!
 //! Stretching a bond to sc dissipates c |ξ| A with A = ∫ F dκ. Breaking a `pmb` bond at the stretch s_e
-//! dissipates c |ξ| s_e²/2. With A = s_e²/2, the bonds across a unit area dissipate the fracture energy for
-//! which s_e is the critical stretch of `pmb`. This holds in every dimension.
+//! dissipates c |ξ| s_e²/2. Let s_e be the critical stretch of `pmb` for a given fracture energy. With
+//! A = s_e²/2, the bonds across a unit area dissipate this fracture energy. This holds in every dimension.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -174,9 +174,9 @@ fn number(values: &Values, key: &Key) -> Option<f64> {
     values.get(key.name).map(|_| values.number(key.name))
 }
 
-/// Return the error if the strength (`tensile_strength` or `strength_stretch`) or the end of the curve
-/// (`fracture_energy` or `critical_stretch`) is not given exactly once, or if a curve other than `trilinear`
-/// has kink keys.
+/// Return the error if the keys are inconsistent. Exactly one of `tensile_strength` and `strength_stretch`
+/// must be given, and exactly one of `fracture_energy` and `critical_stretch`. Only the curve `trilinear`
+/// allows kink keys.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     for [first, second] in [
         [&TENSILE_STRENGTH, &STRENGTH_STRETCH],
@@ -228,8 +228,8 @@ fn fullness(values: &Values) -> f64 {
     }
 }
 
-/// Return the ratio of stress to strain in uniaxial tension, Pa. The ratio depends on Poisson's ratio only in
-/// plane strain and under uniaxial strain, where Poisson's ratio of this law is 1/4.
+/// Return the ratio of stress to strain in uniaxial tension, Pa. It depends on Poisson's ratio only in plane
+/// strain and under uniaxial strain. In these two cases, Poisson's ratio of this law is 1/4.
 fn tensile_modulus(given: &Given) -> f64 {
     let elastic = Isotropic {
         poisson_ratio: 0.25,
@@ -238,7 +238,8 @@ fn tensile_modulus(given: &Given) -> f64 {
     CriticalStretch::tensile_modulus(given.dimension, elastic)
 }
 
-/// Return sc: the value in the deck, or the value that follows from the fracture energy and s0, `strength`.
+/// Return sc: the value in the deck, or the value that follows from the fracture energy and s0. `strength` is
+/// s0.
 fn critical_stretch(given: &Given, strength: f64) -> f64 {
     let values = given.values;
     number(values, &CRITICAL_STRETCH).unwrap_or_else(|| {

@@ -199,7 +199,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
 /// Return the volumes of a block of `count` sphere elements; empty if the block has no volumes.
 ///
 /// The volume is the attribute whose name ends with `volume`. In a block without names of attributes, the
-/// volume is the second attribute, as in the files of Peridigm, whose first attribute is a radius.
+/// volume is the second attribute, as in the files of Peridigm. There, the first attribute is a radius.
 fn sphere_volumes(file: &Netcdf, block: usize, name: &str, count: usize) -> Fault<Vec<f64>> {
     let [variable, names] = ["attrib", "attrib_name"].map(|prefix| format!("{prefix}{block}"));
     if !file.has(&variable) {
@@ -280,9 +280,9 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
 }
 
 /// Return the number (from 1), id and name of each block or set. Ids and names are in variables whose names
-/// start with `prefix`, such as `eb`. Without ids in the file, the blocks or sets are those with a variable
-/// `VARIABLE1`, `VARIABLE2`, …; their ids are their numbers. A missing name becomes `DEFAULT_ID`, such as
-/// `block_3`.
+/// start with `prefix`, such as `eb`. If the file has no ids, there is one block or set for each of the
+/// variables `VARIABLE1`, `VARIABLE2`, …, and its number is also its id. A missing name becomes
+/// `DEFAULT_ID`, such as `block_3`.
 fn entities(
     file: &Netcdf,
     prefix: &str,

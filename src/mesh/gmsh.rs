@@ -1,7 +1,8 @@
 //! Meshes of Gmsh: MSH 2.2 and 4.1, text or binary.
 //!
 //! Text and binary files of version 4.1 hold the same numbers in the same order, so one reader serves both.
-//! In version 2.2, only the numbers of the section `$Elements` have another order in binary files.
+//! In version 2.2, the order of the numbers differs between text and binary files only in the section
+//! `$Elements`.
 
 use std::collections::hash_map::Entry;
 use std::path::Path;
@@ -338,8 +339,8 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Return the element type with this number, and for each node in the order of [`super::kind`] its
-    /// position in the order of the file.
+    /// Return the element type with this number. For each node in the order of [`super::kind`], also return
+    /// its position in the order of the file.
     fn kind(&self, number: i64) -> Result<(Kind, Vec<usize>)> {
         let Some((kind, order)) = kind(number) else {
             let message = format!(
@@ -645,8 +646,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Read a `size_t`. If this number is a count that is too large, reading the counted entries fails at the
-    /// end of the file, because every entry takes bytes.
+    /// Read a `size_t`. The number may be a count that is too large. Every entry takes bytes, so reading the
+    /// entries then fails at the end of the file.
     fn size(&mut self) -> Result<u64> {
         match self.encoding {
             Encoding::Text => {

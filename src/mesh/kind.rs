@@ -2,8 +2,8 @@
 //!
 //! In this module, all types have the node order of VTK. Each node after the corners is described by the
 //! corners between which it lies. A node on an edge lies between two corners, a node on a face between three
-//! or four, and a node at the element's centre between all corners. The order of another format is a list of
-//! such descriptions, which can be compared with the manual of that format.
+//! or four, and a node at the element's centre between all corners. The node order of another format is a
+//! list of such descriptions. The list can be compared with the manual of that format.
 
 /// The shape of an element, without its polynomial order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -88,7 +88,7 @@ impl Kind {
         }
     }
 
-    /// Return the number of corners, which are the first nodes.
+    /// Return the number of corners. The corners are the first nodes of the element.
     pub fn corners(self) -> usize {
         match self.form {
             Point => 1,
@@ -159,8 +159,8 @@ impl Kind {
         &all[..self.nodes - self.corners()]
     }
 
-    /// Return for each node in VTK's order its position in another order. `other` describes the nodes after
-    /// the corners in the other order.
+    /// Return, for each node in VTK's order, its position in another order. `other` is the other order
+    /// without the corners; it describes the nodes as [`Self::between`] does.
     ///
     /// # Panics
     /// If `other` lacks a node.

@@ -24,7 +24,8 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate along `axis` at the position `value`; its gradient is 1 along `axis`.
+    /// Return the reference coordinate along `axis`, with this value. Its derivative is 1 along `axis` and 0
+    /// along the other axes.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
@@ -181,13 +182,14 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
 /// Corners of the square [−1, 1]².
 const SQUARE: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// Compute the shape functions of all nodes at a position in the reference element.
+/// Compute the shape functions of all nodes at a position in the reference element. The reference elements
+/// are:
 ///
 /// - Lines, quadrilaterals and hexahedra in D dimensions: [−1, 1]^D.
 /// - Triangles and tetrahedra: r, s, t ≥ 0, r + s + t ≤ 1.
 /// - Wedges: a triangle × [−1, 1].
-/// - Pyramids: collapsed coordinates u, v in [−1, 1] and w in [0, 1]. At the height w, a pyramid is the
-///   square |ξ|, |η| ≤ 1 − w with ξ = u (1 − w), η = v (1 − w).
+/// - Pyramids: collapsed coordinates u, v in [−1, 1] and w in [0, 1]. The cross-section at the
+///   height w is the square |ξ|, |η| ≤ 1 − w, where ξ = u (1 − w) and η = v (1 − w).
 fn shape_functions(kind: Kind, at: [f64; 3]) -> Vec<Dual> {
     let [x, y, z] = std::array::from_fn(|k| Dual::coordinate(at[k], k));
     let one = Dual::constant(1.0);
@@ -491,8 +493,8 @@ mod tests {
         }
     }
 
-    /// Apply an affine map to nodes. Return the nodes and the determinant of the map in `dimension`
-    /// dimensions.
+    /// Apply an affine map in `dimension` dimensions to nodes. Return the mapped nodes, and the determinant
+    /// of the map.
     fn mapped(nodes: &[[f64; 3]], dimension: usize) -> (Vec<[f64; 3]>, f64) {
         let rows = [[1.5, 0.3, -0.2], [-0.4, 0.8, 0.5], [0.1, -0.6, 1.2]];
         let det = match dimension {

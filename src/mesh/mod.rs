@@ -29,7 +29,8 @@ use kind::KINDS;
 /// Kind of a group in an Exodus file: elements of one type.
 pub const BLOCK: &str = "block";
 
-/// Kind of a group of faces of elements. The group holds the elements, not the faces.
+/// Kind of a group that an Exodus file defines as faces of elements. The mesh stores the elements that have
+/// these faces, not the faces.
 pub const SIDE_SET: &str = "side set";
 
 /// Largest number of group names that a message lists.
@@ -81,7 +82,8 @@ pub struct Mesh {
     /// The elements, in the order of the file.
     pub elements: Elements,
     /// Volumes that the file gives for single-node elements, by the index of the element, in the units of the
-    /// file. For an element without such a volume, the entry is 0, or missing at the end of the list.
+    /// file. For an element without such a volume, the entry is 0. At the end of the list, such entries may
+    /// be missing.
     volumes: Vec<f64>,
     /// Named or numbered groups of elements and of nodes.
     pub groups: Vec<Group>,
@@ -96,8 +98,8 @@ pub struct Elements {
     starts: Vec<usize>,
     nodes: Vec<u32>,
     numbers: Vec<u64>,
-    /// Lines of the elements in the file, from 1; 0 if the reader does not know the line, as in VTU, Exodus
-    /// and binary Gmsh files.
+    /// Line number of each element in its file, from 1. The number is 0 if the reader does not know the line,
+    /// as in VTU, Exodus and binary Gmsh files.
     lines: Vec<u32>,
     /// Files of the elements, each with the index of its first element.
     files: Vec<(usize, PathBuf)>,
@@ -126,7 +128,8 @@ impl Elements {
         }
     }
 
-    /// Append all elements of another list, whose nodes begin at the index `first_node` of the combined mesh.
+    /// Append all elements of another list. In the combined mesh, the nodes of these elements begin at the
+    /// index `first_node`.
     fn append(&mut self, other: &Self, first_node: u32) {
         let (elements, nodes) = (self.len(), self.nodes.len());
         self.kinds.extend_from_slice(&other.kinds);
@@ -191,8 +194,8 @@ pub struct Group {
     pub number: Option<i64>,
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
-    /// Whether the group is a geometrical entity. In a deck, a number without the kind of the group means an
-    /// entity only if no other group has this number.
+    /// Whether the group is a geometrical entity. A deck can give a number without the kind of the group. If
+    /// an entity and another group have this number, the number means the other group.
     pub is_entity: bool,
     /// Members of the group.
     pub members: Members,
@@ -235,7 +238,7 @@ impl Mesh {
             .filter(|volume| *volume > 0.0 && self.elements.kind(element).form == Form::Point)
     }
 
-    /// Test whether an element becomes a point of a problem with this number of dimensions.
+    /// Test whether an element becomes a point in a problem with `dimension` dimensions.
     pub fn is_solid(&self, element: usize, dimension: usize) -> bool {
         self.elements.kind(element).dimension() == dimension || self.volume(element).is_some()
     }
@@ -253,7 +256,7 @@ impl Mesh {
         }
     }
 
-    /// Find the group of a key among the groups that `is_wanted` accepts.
+    /// Find the group that `key` means, among the groups that `is_wanted` accepts.
     ///
     /// A key is a name or a number. The kind of the group may come before the name or number, such as in
     /// `side set 1`. A number without a kind means a geometrical entity only if no other group has this
@@ -333,7 +336,7 @@ impl Mesh {
         ))
     }
 
-    /// Return the names, or else the numbers, of the groups that `wanted` accepts.
+    /// Return the name of each group that `wanted` accepts, or the number of a group without a name.
     pub fn names(&self, wanted: impl Fn(&Group) -> bool) -> Vec<String> {
         let groups = self.groups.iter().filter(|group| wanted(group));
         let name = |group: &Group| match (&group.name, group.number) {
@@ -424,7 +427,8 @@ fn position(place: [f64; 3]) -> std::result::Result<[f64; 3], String> {
     ))
 }
 
-/// Largest absolute coordinate; squared distances stay far from overflow.
+/// Largest allowed absolute value of a coordinate. Up to this value, squared distances stay far from
+/// overflow.
 const FARTHEST: f64 = 1e30;
 
 /// Result with an error message that does not name the file.

@@ -214,7 +214,7 @@ impl<'a> Cursor<'a> {
         usize::try_from(u64::from_be_bytes(bytes)).map_err(|error| error.to_string())
     }
 
-    /// Read a number of entries, or a length.
+    /// Read one number, which is a count of entries or a length.
     fn count(&mut self) -> Fault<usize> {
         if self.version == 5 {
             self.long()

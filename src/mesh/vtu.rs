@@ -16,8 +16,8 @@ use crate::error::{Result, excerpt};
 /// Largest number of different values of an array that describes groups.
 const MOST_GROUPS: usize = 1000;
 
-/// Return the type of the cells with this VTK number, and their node order if the order differs from that of
-/// [`super::kind`]. Return `None` for an unsupported type.
+/// Return the type of the cells with the VTK cell type `number`. Also return their node order if it differs
+/// from the order in [`super::kind`]. Return `None` for an unsupported type.
 fn kind(number: i64) -> Option<(Kind, Option<&'static [usize]>)> {
     let (form, nodes) = match number {
         1 => (Form::Point, 1),
@@ -392,7 +392,7 @@ impl File<'_> {
 struct Source<'a> {
     bytes: &'a [u8],
     is_raw: bool,
-    /// Decoded bytes of the last base-64 group that are not taken yet, in reverse order.
+    /// Those decoded bytes of the last base-64 group that were not yet taken, in reverse order.
     decoded: Vec<u8>,
 }
 

@@ -15,7 +15,7 @@ pub enum Attribute<'a> {
     Integers(&'a [i64]),
     /// UTF-8 text of any length, without NUL.
     Text(&'a str),
-    /// ASCII text of 1 to 64 bytes with fixed length, as VTK requires.
+    /// ASCII text of 1 to 64 bytes. The text is stored with a fixed length, as VTK requires.
     Ascii(&'a str),
 }
 

@@ -12,7 +12,7 @@ use crate::error::Result;
 /// VTKHDF's datasets of counts, one row per step.
 const COUNTS: [&str; 3] = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
 
-/// The datasets of the points of all steps, concatenated.
+/// The datasets of the points. In each dataset, the rows of all steps follow one another.
 pub struct ChangingPoints {
     counts: Vec<Dataset>,
     positions: Dataset,

@@ -1,7 +1,7 @@
 //! Checkpoints: two alternating files, readable on any number of ranks.
 //!
-//! A checkpoint is written to a temporary file and sealed with a checksum. A rename then replaces the older
-//! file. If the run is killed during a write, the existing checkpoints remain valid.
+//! A checkpoint is written to a temporary file and sealed with a checksum. The file is then renamed and
+//! replaces the older checkpoint. If the run is killed during a write, the existing checkpoints remain valid.
 
 use std::path::{Path, PathBuf};
 
@@ -28,8 +28,8 @@ const PART: &str = "checkpoint.part";
 /// Version of the file layout.
 const VERSION: i64 = 9;
 
-/// Test whether a path is in use. A link to a missing file and a path that cannot be examined count as in
-/// use.
+/// Test whether a path is in use. A link to a missing file also counts as in use, and so does a path
+/// that cannot be examined.
 pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
@@ -57,7 +57,7 @@ pub struct Header {
     /// Reference values of the history: energy at the start (J), and number of bonds that were intact
     /// before any bond could break.
     pub start: (f64, u64),
-    /// Description of the physics: the deck with all defaults, or a listing of a problem without a deck.
+    /// Description of the physics: the deck with all defaults or, without a deck, a listing of the problem.
     pub deck: String,
 }
 
@@ -88,8 +88,8 @@ struct Numbers {
     further_results: u64,
 }
 
-/// Attributes with the names of the further results, one per line, and their numbers of outputs; absent
-/// without further results.
+/// Two attributes: the names of the further results, one per line, and the number of outputs of each result.
+/// Both attributes are absent if there are no further results.
 const FURTHER: [&str; 2] = ["further_outputs", "counts_of_further_outputs"];
 
 /// Attribute with the names of the datasets of the state, one per line.
@@ -143,7 +143,8 @@ impl Checkpoints {
     /// Write a checkpoint that replaces the older of the two checkpoints. Collective.
     ///
     /// # Errors
-    /// If the checkpoint cannot be written, for example to a full disk; the existing checkpoints are kept.
+    /// If the checkpoint cannot be written, for example because the disk is full. The existing checkpoints
+    /// are kept.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -172,12 +173,12 @@ impl Checkpoints {
     }
 
     /// Find the newest intact checkpoint of the folder. Return the checkpoints of the folder, and the path of
-    /// the found checkpoint. `warn` receives a message for each damaged checkpoint that was tried before.
-    /// Collective.
+    /// the found checkpoint. `warn` receives a message for each damaged checkpoint that is tried before an
+    /// intact one is found. Collective.
     ///
     /// # Errors
-    /// If no checkpoint is intact, or a file is unreadable. A run that ignored an unreadable file could lose
-    /// the newest checkpoint: its next checkpoint might replace this file.
+    /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint.
+    /// A run that ignored this file could later replace it.
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,

@@ -29,13 +29,13 @@ const OBJECT_BYTES: u64 = 8192;
 /// [`initialise`](super::transfer::initialise) was called before MPI.
 ///
 /// # Full disk
-/// Rank 0 reserves the space before the ranks write (see [`Reservation`]). A full disk inside a collective
-/// write of three or more ranks would make some of the ranks hang.
+/// Rank 0 reserves the space before the ranks write (see [`Reservation`]). Otherwise, if the disk became
+/// full during a collective write of three or more ranks, some of the ranks would hang.
 ///
 /// # Kill and loss of power
 /// A killed process leaves the file in the state of the last flush, because metadata stays in memory between
-/// flushes. A loss of power leaves at least the state of the last [fsync](Self::sync). A flush after growth
-/// of the file includes an fsync. All other flushes only change values in place.
+/// flushes. A loss of power leaves at least the state of the last [fsync](Self::sync). If the file has
+/// grown, a flush includes an fsync. All other flushes only change values in place.
 ///
 /// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
 pub struct CollectiveFile<'a> {
@@ -59,9 +59,9 @@ impl<'a> CollectiveFile<'a> {
     /// Create a file.
     ///
     /// # Errors
-    /// If the file exists and `creation` is exclusive, if the file cannot be created, if
-    /// [`initialise`](super::transfer::initialise) was not called before MPI, or if there are several ranks
-    /// that are threads instead of MPI processes.
+    /// If the file exists and `creation` is exclusive, or the file cannot be created. If
+    /// [`initialise`](super::transfer::initialise) was not called before MPI. If there are several ranks, and
+    /// these ranks are threads instead of MPI processes.
     pub fn create(path: &Path, comm: &'a dyn Communicator, creation: Creation) -> Result<Self> {
         let raw = comm.raw();
         if raw.is_some() && !transfer::initialised_before_mpi() {
@@ -155,8 +155,8 @@ impl<'a> CollectiveFile<'a> {
         Ok(())
     }
 
-    /// Return the causes of non-collective writes, as HDF5's `H5D_MPIO_…` bits over all ranks and writes. 0
-    /// means that all writes were collective or the file is serial.
+    /// Return the causes of non-collective writes, as HDF5's `H5D_MPIO_…` bits, combined over all ranks and
+    /// writes. 0 means that all writes were collective or the file is serial.
     pub fn no_collective_cause(&self) -> u32 {
         self.no_collective_cause
     }
@@ -329,8 +329,8 @@ impl<'a> CollectiveFile<'a> {
 
     /// Flush to the file system, so the file survives a kill of the process.
     ///
-    /// If the file has grown, the flush includes an fsync: a partial write of the metadata at a loss of power
-    /// could destroy the file.
+    /// If the file has grown, the flush includes an fsync. Without an fsync, a loss of power could leave the
+    /// metadata partly written, which could destroy the file.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.

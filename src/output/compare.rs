@@ -1,8 +1,8 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
 //! Outputs and history rows are matched by time, points by id. Values are read in blocks of points; the
-//! history is read as a whole. The ids of two outputs are also read as a whole if they differ and at least
-//! one sequence does not ascend, as on refined grids.
+//! history is read as a whole. The ids of two outputs are also read as a whole if the two lists of ids
+//! differ and at least one list does not ascend, as on refined grids.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};
@@ -115,13 +115,13 @@ impl Difference {
 pub struct Comparison {
     /// Number of pairs of outputs.
     pub outputs: usize,
-    /// Times of the outputs of each result that the other result lacks, s.
+    /// Times of the unmatched outputs of each result, s.
     pub single_outputs: [Vec<f64>; 2],
-    /// Number of pairs of points in all outputs.
+    /// Number of matched pairs of points, summed over all pairs of outputs.
     pub points: u64,
-    /// Whether all pairs of outputs have the same number of pairs of points.
+    /// Whether the number of matched pairs of points is the same for all pairs of outputs.
     pub has_equal_counts: bool,
-    /// Number of points of each result that the other result lacks, in all pairs of outputs.
+    /// Number of unmatched points of each result, summed over all pairs of outputs.
     pub single_points: [u64; 2],
     /// The common fields.
     pub fields: Vec<Difference>,
@@ -129,7 +129,7 @@ pub struct Comparison {
     pub single_fields: [Vec<String>; 2],
     /// Number of pairs of history rows.
     pub rows: usize,
-    /// Number of history rows of each result that the other result lacks.
+    /// Number of unmatched history rows of each result.
     pub single_rows: [usize; 2],
     /// The common columns of the history.
     pub columns: Vec<Difference>,
@@ -152,7 +152,7 @@ impl Comparison {
 /// number of all pairs and the time (s).
 ///
 /// # Errors
-/// If a file is damaged, or if the points of two outputs cannot be matched in order and one of these outputs
+/// If a file is damaged. If the points of two outputs cannot be matched in order, and one of these outputs
 /// has two points with the same id.
 pub fn compare(
     first: &ResultReader,
@@ -190,8 +190,8 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// Add the common fields, and the names of the fields that only one result has, to `comparison`. Return for
-/// each common field whether at least one of the results stores values of the field for each output.
+/// Add the common fields, and the names of the fields that only one result has, to `comparison`. Return one
+/// flag per common field: true if at least one of the results stores values of the field for each output.
 fn common_fields(
     first: &ResultReader,
     second: &ResultReader,
@@ -347,7 +347,7 @@ impl OutputPair<'_> {
         Ok(())
     }
 
-    /// Compare a field at pairs of rows. `ranges` has for each output the range that contains these rows.
+    /// Compare a field at pairs of rows. For each output, `ranges` has the range that contains these rows.
     fn compare_field(
         &self,
         pairs: &[[usize; 2]],
@@ -391,9 +391,10 @@ impl OutputPair<'_> {
     }
 }
 
-/// Match two lists of ids, one of each result, that ascend or are equal. `is_last` says for each result
-/// whether no further ids follow. If so, the remaining ids of the other list have no partner; they count as
-/// used. Return the pairs of indices of equal ids, and the number of used ids of each list.
+/// Match two lists of ids, one list of each result. Both lists must ascend, or the lists must be equal.
+/// `is_last` is true for a list that ends with the last ids of its result. At the end of such a list, the
+/// remaining ids of the other list have no partner and count as used. Return the pairs of indices of equal
+/// ids, and the number of used ids of each list.
 fn match_in_order(ids: &[Vec<u64>; 2], is_last: [bool; 2]) -> (Vec<[usize; 2]>, [usize; 2]) {
     let (mut pairs, mut used) = (Vec::new(), [0; 2]);
     loop {
@@ -442,8 +443,9 @@ struct Matches {
 }
 
 impl Matches {
-    /// Match each time of the first list with the nearest unmatched time of the second list, within the
-    /// larger of the tolerances that follow from [`TIME_TOLERANCE`] and [`ROUND_OFF`].
+    /// Match each time of the first list with the nearest unmatched time of the second list. Two tolerances
+    /// follow from [`TIME_TOLERANCE`] and [`ROUND_OFF`]. The difference of the times may be at most the
+    /// larger tolerance.
     fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
         let reach = |index: usize, time: f64| {

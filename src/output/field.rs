@@ -81,7 +81,8 @@ impl FieldData<'_> {
     }
 }
 
-/// Check the number of components of a field, and the number and the number type of its values.
+/// Check that a field has a supported number of components, and that its values have the right count and the
+/// right number type.
 pub(super) fn check(field: &FieldDescription, data: &FieldData, points: usize) -> Result<()> {
     let (name, components, length) = (field.name, field.components, data.len());
     if !matches!(components, 1 | 2 | 3 | 6 | 9) {

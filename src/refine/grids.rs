@@ -76,8 +76,8 @@ impl<'a> Grids<'a> {
         self.coarsest
     }
 
-    /// Refine the regions of the problem permanently. Nodes are suppressed if a pre-crack separates two of
-    /// their parents. `coarse` are this rank's level-0 points. Collective.
+    /// Permanently refine the nodes in the refinement regions of the problem. A new node is suppressed if a
+    /// pre-crack separates two of its parents. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
     /// If a region contains no point of a body given as a shape; the error is the same on all ranks.
@@ -161,16 +161,16 @@ impl<'a> Grids<'a> {
         removed
     }
 
-    /// The finest refined node at `position` (m) in a body, which is the node to coarsen. `None` if this node
-    /// is permanent, if no node is refined there, or if the body has no refined grid.
+    /// The node to coarsen at `position` (m) in a body: the finest refined node there. `None` if this node is
+    /// permanent, if no node is refined there, or if the body has no refined grid.
     pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
         let index = self.index_at(body, position)?;
         let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(index)?;
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// Suppress nodes that are new since `earlier`, if any two of their parents are separated. `separated`
-    /// tests the positions (m) of two parents.
+    /// Suppress each node that is new since `earlier` and has two parents that are separated. `separated`
+    /// tests this for the positions (m) of two parents.
     pub fn suppress_separated(
         &mut self,
         earlier: &Self,
@@ -195,9 +195,9 @@ impl<'a> Grids<'a> {
         }
     }
 
-    /// The faces between the cells of adjacent nodes of a level, if the node half-way between the two nodes
-    /// is suppressed. Each item is the centre of a face (m), the edges of the cells of the two nodes (m), and
-    /// the axis of the normal of the face.
+    /// For each suppressed node half-way between two adjacent nodes of a level: the face between the cells of
+    /// the two nodes. Each item contains the centre of the face (m), the edge lengths of the cells (m), and
+    /// the axis normal to the face.
     pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
@@ -215,7 +215,8 @@ impl<'a> Grids<'a> {
         faces
     }
 
-    /// All refined nodes, then all suppressed nodes by canonical level and index. Both lists are sorted.
+    /// All refined nodes, then all suppressed nodes with their canonical level and index. Both lists are
+    /// sorted.
     pub fn state(&self) -> [Vec<NodeKey>; 2] {
         let mut state = [Vec::new(), Vec::new()];
         for (body, grid) in (0..).zip(&self.bodies) {
@@ -232,8 +233,8 @@ impl<'a> Grids<'a> {
         state
     }
 
-    /// Refine and suppress the nodes of a state that [`Self::state`] returned. Return whether any of its
-    /// refined nodes was not refined before.
+    /// Apply two lists that [`Self::state`] returned: refine the nodes of the first list, and suppress the
+    /// nodes of the second list. Return whether any node of the first list was not refined before.
     pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
@@ -243,8 +244,8 @@ impl<'a> Grids<'a> {
         self.refine(refined)
     }
 
-    /// The node to refine at `position` (m), the position of a point of block `block`. `None` if the point
-    /// has the finest level, or if its body is on no lattice.
+    /// The node to refine for a point of block `block` at `position` (m). `None` if the point has the finest
+    /// level, or if its body is on no lattice.
     pub fn refining(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
         let level = self.problem.block(block).level;
         if level == self.finest {
@@ -294,8 +295,9 @@ impl<'a> Grids<'a> {
         points.map(unrefined).collect()
     }
 
-    /// The points in the cells of `coarse`, the level-0 points as they are without refinement. The result
-    /// begins with these points, with updated volumes and blocks; finer points follow.
+    /// The points in the cells of the level-0 points `coarse`. `coarse` has the volumes and blocks without
+    /// refinement. The result begins with the points of `coarse`, with updated volumes and blocks. Finer
+    /// points follow.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
         let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
             let grid = grid.as_ref()?;

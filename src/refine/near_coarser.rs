@@ -1,10 +1,10 @@
-//! Search for nodes of a level that have nodes of coarser levels within a distance.
+//! Search for nodes of a level that have nodes of coarser levels within a given distance.
 
 use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
-/// Test for coarser nodes within a distance of a node of a given level.
+/// Test whether a node of a given level has coarser nodes within a given distance.
 pub struct NearCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
@@ -14,14 +14,15 @@ pub struct NearCoarser<'a> {
     /// Bits of a word whose indices lie on the grid of level 0. These bits are the same for all words that
     /// contain indices of this grid.
     coarsest: u64,
-    /// For each bit of a word: offsets to the words within the distance of the bit's index, and the bits of
-    /// these words whose indices lie within the distance.
+    /// For each bit of a word: the words that contain indices within the distance from the bit's index. Each
+    /// entry is the offset to such a word, and the bits of the indices in this word that lie within the
+    /// distance.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
 impl<'a> NearCoarser<'a> {
-    /// Create the test for a level above 0 with the spacing `edges` and the radius `reach`, in the same
-    /// unit.
+    /// Create the test for a level above 0. `edges` is the spacing of the level, and `reach` is the distance
+    /// in the same unit.
     pub fn new(pattern: &'a Pattern, level: u32, edges: [f64; 3], reach: f64) -> Self {
         let dimension = pattern.dimension();
         let mut finer = GridIndexSet::default();

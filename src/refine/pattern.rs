@@ -57,7 +57,7 @@ impl Pattern {
         self.dimension
     }
 
-    /// Refine a node and its ancestors, unless no node is possible at the index. Return true if the node is
+    /// Refine a node and its ancestors, if a node is possible at the index. Return true if the node is
     /// possible and was not refined before.
     pub fn refine(
         &mut self,
@@ -231,18 +231,18 @@ impl Pattern {
             && parents(index).all(|parent| self.is_possible(body, level - 1, parent))
     }
 
-    /// Suppress a node for the rest of the run, given by its canonical level and index.
+    /// Suppress a node, given by its canonical level and index, for the rest of the run.
     pub fn suppress(&mut self, level: u32, index: GridIndex) {
         self.suppressed.insert((level, index));
     }
 
-    /// The suppressed nodes by canonical level and index, unordered.
+    /// The suppressed nodes with their canonical level and index, unordered.
     pub fn suppressed(&self) -> impl Iterator<Item = (u32, GridIndex)> {
         self.suppressed.iter().copied()
     }
 
-    /// The nodes of one canonical level (1 or more) that exist now but not in `earlier`, as indices of this
-    /// level, unordered.
+    /// The nodes of canonical level `level` that exist now but not in `earlier`, as indices of this level,
+    /// unordered. `level` is at least 1.
     pub fn created_since(
         &self,
         earlier: &Self,
@@ -268,7 +268,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All nodes of a body, by grid index in spacings of the finest level.
+    /// All nodes of a body, with their grid indices in spacings of the finest level.
     fn nodes(
         pattern: &Pattern,
         body: &impl Fn(GridIndex) -> bool,
@@ -413,8 +413,8 @@ mod tests {
         assert_eq!(before.len() as f64, cells);
     }
 
-    /// The indices at half a spacing of a level around an index. All indices are in spacings of the finest
-    /// level.
+    /// The indices around an index, at a distance of half a spacing of `level` along one or several axes. All
+    /// indices are in spacings of the finest level.
     fn around_by_half(
         level: u32,
         finest: u32,

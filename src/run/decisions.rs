@@ -79,7 +79,7 @@ fn sent<const D: usize>(simulation: &mut Simulation<'_, D>) -> String {
     format!("{}; numbers per ghost in each step", parts.join(", then "))
 }
 
-/// Return the quadrature of all bodies, or of each body if the bodies differ.
+/// Return the common quadrature of all bodies, or the quadrature of each body if the quadratures differ.
 fn quadrature(bodies: &[Body]) -> String {
     let name = |body: &Body| format!("{:?}", body.quadrature()).to_lowercase();
     if bodies

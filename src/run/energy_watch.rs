@@ -1,4 +1,4 @@
-//! Detection of unstable time steps and of lost energy by the energy balance.
+//! Checks of the energy balance, which detect unstable time steps and lost energy.
 //!
 //! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
 //! last load step or the start. Negative fracture energy is left out of this change. The energy input is
@@ -13,9 +13,9 @@ use crate::solver::Simulation;
 use crate::solver::motion::Clock;
 use crate::solver::observers::HistoryRow;
 
-/// Ratio of energy gain to energy input above which a warning is printed. Near the stable step, the energy of
-/// the shortest waves at full steps oscillates by several times its mean, so smaller gains do not prove
-/// instability.
+/// Ratio of energy gain to energy input above which a warning is printed. If the time step is close to the
+/// stable step, the energy of the shortest waves, evaluated at full steps, oscillates by several times its
+/// mean. Smaller gains therefore do not prove instability.
 const WARNING_GAIN: f64 = 1.0;
 
 /// Ratio of energy gain to energy input. The run ends with an error if two consecutive rows of the history,
@@ -31,7 +31,7 @@ const CERTAIN_GAIN: f64 = 1e9;
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
 /// Error of the energy balance at the end of a run, as a fraction of the largest energy, above which a
-/// warning is printed. The explicit runs of `inputs/` have less than 0.01, also on coarse grids.
+/// warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on coarse grids.
 const MAX_FINAL_ERROR: f64 = 0.2;
 
 /// Strain below which strain energy may be round-off.
@@ -65,7 +65,7 @@ impl StepKinds {
 pub struct EnergyWatch {
     /// Upper bound of the round-off of the energy, J.
     floor: f64,
-    /// Maximum energy input so far, J: initial energy, work of loads and supports, and
+    /// Maximum energy input so far, J. The energy input is |initial energy| + |work of loads and supports| +
     /// [`HistoryRow::step_energy`].
     input: f64,
     /// Error of the energy balance after the last load step, J.

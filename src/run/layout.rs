@@ -1,4 +1,4 @@
-//! Static data and description of the fields of a result.
+//! Static data of a result, and descriptions of its fields.
 
 use crate::comm::{self, IdOrder};
 use crate::output::{Contents, FieldData, FieldDescription, Number, Piece};
@@ -8,7 +8,7 @@ use crate::solver::Simulation;
 /// Names of the static fields. Their values change only if refinement creates or removes points.
 pub const FIXED: [&str; 4] = ["id", "block", "volume", "level"];
 
-/// Static data and fields of a new or resumed result.
+/// Static data and field descriptions of a new or resumed result.
 pub struct ResultLayout<'a> {
     positions: Vec<f64>,
     ids: Vec<u64>,
@@ -23,8 +23,8 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range whose points
-    /// are in the result; `None` for all rows. `steps` is the expected number of outputs. Collective.
+    /// Redistribute the static data to ranges of ids. `rows` are the rows of the points in the result, within
+    /// this rank's range; `None` for all rows. `steps` is the expected number of outputs. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,
@@ -68,7 +68,7 @@ impl<'a> ResultLayout<'a> {
         }
     }
 
-    /// Return the static fields, see [`FIXED`]; `level` only for a deck with `[refinement]`.
+    /// Return the static fields, see [`FIXED`]. `level` is returned only for a deck with `[refinement]`.
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let [id, block, volume, level] = FIXED;
         let mut fixed = vec![

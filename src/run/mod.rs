@@ -1,4 +1,4 @@
-//! Runs of a problem with result, history, checkpoints and restart: the library form of `fissure run`.
+//! The library form of `fissure run`: runs of a problem, with result, history, checkpoints and restart.
 //!
 //! ```no_run
 //! use std::path::Path;

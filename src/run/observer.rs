@@ -66,8 +66,8 @@ pub enum Message {
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
     },
-    /// Paths of removed files that an earlier run has written and that this run does not replace: further
-    /// results with their side-cars, and tables of cracks.
+    /// Paths of removed files: further results with their side-cars, and tables of cracks. An earlier run has
+    /// written these files, and this run does not replace them.
     Removed(Vec<PathBuf>),
     /// The grid was refined or coarsened.
     Refined {
@@ -168,9 +168,10 @@ pub trait RunState {
     fn load_factor(&self, name: &str) -> Option<f64>;
 
     /// Multiply a load by a factor. A load is a condition with `force`, `body_force`, `traction` or
-    /// `pressure`. The factor acts from the end of the next step, or from the next load step, until another
-    /// factor is set. The work of the load counts as external work. Checkpoints contain the factor. All ranks
-    /// must set the same factor at the same step.
+    /// `pressure`. In an explicit stage, the factor acts from the end of the next step. In a quasi-static
+    /// stage, it acts from the next load step. It acts until another factor is set. The work of the load
+    /// counts as external work. Checkpoints contain the factor. All ranks must set the same factor at the
+    /// same step.
     ///
     /// The run soon ends with an error if no load has this name, if the factor is not finite, or if the ranks
     /// set different factors.

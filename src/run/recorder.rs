@@ -27,7 +27,7 @@ const BUFFERED_ROWS: usize = 256;
 pub struct Recorder<'a> {
     /// Observer that computes the rows of the history.
     pub observer: HistoryObserver,
-    /// Exchange plan from owned points to ranges of ids, for checkpoints and results.
+    /// Plan of the exchange between owned points and ranges of ids, for checkpoints and results.
     pub order: IdOrder,
     /// The last row of the history; `None` before the first row.
     pub last_row: Option<HistoryRow>,
@@ -50,8 +50,8 @@ impl<'a> Recorder<'a> {
     /// `rows` rows. Collective.
     ///
     /// # Errors
-    /// If a file cannot be created, resumed or written, or if the set of an output is empty. Also the errors
-    /// of [`HistoryObserver::new`].
+    /// If a file cannot be created, resumed or written, or if the set of an output is empty. The errors of
+    /// [`HistoryObserver::new`] are also returned.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         files: &Files,
@@ -127,7 +127,7 @@ impl<'a> Recorder<'a> {
     /// Find the points of outputs and history again after a rebalance or refinement. Collective.
     ///
     /// # Errors
-    /// Same as for [`HistoryObserver::new`]. Also if the set of an output is empty.
+    /// Same as for [`HistoryObserver::new`]. There is also an error if the set of an output is empty.
     pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
         for file in &mut self.files {
@@ -186,8 +186,8 @@ impl<'a> Recorder<'a> {
         self.write(simulation, |file| file.file.steps() == 0, row)
     }
 
-    /// Write outputs to the files for which `is_chosen` is true and, if `row` is true, a history row.
-    /// Collective.
+    /// Write an output to each file for which `is_chosen` is true. If `row` is true, also write a history
+    /// row. Collective.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.
@@ -283,8 +283,8 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Clean up after a result file could not be opened: close the result files that are already open, and delete
-/// those among them that this run has created. Collective.
+/// Clean up after a result file could not be opened. Close all open result files, and delete each of these
+/// files that this run has created. Collective.
 fn abandon(comm: &dyn Communicator, opened: Vec<OutputFile>, files: &Files, starts: &[Start]) {
     for ((file, path), start) in opened.into_iter().zip(files.results()).zip(starts) {
         // The caller reports why the other file could not be opened, so an error here is ignored.
@@ -296,8 +296,9 @@ fn abandon(comm: &dyn Communicator, opened: Vec<OutputFile>, files: &Files, star
     }
 }
 
-/// For each output, find out whether a restart can resume its result file, or why a new file starts. The
-/// reason is `None` if neither the checkpoint nor the folder contains a result of this output. Collective.
+/// For each output, find out whether a restart can resume the result file. If not, return the reason for a
+/// new file. The reason is `None` if neither the checkpoint nor the folder contains a result of this output.
+/// Collective.
 ///
 /// # Errors
 /// If a set of the history is empty, a deck cannot be parsed, or a result is locked or unreadable.
@@ -353,11 +354,17 @@ pub enum Continuation {
 }
 
 /// Return the reason why the result file of an output cannot be continued; `None` if the file can be
-/// continued. Reasons are: the file is missing or damaged; it has fewer outputs or rows than the checkpoint
-/// counts; the deck requests other points, fields, precision or history columns, or defines a history column
-/// in another way; adaptive refinement was switched on or off. `outputs` is the number of outputs that the
-/// checkpoint counts. For the main result, `history` has the observer, the number of rows that the checkpoint
-/// counts, and the changes of the column definitions. Collective.
+/// continued. Possible reasons are:
+///
+/// - the file is missing or damaged;
+/// - the file has fewer outputs or rows than the checkpoint counts;
+/// - the deck requests other points, fields, precision or history columns;
+/// - the deck defines a history column in another way;
+/// - adaptive refinement was switched on or off.
+///
+/// `outputs` is the number of outputs that the checkpoint counts. For the main result, `history` contains the
+/// observer, the number of rows that the checkpoint counts, and the changes of the column definitions.
+/// Collective.
 ///
 /// # Errors
 /// If the result is locked or unreadable.
@@ -444,8 +451,8 @@ pub fn damage(comm: &dyn Communicator, path: &Path, outputs: u64) -> Result<Opti
     })
 }
 
-/// Run `check` on rank 0, and return its result on all ranks. A damaged result file gives a reason; a failure
-/// to read the file is an error. Collective.
+/// Run `check` on rank 0, and return its result on all ranks. If the result file is damaged, return a
+/// description of the damage. If the file cannot be read, return an error. Collective.
 fn check_on_rank_0(
     comm: &dyn Communicator,
     check: impl FnOnce() -> Result<Option<String>>,

@@ -7,8 +7,8 @@ use crate::problem::{Interval, Output, Problem};
 /// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
 
-/// Separator between the physics and the definitions of the history in the description of a problem without
-/// a deck.
+/// In the description of a problem without a deck, the separator between the physics and the history
+/// definitions.
 const HISTORY: &str = "# its history\n";
 
 /// Maximum length of a line in a message, in characters.

@@ -10,8 +10,8 @@ use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 /// Exit code of an immediate exit after a second signal.
 const IMMEDIATE_EXIT: i32 = 130;
 
-/// Stop signals within this interval after the first one count as one signal, because the launcher and the
-/// batch system may both send the same signal.
+/// Further stop signals within this interval after the first are ignored, because the launcher and the batch
+/// system may both send the same signal.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// Receiver of the signals of this process.
@@ -29,7 +29,7 @@ impl Signals {
     /// Start a thread that receives the signals.
     ///
     /// # Errors
-    /// If the system does not allow the signal handlers or the thread.
+    /// If the signal handlers cannot be installed, or the thread cannot be started.
     pub fn listen() -> Result<Self> {
         let signals = Self {
             stop: Arc::default(),

@@ -1,5 +1,5 @@
-//! Files in the output folder that an earlier run has written and that a new run does not replace: further
-//! results and tables of cracks, if the deck no longer has their output or crack.
+//! Files of an earlier run in the output folder that a new run does not replace. These files are further
+//! results and tables of cracks, if the deck no longer contains the output or the crack.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};

@@ -17,13 +17,13 @@ pub struct Summary {
     pub is_refined: bool,
     /// Number of steps of this run.
     pub steps: u64,
-    /// Number of force evaluations: one per explicit step and per repeat of a step, one or more per iteration
-    /// of a load step, and one per refinement.
+    /// Number of force evaluations. Each explicit step, each repeat of such a step and each refinement takes
+    /// one evaluation. Each iteration of a load step takes one or more.
     pub evaluations: u64,
     /// Time step at the end of the run, or at the stop, s.
     pub step: f64,
-    /// Stable step of the stage in which the run ended or stopped, with the scaled density of this stage, s.
-    /// `None` if this stage computes equilibria.
+    /// Stable step for the scaled density of the last stage, s. The last stage is the stage in which the run
+    /// ended or stopped. `None` if this stage computes equilibria.
     pub stable_step: Option<f64>,
     /// Number of ranks.
     pub ranks: usize,

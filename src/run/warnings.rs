@@ -15,12 +15,12 @@ use crate::solver::{Simulation, Stepper};
 const MAX_INERTIA: f64 = 0.05;
 
 /// Ratio of overshoot to fracture energy above which a warning is printed. For comparison: a run with a
-/// branching crack at `safety = 0.8` has a ratio of 0.4, and steps that are a quarter as long change the
-/// fracture energy of this run by 1 %.
+/// branching crack at `safety = 0.8` has a ratio of 0.4. With a quarter of the time step, the fracture energy
+/// of this run changes by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
-/// Initial fraction of the time of a run in which inertia is not checked, because the strain energy is still
-/// small.
+/// Initial fraction of the simulated time. Inertia is not checked in this part, because the strain energy is
+/// still small.
 const UNCHECKED_FRACTION: f64 = 0.1;
 
 impl<'a> Job<'a> {
@@ -123,8 +123,8 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn if a restarted run with one stage continues with a time step that differs from the step of a new
-    /// run to the same end.
+    /// Warn if a restarted run continues with another time step than a new run with the same end time would
+    /// use. Only runs with one stage are checked.
     pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -150,8 +150,8 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration. Return whether a decision is due. `step` is the clock if the iteration has
-    /// completed a step.
+    /// Count an iteration. Return whether a decision is due. If the iteration has completed a step, `step` is
+    /// the clock after this step, otherwise `None`.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;
         self.iterations >= self.next_decision || self.is_scheduled(step)

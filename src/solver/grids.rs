@@ -28,12 +28,12 @@ struct Cells {
     edges: [f64; 3],
 }
 
-/// Find the regular grids on which the points of whole bodies lie. `longest` is the length of the longest
-/// bond, m. The result is empty if the deck requests lists. Collective.
+/// Find the regular grids of the bodies whose points all lie on a regular grid. `longest` is the length of
+/// the longest bond, m. The result is empty with `family = "list"`. Collective.
 ///
 /// # Errors
-/// If the deck requests lattices, and the points of a body do not lie on a regular grid or do not all have
-/// the volume of a cell. The error is the same on all ranks.
+/// If the deck has `family = "lattice"` and a body is not suitable: all points of the body must lie on a
+/// regular grid and have the volume of a cell. The error is the same on all ranks.
 pub fn grids(
     problem: &Problem,
     comm: &dyn Communicator,

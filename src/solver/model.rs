@@ -129,8 +129,9 @@ impl<const D: usize> Model<D> {
         self.damping[usize::from(self.block[point])]
     }
 
-    /// Return `force`, a component of the force density on an owned point (N/m³), plus the viscous damping −r
-    /// ρ u̇. `velocity` is the same component of the velocity u̇, m/s.
+    /// Return the sum of `force` and the viscous damping −r ρ u̇ of an owned point, N/m³. `force` is a
+    /// component of the force density on the point, and `velocity` is the same component of the velocity u̇
+    /// (m/s).
     #[inline]
     pub fn with_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
         let damping = self.damping_of(point);

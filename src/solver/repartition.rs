@@ -26,8 +26,8 @@ pub struct Repartition {
     pub seconds: f64,
 }
 
-/// Schedule of the checks of the ranks' computing times, with the time that this rank had spent on bonds at
-/// the last check.
+/// Schedule of the checks that compare the computing times of the ranks. Also the time that this rank had
+/// spent on bonds up to the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,
@@ -118,7 +118,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Partition the points again. `time` (ns) is the time that this rank has spent on bonds since the last
-    /// check. Returns the number of points over all ranks that changed their owner. Collective.
+    /// check. Return the number of points that changed their owner, over all ranks. Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little

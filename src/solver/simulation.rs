@@ -1,4 +1,4 @@
-//! A run on one rank: set-up from the problem, and time steps.
+//! The part of a run on one rank: set-up from the problem, and time steps.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -35,7 +35,7 @@ use super::steps::choose_steps;
 /// This reach is needed because points may deviate from their grid by a millionth of a cell.
 const SLACK: f64 = 1e-5;
 
-/// A run on one rank.
+/// The part of a run on one rank.
 pub struct Simulation<'a, const D: usize> {
     /// The validated problem.
     pub problem: &'a Problem,
@@ -47,8 +47,8 @@ pub struct Simulation<'a, const D: usize> {
     pub fields: Fields<D>,
     /// The bonds and their forces.
     pub forces: Forces<D>,
-    /// Contact between points that no intact bond joins, and of points with rigid bodies; `None` in runs
-    /// without contact.
+    /// Contact between points that no intact bond joins, and contact of points with rigid bodies. `None` in
+    /// runs without contact.
     pub contact: Option<Contact<D>>,
     /// Conditions of the present stage.
     pub conditions: Conditions<D>,
@@ -76,11 +76,11 @@ pub struct Simulation<'a, const D: usize> {
 pub struct Undeformed {
     /// Volume of each owned point's whole family, including broken bonds, m³.
     pub family_volume: PaletteColumn,
-    /// Number of bonds of the owned points that each pre-crack cuts. A bond between two owned points counts
+    /// For each pre-crack: number of cut bonds of the owned points. A bond between two owned points counts
     /// twice.
     pub cut: Vec<u64>,
-    /// Number of bonds of the owned points that were intact before any bond could break. A bond between two
-    /// owned points counts twice. `None` if no bond can break at the start.
+    /// Number of intact bonds of the owned points before any bond could break. A bond between two owned
+    /// points counts twice. `None` if no bond can break at the start.
     pub intact: Option<u64>,
     /// Stable step with the density of the materials, s.
     pub stable_step: f64,
@@ -95,7 +95,8 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration and conditions, including the copy of displacements and thermal stretches for the passes.
+    /// Integration and conditions. The copy of displacements and thermal stretches for the bond passes is
+    /// included.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -103,8 +104,8 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// A point with a motion, force or reaction that is not finite: of the points of this rank with such values
-/// at the earliest step, the point with the smallest id.
+/// The first point of this rank whose motion, force or reaction is not finite. If several points have such
+/// values first at the same step, this is the one with the smallest id.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
@@ -118,9 +119,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Create and distribute the points and bonds, and evaluate the forces at time 0. Collective.
     ///
     /// # Errors
-    /// If the problem cannot be run: for example, if the points cannot be created, if a set of a condition is
-    /// empty, if there is no stable step, or if no support holds a loaded piece in load steps. The error is
-    /// the same on all ranks.
+    /// If the problem cannot be run. Examples: the points cannot be created, a set of a condition is empty,
+    /// there is no stable step, or no support holds a loaded piece in a stage of load steps. The error is the
+    /// same on all ranks.
     pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
@@ -350,7 +351,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(BondUpdate::Step(step));
     }
 
-    /// Prepare the conditions for the second half kick at the time of a clock.
+    /// Prepare the conditions for the second half kick at the time of `clock`.
     fn set_second_half(&mut self, clock: &Clock) {
         let (time, step) = (clock.time(), clock.step());
         self.conditions
@@ -358,8 +359,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.conditions.set_velocities(time, step);
     }
 
-    /// Call `work` on several threads, with each part of the owned points and the conditions that act on this
-    /// part. Returns whether all calls returned true.
+    /// Call `work` for each part of the owned points, with the conditions that act on this part. The calls
+    /// run on several threads. Returns whether all calls returned true.
     pub(super) fn walk(
         &mut self,
         work: impl Fn(&mut Part<'_, D>, PartConditions<'_, D>) -> bool + Sync,
@@ -494,16 +495,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .clone_from(&before.progress.load_factors);
     }
 
-    /// Record the owned point with the smallest id whose motion, force or reaction is not finite, with the
-    /// step and time of a clock. If a point has been recorded before, nothing changes.
+    /// Find the owned points whose motion, force or reaction is not finite. Record the one with the smallest
+    /// id, with the step and the time of `clock`. If a point has been recorded before, nothing changes.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
             self.bad = self.first_bad(clock);
         }
     }
 
-    /// Find the owned point with the smallest id whose motion, force or reaction is not finite. The clock
-    /// gives the step and the time of the record.
+    /// Of the owned points whose motion, force or reaction is not finite, return the one with the smallest
+    /// id. `clock` gives the step and the time of the record.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -532,9 +533,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ///
     /// # Errors
     /// - If a value is not finite. The message names a condition or initial value that is not finite, or a
-    ///   temperature that causes a thermal stretch of −1 or less. If there is none, the message names a
-    ///   point: at the earliest step at which points have values that are not finite, the point with the
-    ///   smallest id.
+    ///   temperature that causes a thermal stretch of −1 or less. If there is none, the message names the
+    ///   first point whose values are not finite. If several points have such values first at the same
+    ///   step, this is the one with the smallest id.
     /// - If the motion of a rigid body is not finite. The message names this body.
     /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
     ///   is one.
@@ -694,8 +695,8 @@ fn protect<const D: usize>(
     }
 }
 
-/// Set `protected` to 1 at the points of the no-failure sets of a damage, in blocks for which `is_own` is
-/// true.
+/// Set `protected` to 1 at points of the no-failure sets of `damage`, if `is_own` is true for the block of
+/// the point.
 fn mark_no_failure<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

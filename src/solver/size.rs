@@ -5,9 +5,9 @@ use crate::families::{Fault, MOST_NEIGHBOURS, most_neighbours};
 use crate::points::{lattice, shape};
 use crate::problem::{PointSource, Problem};
 
-/// Return an error if a point would have too many neighbours, or a rank too many points. The numbers are
-/// estimated from the shapes of the problem. `cutoffs` contains the length (m) of the longest bond of each
-/// pair of blocks, row-major; `ranks` is the number of ranks.
+/// Return an error if a point would have too many neighbours, or if a rank would have too many points. The
+/// numbers are estimated from the shapes of the problem. `cutoffs` contains the length (m) of the longest
+/// bond of each pair of blocks, row-major; `ranks` is the number of ranks.
 ///
 /// # Errors
 /// If one of the numbers is too large, or if cells of a lattice are too far from the origin to be numbered.

@@ -14,14 +14,14 @@ use super::steps::even_clock;
 pub struct Stages<const D: usize> {
     /// The stages of the run.
     pub all: Vec<Stage>,
-    /// First step (s) of each stage, and the number of steps of the stage if no bond breaks.
+    /// Length of the first step of each stage (s), and the number of steps of the stage if no bond breaks.
     pub(super) steps: Vec<(f64, f64)>,
     /// Conditions of the other stages; `None` for the present stage.
     pub(super) waiting: Vec<Option<Conditions<D>>>,
 }
 
-/// Return for each condition the time (s) from which the condition acts without interruption up to this
-/// stage; `None` if the condition does not act in this stage.
+/// For each condition, return the time (s) from which it acts without interruption up to this stage. The time
+/// is `None` if the condition does not act in this stage.
 pub(super) fn begins(stages: &[Stage], stage: usize) -> Vec<Option<f64>> {
     let begin = |condition: usize| {
         let acting = stages[..=stage].iter().rev();

@@ -13,9 +13,9 @@ use super::motion::clock::steps_to;
 /// would be so short that they may not change the time.
 const MOST_STEPS: f64 = 1e15;
 
-/// Return the first step (s) of each stage, and the number of steps of the stage if no bond breaks. `stable`
-/// is the stable step with the density of the materials, s. An automatic step divides the stage evenly,
-/// unless `[time.adaptive] largest` limits the step.
+/// Return the length of the first step of each stage (s), and the number of steps of the stage if no bond
+/// breaks. `stable` is the stable step with the density of the materials, s. An automatic step divides the
+/// stage evenly, unless `[time.adaptive] largest` limits the step.
 ///
 /// # Errors
 /// - If no point has a bond, and a stage has load steps or an automatic step.
@@ -32,15 +32,16 @@ pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     problem.all_stages().into_iter().map(choose).collect()
 }
 
-/// Return a clock with equal steps, as many as all stages have together. `steps` contains the first step (s)
-/// and the number of steps of each stage.
+/// Return a clock with equal steps. Their number is the total number of steps of all stages. `steps` contains
+/// the length of the first step (s) and the number of steps of each stage.
 pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
     let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
     Clock::new(problem.time.end / all, problem.time.end)
 }
 
-/// Return the first step (s) of a stage, and the number of its steps if no bond breaks. `length` is the
-/// duration of the stage (s), and `stable` is the stable step with the density of the materials (s).
+/// Return the length of the first step of a stage (s), and the number of steps of the stage if no bond
+/// breaks. `length` is the duration of the stage (s), and `stable` is the stable step with the density of the
+/// materials (s).
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
         if stable.is_infinite() {
@@ -87,8 +88,8 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
     Error::input(message).at(&problem.spans.horizon)
 }
 
-/// Return the given step (s) and number of steps of a stage of duration `length` (s). Return an error if the
-/// number exceeds [`MOST_STEPS`].
+/// Return the given step length (s) and number of steps, or an error if the number exceeds [`MOST_STEPS`].
+/// `length` is the duration of the stage (s).
 fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(
@@ -154,7 +155,7 @@ pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) 
     safety * (stable * time.density_scale.sqrt()).min(damped)
 }
 
-/// Return an error if a step (s) is too long for viscous damping. `key` is the key of `[time]` that gives the
+/// Return an error if `step` (s) is too long for viscous damping. `key` is the key of `[time]` that gives the
 /// step, and `place` is the span of this key in the deck.
 fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64) -> Result<()> {
     let rate = damping(problem);
@@ -171,9 +172,10 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
     Err(Error::input(message).at(place))
 }
 
-/// Return the first step (s) of a stage with an adaptive rule, and the number of its steps if no bond breaks.
-/// `step` and `steps` are the length and the number of steps without the rule, and `length` is the duration
-/// of the stage, s. The first step is at most `largest`; later steps grow up to `largest`.
+/// Return the length of the first step (s) of a stage with an adaptive rule, and the number of steps of the
+/// stage if no bond breaks. `step` and `steps` are the length and the number of steps without the rule, and
+/// `length` is the duration of the stage, s. The first step is at most `largest`; later steps grow up to
+/// `largest`.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
     match rule.largest {
         Some(largest) if largest < step => (largest, steps_to(length, largest)),

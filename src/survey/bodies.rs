@@ -12,9 +12,9 @@ use crate::solver::Simulation;
 /// printed for a larger difference.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// Largest factor between the mean volume of the points of a file or mesh, and the volume of a cell whose
-/// edge is the mean distance to the nearest neighbour. A warning is printed if the mean volume is larger or
-/// smaller by more than this factor.
+/// Largest factor between the mean volume of the points of a file or mesh and the volume of a reference cell.
+/// The edge of this cell is the mean distance to the nearest neighbour. A warning is printed if the mean
+/// volume is larger or smaller by more than this factor.
 const VOLUME_FACTOR: f64 = 10.0;
 
 /// Number, volume, mass, centre and neighbours of a body's points.
@@ -106,8 +106,8 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
     Some(lattice.shape_volume())
 }
 
-/// Return the distance (m) of each owned point to its nearest bonded neighbour, infinite without bonds. The
-/// result is empty if no body has points from a file or mesh.
+/// Return the distance (m) of each owned point to its nearest bonded neighbour. The distance of a point
+/// without bonds is infinite. The result is empty if no body has points from a file or mesh.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
     if !problem.bodies.iter().any(is_from_file) {

@@ -15,8 +15,8 @@ const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 /// Bytes of a result or checkpoint in addition to the data of the points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list, at each end: an eighth of a compact group of eight neighbour indices (20
-/// bytes), and one bit.
+/// Bytes of a bond in a list, at each end: a neighbour index and one bit. A compact group of eight neighbour
+/// indices takes 20 bytes.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
 /// Bytes of a bond in a lattice, at each end: one bit.
@@ -41,11 +41,12 @@ const CONTACT_SEARCH: f64 = 350.0;
 /// Number of work vectors of Newton's method, which are allocated in the first iteration.
 const NEWTON_VECTORS: usize = 8;
 
-/// Number of copies of a field during its output: by point, by id, and in the file layer.
+/// Number of copies of a field during its output: one in the order of the points in memory, one in the order
+/// of the ids, and one in the file layer.
 const FIELD_COPIES: f64 = 3.0;
 
-/// Number of copies of a column during a checkpoint, on one rank and on several: by point, by id, and in
-/// messages.
+/// Number of copies of a column during a checkpoint, on one rank and on several ranks. One copy is in the
+/// order of the points in memory, and one in the order of the ids. With several ranks, one is in messages.
 const CHECKPOINT_COPIES: [f64; 2] = [2.0, 3.0];
 
 /// Memory of the points and bonds of a process, measured or estimated, bytes.
@@ -62,12 +63,12 @@ pub struct Measured {
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Peak memory of all ranks in the time loop (during an output, a checkpoint or a restart), without
-    /// ghosts, bytes: for one rank, and for several ranks.
+    /// Total memory of all ranks at the peak of the time loop (during an output, a checkpoint, a restart
+    /// or a contact search), without ghosts, bytes. The entries are for runs on one rank and for runs on several ranks.
     pub time_loop: [f64; 2],
-    /// The main result with the history, then the further results.
+    /// Disk space of the main result, including the history, and then of each further result.
     pub results: Vec<ResultCost>,
-    /// Size of one checkpoint, bytes; there are two.
+    /// Size of one checkpoint, bytes; a run keeps two checkpoints.
     pub checkpoint: f64,
     /// Number of history rows.
     pub rows: u64,

@@ -35,7 +35,7 @@ pub struct DryRun {
     pub cost: Cost,
     /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
-    /// For each stage: first time step (s), and number of steps if no bond breaks.
+    /// For each stage: length of the first time step (s), and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,
     /// Measured times; `None` if they were not measured.
     pub seconds: Option<Seconds>,

@@ -1,4 +1,4 @@
-//! Warnings about loads, supports and temperatures without the intended effect.
+//! Warnings about loads, supports and temperatures that do not have the intended effect.
 
 use std::collections::HashSet;
 
@@ -153,9 +153,9 @@ fn without_effect<const D: usize>(
     }
 }
 
-/// Warn of a traction or pressure whose default depth, the spacing of a body, differs from the thickness of
-/// the loaded layer by more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`]
-/// points are not checked. Collective.
+/// Check a traction or pressure with the default depth, which is the spacing of a body. Warn if this depth
+/// differs from the thickness of the loaded layer by more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of
+/// more than [`LARGE_LAYER`] points are not checked. Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,
@@ -208,8 +208,8 @@ fn layer<const D: usize>(
 
 /// Return the thickness of a layer and the cell edge, m. The thickness is the mean length of rows of adjacent
 /// cells, in the direction with the shortest rows. If the layer has points of several bodies, the result is
-/// that of the body for which thickness and cell edge differ most. `None` if there are no cells. The entries
-/// of `cells` are a body, and the three indices of a cell.
+/// that of the body for which thickness and cell edge differ most. `None` if there are no cells. Each entry
+/// of `cells` contains the index of a body and the three indices of a cell.
 fn thickness<const D: usize>(problem: &Problem, cells: &HashSet<[i64; 4]>) -> Option<[f64; 2]> {
     let of_body = |body: usize| {
         let own = || cells.iter().filter(move |cell| cell[0] == body as i64);

@@ -47,10 +47,11 @@ const FEW_STEPS: u64 = 2;
 /// Critical stretch above which a warning is printed.
 const LARGEST_STRETCH: f64 = 1.0;
 
-/// Critical stretch below which a warning is printed. Rock at a horizon of 1 km has 1.5e-6.
+/// Critical stretch below which a warning is printed. The critical stretch of rock is 1.5e-6 at a horizon of
+/// 1 km.
 const SMALLEST_STRETCH: f64 = 1e-6;
 
-/// A point at most this distance from a pre-crack, in spacings, lies on the pre-crack.
+/// Largest distance from a pre-crack, in spacings, at which a point counts as lying on the pre-crack.
 const ON_CRACK: f64 = 1e-6;
 
 /// The figures and warnings of a run; equal on all ranks.
@@ -286,8 +287,9 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Return the number of points of each set. Warn of sets by position that have fewer points than there are
-/// dimensions. Do not warn if the run has at most 2 points in 1-D, 4 in 2-D or 6 in 3-D. Collective.
+/// Return the number of points of each set. Warn of sets selected by position that have fewer points than
+/// there are dimensions. Do not warn if the run has at most 2 points in 1-D, 4 in 2-D or 6 in 3-D.
+/// Collective.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;

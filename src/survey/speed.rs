@@ -34,8 +34,8 @@ pub struct Speed {
     pub times: Times,
     /// Number, bytes and time of the messages of the steps.
     pub sent: Traffic,
-    /// Number, bytes and time of the messages of further exchanges of displacements after the steps, as many
-    /// as there are steps. No computation overlaps these messages.
+    /// Number, bytes and time of the messages of an additional test. After the steps, this test exchanges the
+    /// displacements as many times as there are steps. No computation overlaps these messages.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,

@@ -17,15 +17,15 @@ pub struct Contact {
     /// contact only for pairs of bodies with their own `model`.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of two equally thick
-    /// layers of the two materials in series. With `"short-range"`, the spring constant in Pa; by default 15
-    /// times the smaller bulk modulus.
+    /// With `"penalty"`, Young's modulus of the layer in Pa. The default is the modulus of two equally thick
+    /// layers in series, one of each material. With `"short-range"`, the spring constant in Pa. The default
+    /// is 15 times the smaller bulk modulus of the two materials.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// Distance in m between two points at which contact begins. The default is the mean edge of the cells of
-    /// the two points, or 1.35 times this edge with `"short-range"`. This distance is at most the initial
-    /// distance of the two points, or 0.9 times the initial distance with `"short-range"`, even if `radius`
-    /// is larger.
+    /// the two points, or 1.35 times this edge with `"short-range"`. Contact never begins at more than the
+    /// initial distance of the two points (with `"short-range"`, 0.9 times the initial distance), even if
+    /// `radius` is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
@@ -38,7 +38,7 @@ pub struct Contact {
     /// to 1. The default is 1 (no damping).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
-    /// Pairs of bodies with their own rule, by a freely chosen name.
+    /// Pairs of bodies with their own contact model or constants, by a freely chosen name.
     #[serde(default)]
     pub pair: Tables<ContactPair>,
 }
@@ -62,8 +62,8 @@ pub struct ContactPair {
     /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
-    /// Coefficient of static friction. If not given, `friction` of this pair, or the value of `[contact]` if
-    /// the pair has no `friction`.
+    /// Coefficient of static friction. The default is `friction` of this pair. If the pair has no `friction`
+    /// either, the default is the coefficient of static friction of `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
     /// As in `[contact]`; the value of `[contact]` if not given.

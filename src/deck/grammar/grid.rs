@@ -11,7 +11,8 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
-    /// Edge of a lattice cell in m, or a list with one edge for each dimension; for bodies given as shapes.
+    /// Edge of a lattice cell in m, or a list with one edge for each dimension. Only bodies given as shapes
+    /// use this key.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded. With the volume corrections `"exact"` and
@@ -20,9 +21,9 @@ pub struct Grid {
     /// evaluated separately for each body without its own horizon.
     pub horizon: Number,
     /// Position in m of a corner of a lattice cell. The default is chosen separately for each spacing and
-    /// each direction. The default depends on the first body with this spacing that is a whole number of
-    /// cells long between flat faces. It is 0 if a grid with the origin 0 fills this body exactly, otherwise
-    /// the lower face of the body. Without such a body, the default is 0.
+    /// each direction. It depends on the first body with this spacing that has two flat faces normal to this
+    /// direction, a whole number of cells apart. The default is 0 if a grid with the origin 0 fills this body
+    /// exactly, otherwise the position of the lower face of the body. Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
     /// Volume correction of points near the edge of a family: `"exact"`, `"linear"`, `"linear-inside"` or
@@ -33,8 +34,8 @@ pub struct Grid {
     /// Positions of the points in a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
-    /// Largest random shift of the points of shapes from the centres of their cells in each direction, in
-    /// spacings; below 0.5. If not given, points are not shifted.
+    /// Largest random shift of a point from the centre of its cell in each direction, in spacings; below 0.5.
+    /// Only points of bodies given as shapes are shifted. If not given, no points are shifted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter: Option<Number>,
     /// Seed of the random shifts of `jitter`; 0 if not given.
@@ -117,7 +118,8 @@ pub struct Pair {
     pub rule: Option<Spanned<Rule>>,
     /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
     /// these bonds never break. If neither `damage` nor `strength` is given, the bonds break by the damage
-    /// laws of the two bodies. If the horizons are equal, the smaller of the two thresholds applies.
+    /// laws of the two bodies. If the two bodies have the same horizon, the smaller of the thresholds of
+    /// their damage laws applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch of

@@ -230,10 +230,10 @@ pub struct BondEnergy {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
     /// How the critical work follows from the toughness. `"energy"`: breaking all bonds across an area
-    /// dissipates the fracture energy. `"opening"`: separating a block of the body costs the fracture energy.
-    /// The energy of this separation is computed before the run. `"willberg2022"`: eq. 16 and 18 of Willberg
-    /// et al. (2022). `"perilab"`: as in PeriLab, for 2-D and 3-D. `"peridigm2021"`: as in Peridigm in 2021,
-    /// for 2-D.
+    /// dissipates the fracture energy. `"opening"`: separating a block of the body into two halves requires
+    /// the fracture energy. The energy of this separation is computed before the run. `"willberg2022"`: eq.
+    /// 16 and 18 of Willberg et al. (2022). `"perilab"`: as in PeriLab, for 2-D and 3-D. `"peridigm2021"`: as
+    /// in Peridigm in 2021, for 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
     /// Whether only bonds that are longer than initially can break; true if not given. If false, compressed
@@ -300,10 +300,10 @@ pub enum StressMeasure {
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Calibration {
-    /// From the energy of all bonds across an area.
+    /// From the energy that breaking all bonds across an area dissipates.
     #[default]
     Energy,
-    /// From the computed energy that separates a block.
+    /// From the computed energy of separating a block into two halves.
     Opening,
     /// As printed in Willberg et al. 2022.
     Willberg2022,

@@ -2,8 +2,8 @@
 //!
 //! Any number except counts, levels, ids and seeds may be a string with an expression of the `[parameters]`.
 //! All values are in SI units. Unknown keys are errors. A choice, such as the law of a material, is a table
-//! with the name of the chosen variant (`[material.glass.pmb]`). With a key for the variant instead, the
-//! deserializer would lose the locations of the values for error messages.
+//! with the name of the chosen variant (`[material.glass.pmb]`). If a key named the variant instead, the
+//! deserializer would lose the locations of the values, which error messages need.
 
 mod bodies;
 mod conditions;
@@ -120,7 +120,7 @@ pub struct Deck {
     pub balance: Option<Spanned<Balance>>,
 }
 
-/// Dimension of the problem; for plane problems, also whether the stress or the strain across the plane is 0.
+/// Dimension of the problem; for plane problems, also whether the out-of-plane stress or strain is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum DimensionName {
     /// A bar.

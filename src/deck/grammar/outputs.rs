@@ -141,7 +141,7 @@ pub enum Precision {
 #[serde(deny_unknown_fields)]
 pub struct History {
     /// Simulated time between rows in s. The default is 1/500 of the run, unless `every_steps` is given. If
-    /// the whole run is explicit, default rows are only written at multiples of 20 steps.
+    /// the whole run is explicit, this default writes rows only at multiples of 20 steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between rows. Together with `every`, rows are only written at multiples of this number of steps.
@@ -150,11 +150,11 @@ pub struct History {
     /// Sets whose reaction force is recorded, by component.
     #[serde(default)]
     pub reactions: Vec<Text>,
-    /// Forces of supports along a direction, by name.
+    /// Reaction forces of sets, projected on a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether the number of fragments is recorded, with mass and momentum of the fragment with the most
-    /// points; false if not given.
+    /// Whether the number of fragments is recorded, and the mass and momentum of the fragment that has the
+    /// most points; false if not given.
     #[serde(default)]
     pub fragments: bool,
     /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not
@@ -211,8 +211,8 @@ pub struct Balance {
     /// Steps between comparisons of the ranks' times; 500 if not given.
     #[serde(default = "default_interval")]
     pub every_steps: Spanned<Count>,
-    /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced; 1.2 if not
-    /// given.
+    /// Largest ratio of the slowest rank's time to the mean time of the ranks; 1.2 if not given. Points are
+    /// rebalanced above this ratio.
     #[serde(default = "default_imbalance")]
     pub imbalance: Number,
 }
@@ -235,8 +235,8 @@ pub struct SupportForce {
     pub direction: Vector,
 }
 
-/// A crack path: the centre lines of the damaged region that is connected to a start position, one line for
-/// each branch. In 3-D, the area and the front of this region are computed.
+/// A crack path: the centre lines of a damaged region, one line for each branch. The region is connected to a
+/// start position. In 3-D, the area and the front of this region are computed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
@@ -269,8 +269,8 @@ pub struct FieldStatistics {
     /// Name of an output field.
     pub field: Text,
     /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
-    /// `"principal_1"`. If not given, the magnitude of a vector; required for tensors, and not allowed for
-    /// fields with one number per point.
+    /// `"principal_1"`. The default for a vector is its magnitude. The key is required for tensors, and not
+    /// allowed for fields with one number per point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// A set or a body; all points if not given.
@@ -296,9 +296,9 @@ pub enum Statistic {
     Maximum,
 }
 
-/// A front: the position that a field has reached along a line. The search finds the farthest point near the
-/// line at which the absolute value of the field exceeds the threshold. Linear interpolation to the next
-/// point ahead gives the position where the absolute value crosses the threshold.
+/// A front: the position that a field has reached along a line. Of the points near the line, the search finds
+/// the farthest point at which the absolute value of the field exceeds the threshold. Linear interpolation to
+/// the next point ahead gives the position where the absolute value crosses the threshold.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {
@@ -309,23 +309,22 @@ pub struct Front {
     /// Length of the line in m; if not given, the line extends to the end of the bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length: Option<Number>,
-    /// Largest distance in m from the line at which points are evaluated; the horizon of `[grid]` if not
-    /// given.
+    /// Largest distance of the evaluated points from the line, in m; the horizon of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Name of an output field.
     pub field: Text,
     /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or
-    /// `"principal_1"`. If not given, the magnitude of a vector; required for tensors, and not allowed for
-    /// fields with one number per point.
+    /// `"principal_1"`. The default for a vector is its magnitude. The key is required for tensors, and not
+    /// allowed for fields with one number per point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// Threshold that the absolute value of the field must exceed, in the unit of the field.
     pub threshold: Number,
 }
 
-/// A crack tip: of the points of a set with a damage above a threshold, the farthest point in one direction.
-/// The position of the tip is interpolated as for a [`Front`].
+/// A crack tip: the point farthest in one direction among all points with a damage above a threshold. Only
+/// the points of one set are searched. The position of the tip is interpolated as for a [`Front`].
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {

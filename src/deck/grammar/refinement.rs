@@ -60,9 +60,9 @@ pub struct Trigger {
     /// A condition on the reference position and t that every trigger must fulfil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time in s after which points become coarser if, during this time, they were not within the horizon of
-    /// a trigger or of a point with broken bonds. Each evaluation coarsens by one level. If not given, points
-    /// never become coarser.
+    /// Time in s after which refined points are coarsened. During this time, they must lie outside the
+    /// horizons of all triggers and of all points with broken bonds. Each evaluation coarsens these points by
+    /// one level. If not given, points are never coarsened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }

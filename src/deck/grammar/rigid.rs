@@ -7,9 +7,9 @@ use super::Shape;
 use crate::deck::number::{Number, Vector};
 use crate::deck::spanned::Spanned;
 
-/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when the
-/// distance of the point to the surface is half the edge of the point's cell, or the initial distance if the
-/// initial distance is smaller.
+/// A rigid body. With `motion` it is driven, with `mass` it is free, and without these keys it is fixed.
+/// Contact begins when the distance of a point from the surface is half the edge of the point's cell. If the
+/// initial distance of the point is smaller, contact begins at the initial distance.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {

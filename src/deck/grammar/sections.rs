@@ -41,10 +41,10 @@ pub enum Form {
 pub enum Restart {
     /// No changes.
     Fixed,
-    /// No changes, and no other order of the tables, because later bodies, initial values and conditions take
-    /// precedence over earlier ones.
+    /// No changes. The order of the tables must not change either, because later bodies, initial values and
+    /// conditions take precedence over earlier ones.
     FixedOrder,
-    /// Tables may be added or removed. A table that both decks have must not change.
+    /// Tables may be added or removed. A table that is in the old deck and in the new deck must not change.
     WhereUsed,
     /// Any changes.
     Free,

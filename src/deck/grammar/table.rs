@@ -18,11 +18,11 @@ pub struct Table {
     /// Name of the column of values. May be left out if the file has only two columns, times and values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<Text>,
-    /// Name of the column of times in s. If not given, the column `t` or `time`, or the first column if the
+    /// Name of the column of times in s. The default is the column `t` or `time`, or the first column if the
     /// file has neither.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Text>,
-    /// Strictly increasing times in s, instead of a file.
+    /// Strictly increasing times in s, for a table without `file`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<Spanned<Vec<Number>>>,
     /// Values at `times`.

@@ -1,10 +1,10 @@
 //! Bond-associated correspondence: a classical stress for each bond, from the bond's own deformation
 //! gradient. This law has no zero-energy modes and needs no control.
 //!
-//! Breitzman & Dayal 2018. The deformation gradient F_ξ of a bond describes the bond's own motion along the
-//! bond, and the family's motion across the bond.
-//! The energy is the mean of the classical energies of the bonds, whereas
-//! [`Correspondence`](super::Correspondence) uses the energy of the mean gradient.
+//! Breitzman & Dayal 2018. The deformation gradient F_ξ of a bond maps ξ to Y. It maps vectors perpendicular
+//! to ξ like the deformation gradient F of the family.
+//! The strain energy density W of a point is the weighted mean of the classical energy densities at F_ξ.
+//! [`Correspondence`](super::Correspondence) evaluates the classical energy density once, at F.
 //! With F = I + H of [`Correspondence`](super::Correspondence), n = ξ/|ξ| and the classical strain energy
 //! density Ψ,
 //!
@@ -15,12 +15,13 @@
 //! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ), Z = Σ w P_ξ (I − n⊗n).
 //!
 //! Because F_ξ ξ = Y, W is 0 only for motions that keep the length of every bond.
-//! F is the gradient of the point, not the mean gradient of both ends. Therefore the force state depends on
-//! the point's own family only, and Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point.
+//! F is the gradient of the point, not the mean of the gradients at both ends of the bond. Therefore the
+//! force state depends on the point's own family only, and Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every
+//! point.
 //! The gradients of Chen 2018 sum over the neighbours that points i and j share. Such gradients would need
 //! enough shared neighbours and a shape tensor per bond, so they are not used.
 //!
-//! With the largest modulus c of the solid, W ≤ ½ c Σ w |H_ξ|² for H_ξ = F_ξ − I. Here
+//! Let H_ξ = F_ξ − I. With the largest modulus c of the solid, W ≤ ½ c Σ w |H_ξ|². Here
 //! |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|². With the smallest eigenvalue λ of K, |H|² ≤ Σ ω |η|² Ṽ/λ.
 //! Therefore springs with the constant c (1/λ + 1/(|ξ|² Σ ω Ṽ)) store at least the energy W.
 

@@ -22,10 +22,10 @@ pub enum Control {
     /// untruncated family. Long shear waves then have no dispersion.
     ///
     /// Derivation: consider a wave along the axis x with the amplitude u, the wavenumber κ and the modulus M,
-    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. H is too small by the fraction κ²q/(6k), so the wave
-    /// stores ½ M κ² (1 − κ²q/(3k)) |u|² per volume. z is −½ (κ ξ_x)² u, so a control B = (b/k) I with a
-    /// modulus b stores ½ b κ⁴q/(4k) |u|² per volume. The sum of both is independent of q for b = (4/3) M,
-    /// for every dimension, influence function and lattice.
+    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. H is too small by the fraction κ²q/(6k), so the energy
+    /// density of the stress is ½ M κ² (1 − κ²q/(3k)) |u|². z is −½ (κ ξ_x)² u, so the energy density of a
+    /// control B = (b/k) I with a modulus b is ½ b κ⁴q/(4k) |u|². For b = (4/3) M, the sum of the two energy
+    /// densities is independent of q, for every dimension, influence function and lattice.
     Dispersion {
         /// Product (4/3) G/k, N/m⁷.
         strength: f64,
@@ -66,8 +66,8 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
-/// Return the error of the control `wan2019` with anisotropic constants for which C : I is not positive
-/// definite. `None` for other controls and other constants.
+/// Return an error if the control is `wan2019`, the constants are anisotropic, and C : I is not positive
+/// definite; `None` otherwise.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let least = hooke::least_under_dilation(values, dimension)?;
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
@@ -111,7 +111,7 @@ impl Control {
         }
     }
 
-    /// Return the constant of a point that [`Self::matrix`] needs, N/m⁷. `weight` is ω₀ (m³) of the initial
+    /// Return the constant that [`Self::matrix`] needs for a point, N/m⁷. `weight` is ω₀ (m³) of the initial
     /// family of the point. The constant is 0 for `none` and `wan2019`, which do not use the constant, and
     /// for ω₀ = 0 with `silling2017`.
     pub fn constant(&self, weight: f64) -> f64 {
@@ -165,7 +165,7 @@ mod tests {
 
     const YOUNG: f64 = 3.0;
 
-    /// Return the control of a law with these values of its keys.
+    /// Return the control of a law whose keys have these values.
     fn control(
         dimension: Dimension,
         poisson_ratio: f64,

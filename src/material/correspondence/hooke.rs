@@ -16,7 +16,7 @@ use crate::elastic::Isotropic;
 /// Components of a tensor in Voigt's order.
 const VOIGT: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
 
-/// Indices in Voigt's order of the components in the plane.
+/// Indices of the in-plane components in Voigt's order.
 const PLANE: [usize; 3] = [0, 1, 5];
 
 /// Hooke's matrix C, Pa.
@@ -230,8 +230,8 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// Return the error of a matrix that is not finite or not positive definite, at the key `first`; `None` for
-/// other matrices.
+/// Return an error if the matrix is not finite or not positive definite; `None` otherwise. The error is
+/// reported at the key `first`.
 fn indefinite(
     matrix: &Matrix6<f64>,
     dimension: Dimension,
@@ -271,7 +271,7 @@ fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     (all.eigenvalues[softest], parts.join(", "))
 }
 
-/// Return the indices of the components of Hooke's matrix that a dimension uses.
+/// Return the indices, in Voigt's order, of the components that problems of this dimension use.
 fn used(dimension: Dimension) -> Vec<usize> {
     match dimension {
         Dimension::Space => (0..6).collect(),
@@ -322,8 +322,8 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
     Some(compliance.try_inverse().unwrap_or(not_a_solid))
 }
 
-/// Return the elastic constants of the isotropic solid whose stiffness is the average of the stiffness over
-/// all directions (Voigt); in 2-D, over all directions in the plane. `None` for isotropic constants.
+/// Average the stiffness of an anisotropic solid over all directions (Voigt); in 2-D, over all directions in
+/// the plane. Return the isotropic elastic constants of the average; `None` for isotropic constants.
 pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
     let c = unturned(values, dimension)?;
     if matches!(dimension, Dimension::Space) {
@@ -350,7 +350,7 @@ pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
 }
 
 impl Hooke {
-    /// Create Hooke's matrix of a body. `None` if an entry of the matrix of an anisotropic solid is not
+    /// Create Hooke's matrix of a body. `None` if the solid is anisotropic and an entry of its matrix is not
     /// finite.
     pub fn of(given: &Given) -> Option<Self> {
         let Some(own) = unturned(given.values, given.dimension) else {
@@ -408,9 +408,8 @@ impl Hooke {
         stress
     }
 
-    /// Return the shear modulus (Pa) of the isotropic solid whose compliance is the average of the compliance
-    /// over all directions (Reuss); in 2-D, over all directions in the plane. The softest shear modes
-    /// dominate this shear modulus.
+    /// Average the compliance over all directions (Reuss); in 2-D, over all directions in the plane. Return
+    /// the shear modulus (Pa) of the average. The softest shear modes dominate this shear modulus.
     ///
     /// # Panics
     /// If Hooke's matrix is singular.
@@ -451,7 +450,7 @@ impl Hooke {
     }
 }
 
-/// Return the indices in Voigt's order of the components in `D` dimensions.
+/// Return the indices that tensor components in `D` dimensions have in Voigt's order.
 fn components<const D: usize>() -> impl Iterator<Item = usize> {
     const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
     let used: &[usize] = match D {

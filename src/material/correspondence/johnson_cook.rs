@@ -11,14 +11,14 @@
 //! becomes heat, and ρ c the volumetric heat capacity. A step is computed with the temperature at the start
 //! of the step.
 //!
-//! The factor of rate and temperature is part of the plastic state. A force evaluation without passage of
-//! time uses this stored factor. Therefore a stress that was returned to the yield surface does not cause
-//! flow again.
+//! The factor of rate and temperature, the product of the last two factors of σ, is part of the plastic
+//! state. A force evaluation without passage of time uses this stored factor. Therefore a stress that was
+//! returned to the yield surface does not cause flow again.
 //!
-//! The increment of plastic strain is ΔE_p = x S_d with the deviator S_d of the final stress, and Δε̄ = ⅔ x q
-//! with the equivalent stress q of the final stress. q follows from the trial stress and x: each part of the
-//! equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part ([`Modes`]), not the
-//! heat capacity. The equation for x,
+//! Let S_d be the deviator and q the equivalent stress of the final stress. The increment of plastic strain
+//! is ΔE_p = x S_d with an unknown x, and Δε̄ = ⅔ x q. q follows from the trial stress and x: each part of
+//! the equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part ([`Modes`]), not
+//! the heat capacity. The equation for x,
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!
@@ -146,7 +146,7 @@ const ALL: [&Key; 8] = [
 /// Default of the Taylor–Quinney coefficient β.
 const DEFAULT_TAYLOR_QUINNEY: f64 = 0.9;
 
-/// Smallest factor of the temperature on the yield stress. A molten point keeps this fraction of its yield
+/// Lower limit of the factor 1 − T*ᵐ on the yield stress. A molten point keeps this fraction of its yield
 /// stress.
 const MOLTEN: f64 = 1e-3;
 
@@ -381,8 +381,8 @@ impl JohnsonCook {
 }
 
 impl Surface {
-    /// Return the factor on A + B ε̄ⁿ with this increment of ε̄, and the derivative of the factor by the
-    /// increment.
+    /// Return the factor of rate and temperature on A + B ε̄ⁿ, and the derivative of the factor by `growth`.
+    /// `growth` is the increment of ε̄.
     fn by_rate(&self, coefficient: f64, growth: f64) -> [f64; 2] {
         if growth > self.threshold {
             let rate = 1.0 + coefficient * libm::log(growth / self.threshold);
@@ -513,8 +513,9 @@ mod tests {
         }
     }
 
-    /// Integrate the rate equations of a bar by the method of Runge and Kutta. If the stress σ exceeds the
-    /// yield stress σ₀ without the factor of the rate, the rate of flow is ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C).
+    /// Integrate the rate equations of a bar by the method of Runge and Kutta. Let σ₀ be the yield stress
+    /// without the factor of the rate. If the stress σ exceeds σ₀, the rate of flow is
+    /// ε̄̇ = ε̇₀ exp((σ/σ₀ − 1)/C).
     /// Returns σ (Pa), ε̄ and the dissipated energy density (J/m³).
     fn integrated(strain: f64, rate: f64) -> [f64; 3] {
         let steps = 400_000;
@@ -586,8 +587,8 @@ mod tests {
         }
     }
 
-    /// Compare the root for a trial stress of `1 + excess` times the yield stress with the result of
-    /// bisection.
+    /// Compare the root with the result of bisection. The trial stress is `1 + excess` times the yield
+    /// stress.
     fn compare(law: &JohnsonCook, equivalent: f64, step: f64, excess: f64) {
         let state = PlasticState {
             equivalent,

@@ -7,9 +7,9 @@
 //!
 //! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ Σ ε + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
 //!
-//! The flow rule is that of small strains, applied to ε_a and τ_a. After the flow, b_e is Σ exp(2 ε_a)
-//! n_a⊗n_a. A rigid rotation only rotates b_e, so no stress rate needs integration. Flow preserves volume:
-//! det C_p is 1.
+//! The flow rule is that of small strains, applied to ε_a and τ_a. It changes ε_a and keeps n_a.
+//! After the flow, b_e is Σ exp(2 ε_a) n_a⊗n_a with the new ε_a. A rigid rotation only rotates b_e, so no
+//! stress rate needs integration. Flow preserves volume: det C_p is 1.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -119,8 +119,8 @@ pub fn eigenvalues(m: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 /// Return the eigenvalues of a symmetric matrix, and its eigenvectors by columns. Jacobi's method uses
-/// additions, multiplications, divisions and square roots only. The bits are therefore the same on every
-/// machine.
+/// additions, multiplications, divisions and square roots only. The results are therefore bitwise equal
+/// on every machine.
 fn eigen(mut m: Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
     let mut axes = Matrix3::identity();
     for _ in 0..MOST_SWEEPS {

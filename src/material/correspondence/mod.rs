@@ -14,8 +14,8 @@
 //!
 //! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point. B is then multiplied
 //! by a factor s that falls with the flow ([`Plastic::control_left`]), because an elastic control would carry
-//! load that the solid cannot carry. When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the control is
-//! dissipated, with B before the multiplication by s.
+//! load that the solid cannot carry. When s changes by Δs, the control dissipates the energy
+//! −Δs · ½ Σ ω z·B z Ṽ. In this energy, B is the matrix before the multiplication by s.
 
 mod bond_associated;
 mod control;
@@ -244,10 +244,10 @@ struct Family<const D: usize> {
 }
 
 impl Correspondence {
-    /// Compute K⁻¹, H, P and W of a point, and update its plastic state in a step of this length (s). `sums`
-    /// are the sums of the first pass, and `initial_spring_constant` is the spring constant of the initial
-    /// family, N/m⁷. `None` if K is nearly singular, the intact part of the family is stiffer than the stable
-    /// step allows ([`ShapeTensor::inverse_of_rest`]), or the law has no stress at H.
+    /// Compute K⁻¹, H, P and W of a point, and update its plastic state. `sums` are the sums of the first
+    /// pass, `initial_spring_constant` is the spring constant of the initial family (N/m⁷), and `step` is the
+    /// length of the step (s). `None` if K is nearly singular, the intact part of the family is stiffer than
+    /// the stable step allows ([`ShapeTensor::inverse_of_rest`]), or the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],

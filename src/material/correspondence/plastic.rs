@@ -5,14 +5,14 @@
 //! stress is S = C : E_e, P = F S.
 //! A rigid rotation does not change E. Therefore the law needs no corotational frame, no polar decomposition
 //! and no integration of a stress rate.
-//! Without flow this is the St. Venant–Kirchhoff law. The law is meant for small strains with rotations of
-//! any size.
+//! Without flow the law equals the St. Venant–Kirchhoff law. The law is meant for small strains with
+//! rotations of any size.
 //!
 //! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²), the equivalent plastic strain ε̄ and
 //! the hardening modulus H, the yield surface is q = σ_y + H ε̄. A trial stress outside the surface returns
 //! along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In plane
-//! stress, the out-of-plane stress stays 0. Then ΔE_p = x S_d with the deviator of the final stress, where x
-//! solves a scalar equation (§3.4).
+//! stress, the out-of-plane stress stays 0. Then ΔE_p = x S_d, where S_d is the deviator of the final stress,
+//! and x solves a scalar equation (§3.4).
 //!
 //! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain and by the strain
 //! rate, and softening by heat.
@@ -420,8 +420,8 @@ mod tests {
         }
     }
 
-    /// Keys of Johnson–Cook hardening: by strain and strain rate, with softening by heat. In the random walk,
-    /// the temperature rises by about half of the difference between melting and initial temperature.
+    /// Keys of Johnson–Cook hardening by strain and strain rate, and of softening by heat. In the random
+    /// walk, the temperature rises by about half of the difference between melting and initial temperature.
     const JOHNSON_COOK: [(&str, f64); 8] = [
         ("hardening_modulus", 0.02),
         ("hardening_exponent", 0.3),

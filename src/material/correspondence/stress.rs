@@ -14,12 +14,12 @@ use crate::lanes::{Lanes, WIDTH};
 pub enum Stress {
     /// P = F S, S = C : E with E = ½ (FᵀF − I). This stress derives from an energy and is objective.
     StVenantKirchhoff(Hooke),
-    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E and J = det F (Willberg et al. 2022, eq. 9, where F⁻¹ is
-    /// printed). This stress equals that of St. Venant–Kirchhoff at small strains without rotation. It is not
-    /// objective.
+    /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E and J = det F (Willberg et al. 2022, eq. 9, which prints
+    /// F⁻¹ instead of F⁻ᵀ). This stress equals that of St. Venant–Kirchhoff at small strains without
+    /// rotation. It is not objective.
     Willberg2022(Hooke),
     /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress, the out-of-plane
-    /// stretch makes the out-of-plane stress 0.
+    /// stretch is the one at which the out-of-plane stress is 0.
     NeoHooke(NeoHooke),
 }
 
@@ -47,7 +47,7 @@ pub struct OfBonds<const D: usize> {
 }
 
 impl Stress {
-    /// Create the stress law with this name in decks.
+    /// Create the stress law that has the name `name` in decks.
     pub fn of(name: &str, given: &Given, hooke: Hooke) -> Self {
         match name {
             "willberg2022" => Self::Willberg2022(hooke),
@@ -239,7 +239,7 @@ fn st_venant_kirchhoff<T: Number, const D: usize>(
 }
 
 impl NeoHooke {
-    /// Return ln det FᵀF and W (J/m³), from FᵀF − I of the plane or of space. The returned ln det FᵀF
+    /// Return ln det FᵀF and W (J/m³). `doubled` is FᵀF − I in 2-D or 3-D. The returned ln det FᵀF
     /// includes the out-of-plane stretch.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
         let own = libm::log1p(growth(doubled));
@@ -256,7 +256,7 @@ impl NeoHooke {
     }
 
     /// Return the logarithm q of the squared out-of-plane stretch in plane stress. `own` is ln det FᵀF of the
-    /// in-plane F. q solves μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
+    /// in-plane F. Newton's method solves μ (e^q − 1) + ½ λ (own + q) = 0 for q.
     fn log_square_stretch(&self, own: f64) -> f64 {
         let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
         for _ in 0..20 {

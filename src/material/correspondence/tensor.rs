@@ -1,4 +1,4 @@
-//! Tensors of one point or of eight bonds, so that a formula is written only once for both.
+//! Tensors of one point or of eight bonds. A generic type serves both, so each formula is written only once.
 
 use std::ops::{Add, Mul};
 

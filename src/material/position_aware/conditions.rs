@@ -1,5 +1,5 @@
 //! Conditions on the functions ω and σ of a point. n is the direction of a bond, and N has the components
-//! N_a = n_a². Unless a formula gives the terms, each bond has the weight |ξ|² Ṽ in a sum over the family.
+//! N_a = n_a². In a sum over the family, each bond has the weight |ξ|² Ṽ, unless a formula gives the terms.
 
 use crate::material::monomials::index_of;
 use crate::material::symmetric::mixed;
@@ -10,8 +10,8 @@ pub(super) type Monomial = ([usize; 3], f64);
 /// A polynomial of degree 2 in the components of n or N.
 pub(super) type Quadratic = [Monomial];
 
-/// Return the sum of the product of two polynomials over a family, from the sums of the monomials of degree
-/// 4.
+/// Return the sum, over a family, of the product of two polynomials. `sums` are the sums of the monomials of
+/// degree 4 over this family.
 pub(super) fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
     let mut total = 0.0;
     for (a, of_a) in first {
@@ -23,7 +23,7 @@ pub(super) fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f6
     total
 }
 
-/// Return the exponents of the product of the components with the indices `a` and `b`.
+/// Return the exponents of the monomial that is the product of component `a` and component `b`.
 pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
     let mut exponents = [0; 3];
     exponents[a] += 1;
@@ -31,8 +31,8 @@ pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
     exponents
 }
 
-/// The conditions on a function g of the bond direction. Condition k says that the sum of p_k g over the
-/// family is wanted_k, the value of this sum in the solid.
+/// The conditions on a function g of the bond direction. Condition k requires that the sum of p_k g over the
+/// family is wanted_k. Here p_k is a polynomial, and wanted_k is the value of this sum in the solid.
 pub struct Conditions<const D: usize> {
     /// The value c of g in an untruncated family of the continuum.
     pub(super) constant: f64,
@@ -45,8 +45,8 @@ pub struct Conditions<const D: usize> {
 impl<const D: usize> Conditions<D> {
     /// Create the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab on ω, with m = Σ |ξ|² Ṽ (m⁵) and c = ω₀ = d/m.
     ///
-    /// Mixed conditions have the weight √2, because each represents two components. Therefore the function of
-    /// [`Nearest`](super::Nearest) rotates with the family.
+    /// Conditions with a ≠ b have the weight √2, because each of them represents the components ab and ba.
+    /// Therefore the function of [`Nearest`](super::Nearest) rotates with the family.
     pub(super) fn dilatational(weighted_volume: f64) -> Self {
         let axes = (0..D).map(|a| (vec![(of_product(a, a), 1.0)], 1.0));
         let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2_f64.sqrt())], 0.0));

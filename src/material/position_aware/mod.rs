@@ -7,7 +7,8 @@
 //!
 //! t = (k′θ − (1/d) Σ σ|ξ| ε Ṽ) ω|ξ| + σ ε,
 //!
-//! with the number of dimensions d, the force state along the bond t, and k′, A and m of [`Ordinary`].
+//! where d is the number of dimensions, and t is the force state along the bond. k′, A and m are those of
+//! [`Ordinary`].
 //!
 //! At a small homogeneous strain H, a bond of direction n has e = |ξ| n·H n. The probe strains H are unit
 //! extensions along the axes and shears between the axes. In an untruncated family of the continuum, ω and σ
@@ -17,10 +18,11 @@
 //!
 //! The functions of [`Ordinary`] are ω₀ = d/m and σ₀ = A/m. The [`Form`] of ω and σ determines how they are
 //! fitted to these conditions. With ω = ω₀ and σ = σ₀ the law is [`Ordinary`], as long as no bond of the
-//! family is broken. The loops multiply ω and σ by the influence function of the deck, as in all sums.
+//! family is broken. The influence function of the deck is a further factor of each bond in all sums.
+//! Therefore the loops over bonds multiply ω and σ by it.
 //!
-//! A critical stretch that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)), with σ_w of
-//! an untruncated family. Breaking the bond then takes the same energy as in an untruncated family.
+//! A critical stretch s_c that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)). Here σ_w
+//! is σ of an untruncated family. Breaking the bond then takes the same energy as in an untruncated family.
 
 mod conditions;
 mod directional;
@@ -69,7 +71,7 @@ pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
     const WITHOUT_BONDS: f64;
 
     /// Fit ω and σ to `conditions`, the conditions on ω and on σ. `sums` are the sums of |ξ|² Ṽ times the
-    /// monomials of degree 4 of n, and of N with N_a = n_a². `reference` is σ₀, N/m⁷.
+    /// monomials of degree 4, first of n, then of N with N_a = n_a². `reference` is σ₀, N/m⁷.
     fn fit<const D: usize>(
         sums: [&[f64]; 2],
         conditions: [&Conditions<D>; 2],
@@ -135,7 +137,7 @@ impl<F: Form> PositionAware<F> {
     }
 }
 
-/// No deck name: decks write `ordinary` with a `surface_correction`.
+/// The law has no name of its own in decks. Decks select it with `ordinary` and a `surface_correction`.
 impl<F: Form> Declared for PositionAware<F> {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
@@ -153,11 +155,11 @@ type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 /// Return an upper bound of the smallest λ with k′θ² + Σ σ ε² Ṽ ≤ λ Σ σ e² Ṽ for all extensions e, in `d`
 /// dimensions.
 ///
-/// In the scalar product ⟨a, b⟩ = Σ σ a b Ṽ, θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|. The inputs are
-/// R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. If all three are equalities, they give the
-/// components of ε along r and normal to r. Then λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g],
-/// [−g, 1]] with g² = (RQ − τ²)/d². Because λ ≥ 1, this eigenvalue grows with R and Q and decreases with τ.
-/// It is therefore an upper bound if the inputs are bounds.
+/// Let ⟨a, b⟩ = Σ σ a b Ṽ be a scalar product. Then θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|. The
+/// inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. If R, Q and τ equal these products,
+/// they give the components of ε along r and normal to r. Then λ is the larger eigenvalue of
+/// [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². Because λ ≥ 1, this eigenvalue grows with R
+/// and Q and decreases with τ. It is therefore an upper bound if the inputs are bounds.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
     let determinant = bulk_modulus * r + (1.0 - tau / d).powi(2);
@@ -178,8 +180,8 @@ fn squares<const D: usize>(bond: &Bond<D>) -> [Lanes; D] {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
-    /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Then k′θ − (1/d) Σ σ|ξ| ε Ṽ
-    /// (Pa) and θ/d.
+    /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Changing numbers:
+    /// k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
@@ -384,7 +386,7 @@ mod tests {
         functions_of::<F>(family, family)
     }
 
-    /// Return ω and σ of these bonds at a point with a family, and λ of this point.
+    /// Return ω and σ of `bonds` at a point with the family `family`, and λ of this point.
     fn functions_of<F: Form>(
         family: &[Vector3<f64>],
         bonds: &[Vector3<f64>],
@@ -449,8 +451,8 @@ mod tests {
         }
     }
 
-    /// The point contributes nothing to a bond from a point with a larger horizon. The critical stretch of
-    /// this bond therefore changes only by the factor √2.
+    /// A point without bonds of its own contributes nothing to a bond from a point with a larger horizon. The
+    /// critical stretch of this bond therefore changes only by the factor √2.
     #[test]
     fn points_without_bonds_have_no_share() {
         for functions in [
@@ -465,7 +467,7 @@ mod tests {
         }
     }
 
-    /// Check that λ is at least the largest eigenvalue of the energy, and at most `most` times as large.
+    /// Check that λ lies between the largest eigenvalue of the energy and `most` times this eigenvalue.
     fn check_bound<F: Form>(name: &str, family: &[Vector3<f64>], most: f64) {
         let law = law::<F>();
         let (functions, bound) = functions::<F>(family);

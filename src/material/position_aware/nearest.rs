@@ -64,7 +64,7 @@ impl Form for Nearest {
     }
 }
 
-/// Among all functions of the bond direction that satisfy the conditions, the function nearest to a constant.
+/// The function of the bond direction that satisfies the conditions and is nearest to a constant.
 struct Function<const D: usize> {
     /// Matrix of the function: T in n·T n or N·T N.
     tensor: SMatrix<f64, D, D>,
@@ -74,8 +74,8 @@ struct Function<const D: usize> {
     sum: f64,
 }
 
-/// Fit the function g = c + Σ τ_k p_k, with the multipliers τ_k, to the conditions, as far as the family
-/// allows. `sums` are the sums of the monomials of degree 4, in the components of n or N, over the family.
+/// Fit the multipliers τ_k of the function g = c + Σ τ_k p_k to the conditions, as far as the family allows.
+/// `sums` are the sums, over the family, of the monomials of degree 4 in the components of n or N.
 fn nearest<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> Function<D> {
     let (each, count) = (&conditions.each, conditions.each.len());
     let matrix = DMatrix::from_fn(count, count, |r, c| product(sums, &each[r].0, &each[c].0));

@@ -1,13 +1,13 @@
 //! Elastic–perfectly plastic solid with the influence functions of [`PositionAware`].
 //!
 //! Each bond has a plastic extension e_p per end. Energy and force are those of [`PositionAware`] at the
-//! elastic extensions e − e_p. Let ε_d be the elastic extension without the mean elastic stretch of the
-//! intact bonds, so that Σ ω|ξ| ε_d Ṽ = 0:
+//! elastic extensions e − e_p. Let ε_d be the elastic extension, minus |ξ| times the mean elastic stretch of
+//! the intact bonds, so that Σ ω|ξ| ε_d Ṽ = 0:
 //!
 //! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G). This limit is twice the deviatoric energy density at which the
-//! equivalent stress of von Mises is the yield stress σ_y. Without surfaces, this is the yield condition of
+//! equivalent stress of von Mises is the yield stress σ_y. Away from surfaces, the yield condition is that of
 //! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with r² Σ σ ε_d² Ṽ =
 //! σ_y²/(3G). Because Σ ω|ξ| ε_d Ṽ = 0, plastic flow does not change θ.
 //!
@@ -51,7 +51,8 @@ impl<F: Form> PositionAwarePlastic<F> {
     }
 }
 
-/// No deck name: decks write `ordinary_plastic` with a `surface_correction`.
+/// The law has no name of its own in decks. Decks select it with `ordinary_plastic` and a
+/// `surface_correction`.
 impl<F: Form> Declared for PositionAwarePlastic<F> {
     const DECLARATIONS: &'static [Declaration] = &[];
 }

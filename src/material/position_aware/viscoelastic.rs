@@ -40,7 +40,8 @@ impl<F: Form> PositionAwareViscoelastic<F> {
     }
 }
 
-/// No deck name: decks write `ordinary_viscoelastic` with a `surface_correction`.
+/// The law has no name of its own in decks. Decks select it with `ordinary_viscoelastic` and a
+/// `surface_correction`.
 impl<F: Form> Declared for PositionAwareViscoelastic<F> {
     const DECLARATIONS: &'static [Declaration] = &[];
 }

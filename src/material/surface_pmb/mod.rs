@@ -7,9 +7,9 @@
 //! solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the number of dimensions d
 //! and the energy density W₁ at unit isotropic stretch.
 //!
-//! A bond has the mean of the micromoduli of points i and j, c_ij(n). A critical stretch s_c that follows
-//! from a fracture energy is scaled to s_c √(c/c_ij). Breaking the bond then takes the same energy as in an
-//! untruncated family. Le & Bobaru (2018) compare other corrections.
+//! The micromodulus c_ij(n) of a bond is the mean of the micromoduli of points i and j. A critical stretch
+//! s_c that follows from a fracture energy is scaled to s_c √(c/c_ij). Breaking the bond then takes the same
+//! energy as in an untruncated family. Le & Bobaru (2018) compare other corrections.
 //!
 //! In 1-D, where all bonds have the same direction, [`Normalised`](super::Normalised) replaces this law.
 
@@ -78,7 +78,8 @@ impl<F: Form> SurfacePmb<F> {
     }
 }
 
-/// No deck name: decks write `pmb` or `proportional` with a `surface_correction`.
+/// The law has no name of its own in decks. Decks select it with `pmb` or `proportional` and a
+/// `surface_correction`.
 impl<F: Form> Declared for SurfacePmb<F> {
     const DECLARATIONS: &'static [Declaration] = &[];
 }

@@ -14,8 +14,8 @@ use crate::material::symmetric::{Symmetric, quadratic_form};
 /// or three points thick.
 const SMALLEST: f64 = 0.2;
 
-/// Largest allowed eigenvalue of H. Without this limit, the stiffness of points with few neighbours, nearly
-/// in one plane, would be unbounded.
+/// Largest allowed eigenvalue of H. Without this limit, the stiffness of points whose few neighbours lie
+/// nearly in one plane would be unbounded.
 const LARGEST: f64 = 30.0;
 
 /// Singular values below this fraction of the largest singular value are dropped; the solution of smallest

@@ -9,7 +9,7 @@ use super::super::{Elements, Group, Members, Mesh, Runs, fault, position};
 use super::{Place, Reader};
 use crate::error::{Result, excerpt};
 
-/// Largest total number of nodes, and of elements, of the model and all instances.
+/// Largest number of nodes in the model and all instances together, and largest number of elements.
 const LARGEST: usize = u32::MAX as usize;
 
 /// Nodes, elements and sets of the model, of a part or of an instance.
@@ -43,7 +43,7 @@ pub(super) struct Set {
     /// Names of other sets that this set includes. An entry may also be a single member, given by an instance
     /// and a number, such as `part-1-1.7`.
     pub(super) names: Vec<String>,
-    /// Whether the members are all nodes of the element sets in `names`.
+    /// Whether the set consists of all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
     pub(super) place: Place,
 }
@@ -160,8 +160,8 @@ impl Reader {
         });
     }
 
-    /// Return the indices in the mesh of the members of a set. `own` is the index in `placed` of the instance
-    /// or model that contains the set. `known` holds the earlier sets of this instance or model.
+    /// Return the mesh indices of the members of a set. `own` is the index in `placed` of the instance or
+    /// model that contains the set. `known` holds the earlier sets of this instance or model.
     fn members(
         &self,
         set: &Set,
@@ -301,8 +301,8 @@ impl Reader {
         Ok(self.mesh)
     }
 
-    /// For each set name that occurs in instances, add a group with the members of all sets of instances with
-    /// this name. If the assembly has a set with this name, no group is added.
+    /// For each set name that occurs in instances, add a group of this name. The group holds the members of
+    /// the sets of this name in all instances. If the assembly has a set with this name, no group is added.
     fn add_bare_names(&mut self) {
         let prefixes: FxHashSet<String> = self
             .placed

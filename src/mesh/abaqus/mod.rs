@@ -18,7 +18,7 @@ use crate::error::{Error, Result, excerpt};
 use assembly::{Instance, MemberKind, Part, Placed, Set};
 use names::{GENERATORS, Keyword, kind};
 
-/// Largest depth of files that include one another.
+/// Largest nesting depth of included files.
 const DEEPEST: usize = 16;
 
 /// Largest number of included files. A file that is included several times counts each time.

@@ -2,7 +2,8 @@
 
 use super::super::kind::{Form, Kind};
 
-/// Keywords that generate or move nodes or elements, or (`SUBMODEL`) refer to the mesh of another model.
+/// Keywords that generate or move nodes or elements, and `SUBMODEL`, which refers to the mesh of another
+/// model.
 pub(super) const GENERATORS: [&str; 8] = [
     "NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM", "SUBMODEL",
 ];

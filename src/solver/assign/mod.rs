@@ -118,8 +118,8 @@ fn build(
     (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
-/// Return the volume correction factors of the cells of block `neighbours` in the families of points with
-/// this horizon (m).
+/// Return the volume correction factors for points with this horizon (m) whose neighbours are cells of block
+/// `neighbours`.
 fn volume_factors(problem: &Problem, neighbours: &Block, horizon: f64) -> VolumeFactors {
     // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
@@ -201,8 +201,8 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
-/// Return the damage law of bonds at an end with these constants, from the damage in the deck. `body` is the
-/// body of this end.
+/// Return the damage law at one end of bonds, from the damage in the deck. `body` and `constants` are the
+/// body and the constants of this end.
 fn damage_law(
     problem: &Problem,
     body: &Body,
@@ -274,8 +274,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
 }
 
 /// Failure criterion of the bonds between two blocks, from the damage of both blocks; see [`Criterion`]. A
-/// block without damage sets no threshold. `ends` are the indices of both blocks, and `of_ends` are the data
-/// of the ends of the bonds in these blocks. `per_point` says whether thresholds are stored per point.
+/// block without damage sets no threshold. `ends` are the indices of both blocks. `of_ends` has one entry per
+/// block: the data of the bonds' end in this block. `per_point` says whether thresholds are stored per point.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
@@ -358,8 +358,8 @@ fn criterion(
     }
 }
 
-/// Create an interaction from the bonds of each pair of blocks (`all`): the bonds with their weights, laws
-/// and failure criterion. `blocks` are the laws of all blocks.
+/// Create one interaction per pair of blocks. `all` contains the bonds of each pair. This function adds the
+/// weights, the laws and the failure criterion. `blocks` are the laws of all blocks.
 ///
 /// # Errors
 /// If there is not enough memory for the weights.
@@ -425,7 +425,8 @@ struct End {
     pair_damage: Option<DamageLaw>,
     /// Horizon, m.
     horizon: f64,
-    /// Volume correction factors of the other block's cells in the families of this end.
+    /// Volume correction factors for the neighbours of a point at this end; the neighbours are in the other
+    /// block.
     volume_factors: VolumeFactors,
 }
 

@@ -1,4 +1,4 @@
-//! Check which laws and which damage the bodies of a problem can have.
+//! Check that the bodies of a problem can have the laws and the damage from the deck.
 
 use super::{Breaks, breaks, build, constants, given};
 use crate::error::{Error, Result};
@@ -13,8 +13,8 @@ use crate::problem::{
 /// # Errors
 /// - If the law of a body does not support the dimension of the problem.
 /// - If the law does not support the damage, the thermal expansion or a horizon of the body.
-/// - If the damage of a body is incompatible with another setting, or with the damage of another body to
-///   which bonds may join this body.
+/// - If the damage of a body is incompatible with another setting.
+/// - If bonds may join two bodies, and the damage of one is incompatible with the damage of the other.
 /// - If the bonds of a pair of bodies cannot have the damage of the pair.
 ///
 /// Most of these errors are found earlier, when the deck is read.
@@ -135,7 +135,8 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
 /// - the law of the material has no potential (as with plasticity or softening);
 /// - the strain perpendicular to the plane or bar is 0.
 ///
-/// The inelastic strain then depends on the stress in this direction, which the law does not compute.
+/// The inelastic strain then depends on the stress perpendicular to the plane or bar. The law does not
+/// compute this stress.
 fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let (material, dimension) = (&body.material, problem.dimension);
     let law = &material.law;

@@ -1,5 +1,5 @@
-//! Displacements and thermal stretches of the owned points in the layout that bonds read, written range by
-//! range.
+//! Displacements and thermal stretches of the owned points, in the layout that bonds read. The values are
+//! written range by range.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use super::list_points::{self, Node};
 /// Write access to the bond inputs of a range of owned points. Different threads hold disjoint ranges.
 pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
-    /// List nodes of these points; empty if there is no list.
+    /// Nodes of these points, which bonds in lists read; empty if no bonds are stored in lists.
     nodes: &'a mut [Node],
     /// Write access to the slots of the owned points, one entry per grid.
     places: &'a [OwnedPlaces<'a, D>],
@@ -20,7 +20,7 @@ impl<const D: usize> BondInputs<'_, D> {
     /// Split off the bond inputs of the first `count` points.
     ///
     /// # Panics
-    /// If there are fewer points.
+    /// If there are fewer than `count` points.
     pub fn split_off_first(&mut self, count: usize) -> Self {
         let middle = self.points.start + count;
         assert!(middle <= self.points.end, "more points than there are");

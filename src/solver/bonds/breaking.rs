@@ -8,9 +8,9 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, ForceState, Law, PairLaw};
 use super::kernel::{Group, Kernel};
 use super::measures::wanted;
 
-/// Kernel that sums over breaking bonds, which the caller selects by [`Group::intact`]:
+/// Kernel that sums over breaking bonds. The caller marks these bonds in [`Group::intact`]. The sums are:
 ///
-/// - their number;
+/// - the number of these bonds;
 /// - the energy that they release at the point, J;
 /// - the part of this energy above the criterion, J;
 /// - their forces, N/m³.
@@ -22,7 +22,7 @@ pub struct BreakingBonds {
     pub laws: [AnyLaw; 2],
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether the weights of the bonds contain no volume correction, but only the influence function.
+    /// Whether the weights of the bonds contain only the influence function, without volume correction.
     pub no_volume_correction: bool,
 }
 
@@ -104,8 +104,8 @@ pub struct BrokenSums {
 /// Number of sums of [`BreakingBonds`] in three dimensions.
 pub const MAX_BROKEN_SUMS: usize = 6;
 
-/// The groups of eight bonds in which bonds break, of one row or lane group. An entry has the index of the
-/// group and the bits of the bonds that break.
+/// The groups of one row or lane group that contain breaking bonds. An entry has the index of a group of
+/// eight bonds, and the bits of its bonds that break.
 pub type BreakingBits = Vec<(usize, u8)>;
 
 /// Note the breaking bonds of a group. Out of line to save registers.
@@ -115,7 +115,7 @@ pub fn note_group(noted: &mut BreakingBits, group: usize, bits: u8) {
     noted.push((group, bits));
 }
 
-/// Return the sums of [`BreakingBonds`] in `D` dimensions, padded with zeros to the sums in three dimensions.
+/// Return the sums of [`BreakingBonds`] in `D` dimensions, padded with zeros to [`MAX_BROKEN_SUMS`] entries.
 #[inline(always)]
 pub fn padded<const D: usize>(
     sums: &<BreakingBonds as Kernel<D>>::Sums,

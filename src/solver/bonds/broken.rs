@@ -31,8 +31,8 @@ pub struct Broken<const D: usize> {
     /// Energy that the point loses, J: its part of the energy of the broken bonds, plus the decrease of its
     /// remaining energy.
     pub energy: f64,
-    /// The point's part of the overshoot energy of the broken bonds, J: the energy of a bond above its
-    /// criterion when it breaks.
+    /// The point's part of the overshoot energy of the broken bonds, J. The overshoot energy of a bond is its
+    /// energy above the criterion when it breaks.
     pub overshoot: f64,
     /// Force density that the point loses, N/m³: the forces of the broken bonds, plus the decrease of the sum
     /// of the forces of its other bonds.
@@ -65,8 +65,8 @@ impl<const D: usize> Broken<D> {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Return the changes that the bonds that broke in the last [evaluation](Self::evaluate) cause at their
-    /// points, in ascending order of the points.
+    /// Return the changes caused by bonds that broke in the last [evaluation](Self::evaluate). The entries
+    /// are in ascending order of their points.
     pub fn broken(&self) -> &[Broken<D>] {
         &self.broken
     }

@@ -26,8 +26,8 @@ use super::{Forces, Pass};
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Number of interior points per thread between two calls that advance the messages. In 3-D, the sums over
-/// the bonds of these points take a few tenths of a millisecond.
+/// Number of interior points that a thread processes between two calls that advance the messages. In 3-D, the
+/// sums over the bonds of these points take a few tenths of a millisecond.
 const PIECE: usize = 4096;
 
 /// Maximum number of columns of [`Forces::changing_columns`].
@@ -86,7 +86,7 @@ pub struct Acting<'a, const D: usize> {
 impl<const D: usize> Forces<D> {
     /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
     /// written the data of the owned points. `bond_update` says whether bonds break, and how the bond history
-    /// advances. Afterwards, [`Self::broken`] returns the changes by bonds that broke. Collective.
+    /// advances. Afterwards, [`Self::broken`] returns the changes that broken bonds have caused. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -376,8 +376,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Compute the thresholds, or the point numbers and rotations, of a range of points from the sums of a
-    /// pass.
+    /// Compute the results of a pass from its sums, for a range of points. Depending on the pass, the results
+    /// are the thresholds, or the point numbers and rotations.
     pub(super) fn finish(
         &mut self,
         pass: Pass,

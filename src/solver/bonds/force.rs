@@ -45,7 +45,7 @@ pub struct Force<L> {
     pub laws: [L; 2],
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether the weights of the bonds contain no volume correction, but only the influence function.
+    /// Whether the weights of the bonds contain only the influence function, without volume correction.
     pub no_volume_correction: bool,
     /// Changes of the bond state.
     pub bond_update: BondUpdate,
@@ -96,8 +96,8 @@ impl<L> Force<L> {
         group.work_of_ends(simd, &self.laws, weights)
     }
 
-    /// Time increment of the bond history that the evaluation computes, s; `None` if the evaluation computes
-    /// no history.
+    /// Time increment for computing the bond history, s; `None` if the evaluation does not compute the
+    /// history.
     #[inline(always)]
     fn history_step<const D: usize>(&self) -> Option<f64>
     where

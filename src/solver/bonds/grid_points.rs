@@ -26,8 +26,8 @@ pub struct GridValues<const D: usize> {
 }
 
 impl<const D: usize> GridValues<D> {
-    /// Create the values of a grid with zero displacements. Bonds read `numbers` point numbers, the limits in
-    /// `limits`, and thermal stretches if `is_thermal`.
+    /// Create the values of a grid with zero displacements. `numbers` is the number of point numbers that
+    /// bonds read. Bonds also read the limits in `limits`, and thermal stretches if `is_thermal` is true.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();
         let of_temperature = if is_thermal { count } else { 0 };
@@ -70,7 +70,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Copy the point numbers of the selected local points to their slots, from column `first` on.
+    /// Copy the columns of the point numbers, from column `first` on, to the slots of the selected points.
     pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);
@@ -312,9 +312,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// Load the bonds of a lane group at the offset with index `o`. `FAST_PATH` omits the data of the
-    /// criterion, the breakable bits, the thermal stretches, and the closed forms for |x| above
-    /// [`NEAR`](crate::material::bond::NEAR).
+    /// Load the bonds of a lane group at the offset with index `o`. With `FAST_PATH`, the data of the
+    /// criterion, the breakable bits and the thermal stretches are not loaded. The closed forms for |x| above
+    /// [`NEAR`](crate::material::bond::NEAR) are then not computed (x: see [`crate::material::bond`]).
     ///
     /// # Safety
     /// The lane group must belong to the grid, and `o` must be the index of an offset of the lattice.

@@ -15,7 +15,7 @@ pub struct Interaction {
     pub laws: PairLaw,
     /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether the weights of the bonds contain no volume correction, but only the influence function.
+    /// Whether the weights of the bonds contain only the influence function, without volume correction.
     pub no_volume_correction: bool,
 }
 
@@ -41,8 +41,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Point data that are read by the failure criteria of bonds between two bodies, for pairs of bodies with a
-/// separate damage law.
+/// Point data that the failure criteria of bonds between two bodies read. Only pairs of bodies with a
+/// separate damage law count.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.
@@ -51,7 +51,7 @@ pub struct PairReads {
     pub truncation_factors: bool,
     /// Whether these criteria read rotations.
     pub rotations: bool,
-    /// For each stress measure, in the order of [`StressMeasure::ALL`]: whether these criteria read it.
+    /// Whether these criteria read each stress measure, in the order of [`StressMeasure::ALL`].
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 

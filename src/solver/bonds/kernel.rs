@@ -1,7 +1,7 @@
 //! Sums over the bonds of points: forces, point numbers, energies.
 //!
-//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel serves both storages of
-//! bonds: the eight bonds belong to one point (lists) or to eight points (lattices).
+//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel is used for both ways of
+//! storing bonds. In a list, the eight bonds belong to one point; in a lattice, to eight points.
 
 use crate::damage::{Criterion, Ends, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
@@ -142,8 +142,8 @@ impl Combine {
 
 /// A sum over the bonds of points.
 pub trait Kernel<const D: usize>: Copy + Sync {
-    /// Sums, eight lanes per quantity. Each quantity has a column over the points. [`Self::COMBINE`] combines
-    /// the sums with this column.
+    /// Sums, eight lanes per quantity. Each quantity has a column with one entry per point. [`Self::COMBINE`]
+    /// combines each sum with the column of its quantity.
     type Sums: LaneTuple;
 
     /// Point numbers of points i that the kernel reads.
@@ -166,7 +166,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// [`sweep_and_break`](super::sweep::sweep_and_break).
     const BREAKS: bool = false;
 
-    /// Operation that combines the sums with the columns, and the lanes of a sum if they belong to one point.
+    /// Operation that combines each sum with its column. If the lanes of a sum belong to one point, the
+    /// operation first combines these lanes.
     const COMBINE: Combine = Combine::Add;
 
     /// Instruction sets for which the kernel's loops are compiled. The default, one version, is enough for
@@ -183,7 +184,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether the kernel's criterion can read stresses of points i and j.
     const READS_STRESSES: bool = false;
 
-    /// Quantities of the deformed bonds to compute.
+    /// Quantities that are computed for the deformed bonds.
     const WANTED: Wanted;
 
     /// Whether the law is known only at run time. The compiler then does not know whether the law is linear.
@@ -206,14 +207,14 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         wanted
     }
 
-    /// Whether sums depend only on reference positions and intact bits. The sums of a lattice are then cached
-    /// per bit pattern. Such a kernel must not break or change bonds.
+    /// Whether sums depend only on reference positions and intact bits. The sums over the bonds of a lattice
+    /// are then cached for each pattern of intact bits. Such a kernel must not break or change bonds.
     #[inline(always)]
     fn is_undeformed(&self) -> bool {
         false
     }
 
-    /// Whether the law receives bonds without their thermal stretch.
+    /// Whether the thermal stretch is removed from the bonds before the law reads them.
     #[inline(always)]
     fn is_elastic(&self) -> bool {
         true

@@ -59,7 +59,7 @@ pub struct LimitColumns {
 
 impl LimitColumns {
     /// Allocate the columns that `read` selects, with `count` entries each. `number` is the index of the
-    /// first of these columns among all columns that a loop reads, see [`Column`].
+    /// thresholds among all columns that a loop reads, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
@@ -75,7 +75,7 @@ impl LimitColumns {
         }
     }
 
-    /// Iterate over the columns of rotations and stress measures that are stored.
+    /// Iterate over the stored columns of rotations and stress measures.
     pub fn kept_changing(&mut self) -> impl Iterator<Item = &mut Column> {
         let columns = self.rotations.iter_mut().chain(&mut self.stresses);
         columns.filter(|column| !column.is_empty())
@@ -102,7 +102,7 @@ pub struct ReadLimits<'a> {
 }
 
 impl<'a> ReadLimits<'a> {
-    /// Prepare the columns for a criterion. Bonds read the entries below `reach`.
+    /// Prepare the columns for a criterion. Only entries with an index below `reach` are read.
     ///
     /// # Panics
     /// If a column that the criterion reads has fewer entries than `reach`.
@@ -129,9 +129,9 @@ impl<'a> ReadLimits<'a> {
         }
     }
 
-    /// Load the limits of eight points. `take` is called only for columns whose length was checked. Stresses
-    /// are loaded only if `may_read_stresses`. This argument is a constant, so the compiler removes the
-    /// branch.
+    /// Load the limits of eight points. `take` loads their entries of a column. It is called only for columns
+    /// whose length [`Self::new`] has checked. Stresses are loaded only if `may_read_stresses`. This argument
+    /// is a constant, so the compiler removes the branch.
     #[inline(always)]
     pub fn eight(&self, may_read_stresses: bool, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();
@@ -159,7 +159,8 @@ pub struct ReadRotations<'a, R: LaneTuple> {
 }
 
 impl<'a, R: LaneTuple> ReadRotations<'a, R> {
-    /// Prepare the rotations for a criterion, in `D` dimensions. Bonds read the entries below `reach`.
+    /// Prepare the rotations for a criterion, in `D` dimensions. Only entries with an index below `reach` are
+    /// read.
     ///
     /// # Panics
     /// If a column that the criterion reads has fewer entries than `reach`.
@@ -184,7 +185,8 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         Self { columns, is_read }
     }
 
-    /// Load the rotations of eight points. `take` is called only for columns whose length was checked.
+    /// Load the rotations of eight points. `take` loads their entries of a column. It is called only for
+    /// columns whose length [`Self::new`] has checked.
     #[inline(always)]
     pub fn eight<const D: usize>(&self, take: impl Fn(&[f64]) -> Lanes) -> R {
         if !self.is_read {

@@ -1,4 +1,4 @@
-//! Point data of list families that kernels read: the geometry of a point fills one cache line.
+//! Point data that kernels read for bonds in lists. The [`Node`] of a point fills one cache line.
 
 use crate::damage::Limits;
 use crate::families::{Groups, Row};
@@ -260,8 +260,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 }
 
-/// Load the history of the bonds of a group for point i and for point j. If `H` has fewer numbers than are
-/// stored per end, only the history of point i is valid, unless [`LaneTuple::PADDED`].
+/// Load the history of the bonds of a group for point i and for point j. Without [`LaneTuple::PADDED`], the
+/// history of point j is valid only if `H` has as many numbers as are stored per end.
 #[inline(always)]
 pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 2] {
     if H::COUNT == 0 {

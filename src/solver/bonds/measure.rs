@@ -1,4 +1,4 @@
-//! Quantities of the bonds for set-up and output, by column over the owned points.
+//! Quantities of the owned points for set-up and output, computed from their bonds.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ use super::kernel::Kernel;
 use super::measures;
 use super::sweep::{PointData, sweep, sweep_from};
 
-/// Sums over the bonds of the owned points, by column.
+/// Sums over the bonds of each owned point, one column per sum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BondSums {
     /// Strain energy density W, J/m³; empty if energies were not requested.
@@ -128,8 +128,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(of_point).collect()
     }
 
-    /// Sum the tensor D of each owned point (N/m⁴), see `measures::Stiffness`: columns xx, yy, zz, xy, yz,
-    /// xz.
+    /// Sum the tensor D of each owned point (N/m⁴), which `measures::Stiffness` defines. The columns are xx,
+    /// yy, zz, xy, yz, xz.
     pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let laws = interaction.laws.laws();
@@ -139,8 +139,8 @@ impl<const D: usize> Forces<D> {
         columns.try_into().expect("six columns")
     }
 
-    /// Kirchhoff stress of each owned point (Pa), columns xx, yy, zz, xy, yz, xz, at the displacements of the
-    /// last [evaluation](Self::evaluate).
+    /// Compute the Kirchhoff stress of each owned point (Pa) at the displacements of the last
+    /// [evaluation](Self::evaluate). The columns are xx, yy, zz, xy, yz, xz.
     pub fn stress(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let [law, _] = interaction.laws.laws();
@@ -150,9 +150,10 @@ impl<const D: usize> Forces<D> {
         columns.try_into().expect("six columns")
     }
 
-    /// Out-of-plane Kirchhoff stress of each owned point (Pa) in plane strain, at the displacements of the
-    /// last [evaluation](Self::evaluate) and the plastic state of each point; see
-    /// [`Law::out_of_plane_stress`]. `None` for a point whose law does not compute this stress.
+    /// Compute the out-of-plane Kirchhoff stress of each owned point (Pa) in plane strain, see
+    /// [`Law::out_of_plane_stress`]. The displacements are those of the last [evaluation](Self::evaluate).
+    /// `plastic` returns the plastic state of a point. The result is `None` for a point whose law does not
+    /// compute this stress.
     pub fn out_of_plane_stress(
         &mut self,
         model: &Model<D>,
@@ -193,9 +194,9 @@ impl<const D: usize> Forces<D> {
         Law::<D>::out_of_plane_stretch(law, &gradient, plastic)
     }
 
-    /// Deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
-    /// displacements of the last [evaluation](Self::evaluate). F is I if the point is
-    /// [singular](Self::singular) or its shape tensor is nearly singular.
+    /// Compute the deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point at the displacements of
+    /// the last [evaluation](Self::evaluate). The sum and the shape tensor K contain only the intact bonds. F
+    /// is I if the point is [singular](Self::singular) or its shape tensor is nearly singular.
     pub fn deformation_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
         self.gradient(model, false)
     }
@@ -242,8 +243,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// Rate of change of the strain energy density of each owned point, if every point moves with its `rate`:
-    /// Σ T·(v_j − v_i) Ṽ over the intact bonds, with the force states T of the last
+    /// Compute the rate of change of the strain energy density of each owned point if every point moves with
+    /// its rate v. The result is Σ T·(v_j − v_i) Ṽ over the intact bonds. T are the force states of the last
     /// [evaluation](Self::evaluate). `rate` contains the components of v at the local points, including
     /// ghosts. The unit of the result is J/m⁴ times the unit of v.
     pub fn energy_rate(&mut self, owned: usize, rate: [Column; D]) -> Vec<f64> {

@@ -136,10 +136,10 @@ fn add_tensor<S: Simd, const D: usize>(
     }
 }
 
-/// Kernel that sums D = Σ V_j C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
-/// zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both ends. An end whose law
-/// [resists displacements across](Law::resists_across) the bonds contributes its part of C times the identity
-/// I instead of n⊗n.
+/// Kernel that sums the tensor D = Σ V_j C n⊗n (N/m⁴) over the intact bonds in the reference configuration.
+/// The sums are xx, yy, zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both
+/// ends. If the law of an end [resists displacements across](Law::resists_across) the bonds, the part of this
+/// end in C is multiplied by the identity I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -282,9 +282,9 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     }
 }
 
-/// Kernel that sums the rate of change of the strain energy density, Σ T·(v_j − v_i) Ṽ over the intact bonds,
-/// if every point moves with its rate v. The first point numbers are the components of v. The unit of the sum
-/// is J/m⁴ times the unit of v.
+/// Kernel that sums Σ T·(v_j − v_i) Ṽ over the intact bonds. This is the rate of change of the strain energy
+/// density if every point moves with its rate v. The first point numbers are the components of v. The unit of
+/// the sum is J/m⁴ times the unit of v.
 #[derive(Clone, Copy)]
 pub struct EnergyRate {
     /// Law of point i.

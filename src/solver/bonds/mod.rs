@@ -70,8 +70,8 @@ enum Pass {
     /// Smallest stretch of the intact bonds of each point; the threshold of the point follows from this
     /// stretch.
     SmallestStretch,
-    /// The sums from which laws compute point numbers, by index of the pass, see [`Law::PASSES`]. Laws with
-    /// fewer passes are skipped.
+    /// The sums of the law's pass with this index, see [`Law::PASSES`]. Laws compute point numbers from these
+    /// sums. Laws with fewer passes are skipped.
     PointSum(usize),
     /// The forces.
     Force,
@@ -140,7 +140,7 @@ pub struct Forces<const D: usize> {
     breaks: bool,
     /// Whether points have thermal stretches; the same on all ranks.
     is_thermal: bool,
-    /// Changes that broken bonds caused in the last evaluation, by point.
+    /// Changes that broken bonds caused at points in the last evaluation, in ascending order of the points.
     broken: Vec<Broken<D>>,
 }
 

@@ -38,7 +38,7 @@ pub struct PointNumbers {
     pub first_changing: usize,
     /// Number of point sums before the force sum.
     pub passes: usize,
-    /// Whether any law has constants: point numbers that do not change, [`Law::CONSTANTS`].
+    /// Whether any law has constants, which are point numbers that do not change; see [`Law::CONSTANTS`].
     pub with_constants: bool,
     /// Sums of a pass over the bonds, by column.
     pub sums: Vec<Column>,
@@ -125,7 +125,7 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Compute the rotations of a range of owned points, by column, from the sums of the first pass.
+    /// Compute the rotations of a range of owned points, by column, from the sums of the law's first pass.
     /// Components with empty columns are skipped.
     pub fn find_rotations<const D: usize>(
         &self,
@@ -214,8 +214,8 @@ impl PointNumbers {
     }
 }
 
-/// Split the points and their columns recursively, and call `work` with each piece on all threads. Columns
-/// may be empty.
+/// Split the points and their columns recursively into pieces. Call `work` for each piece, in parallel.
+/// Columns may be empty.
 pub(super) fn over_points<const N: usize>(
     points: Range<usize>,
     mut columns: [&mut [f64]; N],

@@ -11,7 +11,7 @@ use crate::solver::model::Model;
 use super::interaction::BlockLaws;
 use super::point_numbers::{PlasticColumns, PointNumbers, over_points};
 
-/// Inputs of the stress measures, in addition to the sums of the first pass.
+/// Inputs of the stress measures, in addition to the sums of the law's first pass.
 pub struct StressInputs<'a, 'b, const D: usize> {
     /// Model of the points, which gives the block of each point.
     pub model: &'a Model<D>,
@@ -24,8 +24,8 @@ pub struct StressInputs<'a, 'b, const D: usize> {
 }
 
 impl PointNumbers {
-    /// Compute the stress measures of the owned points (Pa) from the sums of the first pass; −∞ for points
-    /// that carry no stress. Measures with empty columns are skipped.
+    /// Compute the stress measures of the owned points (Pa) from the sums of the law's first pass; −∞ for
+    /// points that carry no stress. Measures with empty columns are skipped.
     pub fn find_stresses<const D: usize>(
         &self,
         read: &StressInputs<'_, '_, D>,

@@ -7,8 +7,8 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Request the relative change of the squared length of the bonds ([`crate::material::bond`]), but neither
-/// their stretch nor their extension over the deformed length.
+/// Request only x of the bonds, see [`crate::material::bond`]. The stretch and the extension over the
+/// deformed length are not requested.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,

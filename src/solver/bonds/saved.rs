@@ -9,7 +9,7 @@ use super::Forces;
 pub struct KeptBonds(Vec<(Vec<u8>, Vec<Lanes>)>);
 
 impl<const D: usize> Forces<D> {
-    /// Number of bytes in a checkpoint for the bonds of each owned point.
+    /// Number of bytes that the bonds of each owned point need in a checkpoint.
     pub fn saved_lengths(&self, owned: usize) -> Vec<u32> {
         let mut lengths = vec![0; owned];
         for interaction in &self.interactions {

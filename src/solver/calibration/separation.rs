@@ -23,15 +23,15 @@ const START: f64 = 0.02;
 /// Maximum number of steps; blocks need far fewer steps to separate.
 const MAX_STEPS: u32 = 1500;
 
-/// Relative tolerance of the cutoff. With this tolerance, the number of cells within the cutoff is correct
-/// also if the cutoff is a multiple of the spacing, up to round-off.
+/// Relative tolerance of the cutoff. If the cutoff is a multiple of the spacing, round-off could change the
+/// number of cells within the cutoff. The tolerance prevents this.
 const SLACK: f64 = 1e-9;
 
 /// Steps between checks of the bonds across the plane.
 const CHECK_INTERVAL: u32 = 20;
 
-/// Compute the separation energy of a body per area, divided by the fracture energy. The upper half of the
-/// block moves at an angle (rad) to the normal of the plane.
+/// Compute the ratio of the separation energy per area to the fracture energy of a body. The upper half of
+/// the block moves at an angle (rad) to the normal of the plane.
 ///
 /// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
@@ -123,7 +123,7 @@ struct Separation {
     angle: f64,
     /// Separation at the first step, m.
     start: f64,
-    /// Half the edges of a cell, m.
+    /// Half the edge lengths of a cell, one per axis, m.
     half_cell: [f64; 3],
     /// Height of the block, m.
     height: f64,

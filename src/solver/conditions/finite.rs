@@ -82,7 +82,7 @@ pub fn are_finite<const D: usize>(
     Ok(())
 }
 
-/// Data for the checks of the conditions and initial values. Each call checks one entry of the deck.
+/// Data for the checks of the conditions and initial values. Each method call checks one entry of the deck.
 struct FiniteCheck<'a, const D: usize> {
     problem: &'a Problem,
     comm: &'a dyn Communicator,

@@ -92,9 +92,9 @@ fn apply_file<const D: usize>(
     Ok(())
 }
 
-/// Read displacement and velocity of the owned points from a file, 2 D values per point; NaN for points
-/// without a row. Each rank reads a part of the rows, and sends each row to the rank whose range of ids
-/// contains the id of the row. Collective.
+/// Read displacement and velocity of the owned points from a file. Return `2 * D` values per point, NaN for
+/// points without a row. Each rank reads a part of the rows, and sends each row to the rank whose range of
+/// ids contains the id of the row. Collective.
 fn values_of_owned<const D: usize>(
     file: &InitialFile,
     comm: &dyn Communicator,

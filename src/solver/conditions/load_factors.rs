@@ -59,8 +59,8 @@ impl LoadFactors {
         self.present.copy_from_slice(&self.requested);
     }
 
-    /// Record the factors of the current step as the factors at the last equilibrium, at the end of a load
-    /// step.
+    /// Record the factors of the current step as the factors at the last equilibrium. Call at the end of a
+    /// load step.
     pub fn record_equilibrium(&mut self) {
         self.at_equilibrium.copy_from_slice(&self.present);
     }
@@ -98,7 +98,7 @@ impl LoadFactors {
         3 * self.requested.len()
     }
 
-    /// Decode the factors of `conditions` conditions from [`Self::words`].
+    /// Decode the factors from [`Self::words`]. `conditions` is the number of conditions.
     pub fn of_words(words: &[u64], conditions: usize) -> Self {
         if words.is_empty() {
             return Self::new(conditions);

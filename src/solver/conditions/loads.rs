@@ -15,12 +15,12 @@ pub struct Load<const D: usize> {
     /// Factor that an observer has set, see `LoadFactors`.
     scale: f64,
     now: [At; D],
-    /// Whether the force density must be computed: it may have changed, or the caller has requested all
-    /// loads.
+    /// Whether the force density must be computed, because it may have changed or because the caller has
+    /// requested all loads.
     pub is_due: bool,
 }
 
-/// The points of a [`Part`] on which a load acts.
+/// The loaded points of a [`Part`], for one load.
 pub struct Loaded<const D: usize> {
     /// Index of the load among the loads of the stage.
     load: usize,
@@ -78,7 +78,7 @@ impl<const D: usize> Load<D> {
 }
 
 impl<const D: usize> Loaded<D> {
-    /// Create the entry for the load with index `load` and the points with these indices in the part.
+    /// Create the loaded points of the load with index `load`. `points` are their indices in the part.
     pub fn new(
         load: usize,
         points: Vec<u16>,

@@ -45,14 +45,14 @@ pub struct OnPart<const D: usize> {
     heated: Vec<Heated>,
 }
 
-/// Formula of the work of loads and supports from a stored state 0 to the present state.
+/// Formula for the work that loads and supports do from a stored state 0 to the present state.
 ///
 /// f is the force density of a load or a reaction, u is the displacement, and V is the volume of a point. A
 /// load step in which bonds break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work
 /// is
 /// ½ (f₀ + f₁)·(u₁ − u₀) V.
-/// From 1 to 2, supports do not move, and the force density of loads remains f₁. Only u₀ is stored, so the
-/// work of loads is computed as
+/// From 1 to 2, supports do not move, and the force density of loads remains f₁. The displacement u₁ is not
+/// stored, so the work of loads from 0 to 2 is computed as
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
@@ -124,8 +124,9 @@ fn body_of<'p, const D: usize>(problem: &'p Problem, model: &Model<D>, point: u3
     problem.block(usize::from(model.block[point as usize])).body
 }
 
-/// For a load on a layer whose thickness is the spacing, return an input error if a loaded point on any rank
-/// belongs to a body without a [single spacing](Body::single_spacing). Collective.
+/// Check a load on a layer whose thickness is the spacing. Return an input error if a loaded point on any
+/// rank belongs to a body without a [single spacing](Body::single_spacing). Do nothing for other loads.
+/// Collective.
 fn have_depths<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -205,9 +206,9 @@ pub fn not_empty(
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Find the points of the conditions that act in a stage. `begins` has for each condition the time at
-    /// which it begins to act (s); `None` if it does not act in this stage. If two supports prescribe the
-    /// same component of a point, the later support applies. Collective.
+    /// Find the points of the conditions that act in a stage. For each condition, `begins` contains the time
+    /// (s) at which the condition begins to act; `None` if the condition does not act in this stage. If two
+    /// supports prescribe the same component of a point, the later support applies. Collective.
     ///
     /// # Errors
     /// - If a set is empty.
@@ -299,8 +300,8 @@ impl<const D: usize> Conditions<D> {
         Ok(conditions)
     }
 
-    /// Add a load on `points`, ascending local indices of owned points. The load acts on the fraction
-    /// `fractions[k]` of the point `points[k]`; `None` if all fractions are 1.
+    /// Add a load on `points`, which are local indices of owned points in ascending order. The load acts on
+    /// the fraction `fractions[k]` of the point `points[k]`. `fractions` is `None` if all fractions are 1.
     fn add_load(
         &mut self,
         model: &Model<D>,
@@ -352,13 +353,13 @@ impl<const D: usize> Conditions<D> {
         self.temperatures.set_time(time);
     }
 
-    /// Make the next [`Self::set_temperatures`] and [`PartConditions::apply_temperatures`] set all
-    /// temperatures.
+    /// Make [`PartConditions::apply_temperatures`] set all temperatures after the next call of
+    /// [`Self::set_temperatures`].
     pub fn reset_temperatures(&mut self) {
         self.temperatures.reset();
     }
 
-    /// Split into the conditions, and the points on which they act in each part.
+    /// Return the conditions of the stage, and for each part the points on which these conditions act.
     pub fn by_part(&mut self) -> (StageConditions<'_, D>, &mut [OnPart<D>]) {
         let stage = StageConditions {
             loads: &self.loads,
@@ -368,8 +369,8 @@ impl<const D: usize> Conditions<D> {
         (stage, &mut self.on_parts)
     }
 
-    /// Return a column per component over `local` points. Entries are 0 at owned points whose component a
-    /// support prescribes, otherwise 1.
+    /// Return a column per component, with an entry for each of the `local` points. The entry of an owned
+    /// point is 0 if a support prescribes this component of the point. All other entries are 1.
     pub fn free_components(&self, local: usize) -> [Vec<f64>; D] {
         let mut free = std::array::from_fn(|_| vec![1.0; local]);
         for (number, part) in self.on_parts.iter().enumerate() {
@@ -402,10 +403,10 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// For each condition with loads in this stage, sum `weight(point, force)` over those of `points` on
-    /// which the loads act. `points` are sorted local indices of owned points. The arguments of `weight` are
-    /// the local index of a point and the force of a load on this point (N). Returns the indices of the
-    /// conditions, and the sums of this rank.
+    /// For each condition with loads in this stage, sum `weight(point, force)` over the loads and the points
+    /// on which they act. Only points in `points` count. `points` are sorted local indices of owned points.
+    /// The arguments of `weight` are the local index of a point and the force of a load on this point (N).
+    /// Returns the indices of the conditions, and the sums of this rank.
     pub fn load_sums(
         &self,
         model: &Model<D>,
@@ -433,10 +434,10 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step (s)
-    /// in addition to the counted work. The trapezoidal rule, which integrates the work, misses this energy.
-    /// A load contributes the energy that it gives to points at rest in one step. A supported component
-    /// contributes the energy of its velocity, and the energy that its prescribed acceleration gives to a
-    /// point at rest in one step.
+    /// beyond the counted work. The work is integrated by the trapezoidal rule, which misses this energy. A
+    /// load contributes the energy that points initially at rest gain from the load in one step. A supported
+    /// component contributes the energy of its velocity. It also contributes the energy that a point
+    /// initially at rest gains from the prescribed acceleration in one step.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density on a point jumps
     /// from 0 to f, the energy ½ ρ u̇² jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow

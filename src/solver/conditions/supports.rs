@@ -97,8 +97,8 @@ impl Support {
         };
     }
 
-    /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. The point is at a position
-    /// (m), and the step (s) begins at a time (s).
+    /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. `position` is the reference
+    /// position of the point (m). The step begins at `time` (s) and has the length `step` (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
         // For times before the support begins, a displacement is extrapolated linearly, and a velocity is
         // constant. If the change in the next step is not finite, as for √(1 − t) at t = 1, the change of the

@@ -29,7 +29,7 @@ impl Values {
         }
     }
 
-    /// Prepare the values at a time (s). A value that is the same for all points is computed here.
+    /// Prepare the values at a time (s). If the value is the same for all points, this call computes it.
     pub fn at(&self, time: f64) -> At {
         let same = || self.expression.evaluate([0.0; 3], time);
         At {

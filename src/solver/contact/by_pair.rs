@@ -29,14 +29,15 @@ pub struct Touching {
     pub count: u64,
     /// The largest overlap, m.
     pub overlap: f64,
-    /// Force on the first of the two bodies by component, N; 0 in [`ContactNow::all`] and for a body with
-    /// itself. Friction and damping are computed from the velocities at the full step.
+    /// Force on the first of the two bodies by component, N. The force is 0 in [`ContactNow::all`] and for
+    /// the contact of a body with itself. Friction and damping are computed from the velocities at the full
+    /// step.
     pub force: Vec<f64>,
 }
 
 /// Sums over the contacts of a pair of bodies on one rank.
 struct PairSum<const D: usize> {
-    /// Number of contacts of owned points. A pair of points counts twice over all ranks.
+    /// Number of contacts of owned points. The sum over all ranks counts each pair of points twice.
     count: u64,
     overlap: f64,
     force: [ExactSum; D],

@@ -35,8 +35,8 @@ pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item 
 pub(super) struct Cells {
     edge: f64,
     dimension: usize,
-    /// Index in `entries` of the first point of each bucket, followed by the number of points. A bucket
-    /// contains the points of all cells whose hashes have the same lowest bits.
+    /// Index in `entries` of the first point of each bucket; the last element is the number of points. A
+    /// bucket contains the points of all cells whose hashes have the same lowest bits.
     starts: Vec<u32>,
     /// Cell and index of each point.
     entries: Vec<(Cell, u32)>,

@@ -2,8 +2,8 @@
 //! ghosts of the bonds, because contact depends on present positions.
 //!
 //! Points of any two ranks can touch each other. Each cell of present positions has a home rank, given by the
-//! hash of the cell. The home rank informs every rank with points in the cell about the other ranks with
-//! points in this cell or in an adjacent one.
+//! hash of the cell. Each rank with points in the cell receives a list from the home rank: the other ranks
+//! that have points in this cell or in an adjacent cell.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -5,7 +5,7 @@
 //! distance is below its contact distance. The lists contain the pairs whose gap (present distance minus
 //! contact distance) is at most the skin. The lists are rebuilt when a point has moved so far that other
 //! pairs may soon touch. The contact distance never exceeds the reference distance, so an undeformed body has
-//! no contact forces. Crack faces consist of points whose bonds have broken.
+//! no contact forces. Points on opposite crack faces can touch, because the bonds between them have broken.
 //!
 //! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so the states of
 //! the bodies are the same on all ranks.
@@ -59,7 +59,7 @@ const LOOK_AHEAD: f64 = 2.0;
 /// Contact on one rank.
 pub struct Contact<const D: usize> {
     dimension: Dimension,
-    /// Rule of each pair of blocks in both orders, row-major; `None` for pairs without contact.
+    /// Contact rule of each ordered pair of blocks, row-major; `None` for pairs without contact.
     rules: Vec<Option<PairRule>>,
     /// Number of blocks.
     blocks: usize,
@@ -69,13 +69,13 @@ pub struct Contact<const D: usize> {
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
-    /// Two lists, found at the last evaluation and at the evaluation before it: the owned points that touched
-    /// a rigid body or were going to touch one within the look-ahead.
+    /// The owned points that touched a rigid body or were going to touch one within the look-ahead. The first
+    /// list is from the last evaluation, and the second list is from the evaluation before it.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
     /// Owned points that may touch another point to which no intact bond joins them.
     open: Vec<u32>,
-    /// Whether `open` contains each owned point.
+    /// For each owned point, whether `open` contains the point.
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
@@ -96,8 +96,8 @@ pub struct Contact<const D: usize> {
 /// Settings of a contact force evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactEvaluation {
-    /// Whether the evaluation is part of a relaxation or static solution. Velocities are then 0, and in a
-    /// relaxation contact adds to the fictitious density.
+    /// Whether the evaluation is part of a relaxation or static solution. Velocities are then 0. In a
+    /// relaxation, contact also adds to the fictitious density.
     pub is_quasi_static: bool,
     /// Data of the step, if a step ends with this evaluation or a load step has reached equilibrium;
     /// otherwise `None`.
@@ -237,9 +237,9 @@ impl<const D: usize> Contact<D> {
 
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
     /// friction and damping from the velocities in the middle of the step, and record the energy that they
-    /// dissipate. Also apply the second half kick of rigid bodies. An evaluation that does not end a step
-    /// does not change friction and damping. If points can touch each other and a position is not finite,
-    /// nothing is added. Collective.
+    /// dissipate. At the end of a step, also apply the second half kick of rigid bodies. An evaluation that
+    /// does not end a step does not change friction and damping. If points can touch each other and a
+    /// position is not finite, nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
@@ -388,7 +388,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Return the block and the data of a point, given its index: owned points first, then ghosts.
+    /// Return the block and the data of the point with this index. Ghosts are numbered after the owned
+    /// points.
     fn point(
         &self,
         model: &Model<D>,

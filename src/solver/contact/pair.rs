@@ -13,8 +13,7 @@ const SHORT_RANGE: f64 = 1.35;
 /// Upper limit of the contact distance of short-range forces, as a fraction of the reference distance.
 const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
 
-/// Ratio of the stiffness of short-range forces to the stiffness of the bonds of a bond-based law (Macek &
-/// Silling 2007).
+/// Stiffness of short-range forces, divided by the bond stiffness of a bond-based law (Macek & Silling 2007).
 const SHORT_RANGE_STIFFNESS: f64 = 15.0;
 
 /// Damping ratio of the tangential motion of a contact that sticks by friction.
@@ -27,8 +26,8 @@ pub(super) struct PairRule {
     /// both points.
     radius: Option<f64>,
     edge_share: f64,
-    /// Upper limit of the contact distance as a fraction of the reference distance, so no force acts in the
-    /// reference positions.
+    /// Upper limit of the contact distance, as a fraction of the reference distance. With this limit, no
+    /// force acts in the reference positions.
     reference_share: f64,
     stiffness: Stiffness,
     response: Response,
@@ -46,10 +45,10 @@ pub(super) struct Response {
 /// The stiffness of a pair of points, N/m.
 #[derive(Debug, Clone, Copy)]
 enum Stiffness {
-    /// Factor (N/m^D) of ℓ^(D − 1), where ℓ is the mean edge (m) of both points: the stiffness of a layer of
-    /// material between the points.
+    /// Stiffness of a layer of material between the points: this factor (N/m^D) times ℓ^(D − 1), where ℓ is
+    /// the mean edge (m) of both points.
     OfLayer(f64),
-    /// Factor (N/m⁷) of the product of the volumes of both points.
+    /// This factor (N/m⁷) times the product of the volumes of both points.
     OfVolumes(f64),
 }
 
@@ -310,8 +309,8 @@ fn damping_ratio(restitution: f64) -> f64 {
     low
 }
 
-/// Coefficient of restitution of a damped linear spring that never pulls, for its damping ratio (Schwager &
-/// Pöschel 2007, eq. 19 to 21).
+/// Coefficient of restitution of a damped linear spring that never pulls, as a function of its damping ratio
+/// (Schwager & Pöschel 2007, eq. 19 to 21).
 fn restitution_of(ratio: f64) -> f64 {
     let root = (1.0 - ratio * ratio).abs().sqrt();
     if root < 1e-8 {

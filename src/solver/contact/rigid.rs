@@ -62,8 +62,8 @@ pub(super) struct RigidBody {
     /// Inertia tensor in the body's axes (kg m²), and its inverse.
     inertia: [Matrix3<f64>; 2],
     response: Response,
-    /// Stiffness of the contact layer by block: modulus times out-of-plane measure, divided by the
-    /// depth of the layer (N/m³ in 3-D).
+    /// Stiffness of the contact layer by block: modulus times out-of-plane measure, divided by the thickness
+    /// of the layer (N/m³ in 3-D).
     layers: Vec<f64>,
 }
 
@@ -335,9 +335,9 @@ impl RigidBody {
     }
 
     /// Contribution of a point to the step limits. The result is `None` if the point does not touch the body
-    /// and will not touch the body within a time (s) at its present approach speed. The gap is the distance
-    /// of the point from the surface minus half the edge of the point's cell. If the gap exceeds the edge,
-    /// the result is `None` at any velocity.
+    /// and will not touch the body within a time (s) at its present approach speed. At any velocity, the
+    /// result is also `None` if the gap exceeds the edge of the point's cell. The gap is the distance of the
+    /// point from the surface minus half this edge.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -378,8 +378,8 @@ impl RigidBody {
         Vector3::from(self.state.velocity) + spin.cross(&arm)
     }
 
-    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre, with the mass m
-    /// of the body and its moment of inertia I about any axis; 0 for a driven body.
+    /// Upper bound of 1/m + r²/I (1/kg) for contacts within a distance r (m) of the centre; 0 for a driven
+    /// body. m is the mass of the body, and I is its moment of inertia about any axis.
     pub fn mobility(&self, reach: f64) -> f64 {
         if self.mass == 0.0 {
             return 0.0;
@@ -409,7 +409,7 @@ impl RigidBody {
     }
 }
 
-/// Return `rotation`, followed by a rotation with an angular velocity (1/s) over a time (s).
+/// Append to `rotation` a rotation with an angular velocity (1/s) over a time (s), and return the result.
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
     // The result is (1 + ½ Δt w) q with the angular velocity w and the quaternion q of `rotation`. The

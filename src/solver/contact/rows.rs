@@ -9,9 +9,9 @@ const CHUNK: usize = 1024;
 /// ascending order of ids.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    /// Index of the first pair of each owned point, followed by the number of pairs.
+    /// Index of the first pair of each owned point; the last element is the number of pairs.
     starts: Vec<usize>,
-    /// Index of the other point of each pair: owned points first, then ghosts.
+    /// Index of the other point of each pair. Ghosts are numbered after the owned points.
     others: Vec<u32>,
     /// Id of the other point of each pair.
     ids: Vec<u64>,
@@ -23,7 +23,7 @@ pub(super) struct Rows {
 pub(super) struct FoundPair {
     /// Id of the other point.
     pub id: u64,
-    /// Index of the other point: owned points first, then ghosts.
+    /// Index of the other point. Ghosts are numbered after the owned points.
     pub other: u32,
 }
 
@@ -100,8 +100,8 @@ impl Rows {
         self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
     }
 
-    /// Copy the bonded flags of the pairs that earlier rows of the same points contain. Return the points
-    /// with pairs that the earlier rows do not contain.
+    /// Copy the bonded flags of all pairs that are also in `earlier`, the earlier rows of the same points.
+    /// Return the points that have a pair which is not in `earlier`.
     pub fn inherit(&mut self, earlier: &Self) -> Vec<usize> {
         let mut new = Vec::new();
         for point in 0..self.starts.len() - 1 {

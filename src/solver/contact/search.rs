@@ -27,8 +27,8 @@ const MOVED: f64 = 0.5 * (SKIN - MOST_GAP);
 
 impl<const D: usize> Contact<D> {
     /// Repeat the search if the lists are stale or if a point has moved by more than [`MOVED`] since the last
-    /// search. Returns whether all positions on all ranks are finite; otherwise the search is not
-    /// repeated. Collective.
+    /// search. Returns whether all positions on all ranks are finite. If a position is not finite, the search
+    /// is not repeated. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,

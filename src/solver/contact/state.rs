@@ -18,8 +18,8 @@ const CALM: u64 = 100;
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
-    /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to the
-    /// squares of the angular frequencies.
+    /// Largest 2 Σ k/m of a point or rigid body, 1/s². Contact adds at most this value to the square of an
+    /// angular frequency.
     pub stiffness: f64,
     /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
@@ -115,16 +115,16 @@ impl<const D: usize> Contact<D> {
 
     /// Stable step (s) with contact; `step` is the stable step without contact.
     ///
-    /// With damping from the velocities half a step earlier, Δt² ω² + 2 Δt C/m < 4 is stable. Here ω² is the
-    /// sum of 4/`step`² and `StepDemand::stiffness`, and C/m is `StepDemand::damping`.
+    /// With damping from the velocities half a step earlier, the step Δt is stable if Δt² ω² + 2 Δt C/m < 4.
+    /// Here ω² is the sum of 4/`step`² and `StepDemand::stiffness`, and C/m is `StepDemand::damping`.
     pub fn stable_step(&self, step: f64) -> f64 {
         let square = 4.0 / (step * step) + self.demand.stiffness;
         let damping = self.demand.damping;
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Count the consecutive steps that contact did not limit. `is_unlimited` says that contact did not
-    /// limit the present step; otherwise, reset the count.
+    /// Count the consecutive steps that contact did not limit. If `is_unlimited` is true, contact did not
+    /// limit the present step, and the count increases by 1. Otherwise the count is reset to 0.
     pub fn count_calm(&mut self, is_unlimited: bool) {
         self.demand.calm = if is_unlimited {
             self.demand.calm + 1

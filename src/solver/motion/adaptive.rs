@@ -2,7 +2,7 @@
 //! with a shorter length.
 //!
 //! See Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. With short
-//! steps, the load is redistributed before more bonds break:
+//! steps, the load is redistributed before more bonds break. The rule is:
 //!
 //! ```text
 //! N_b > most_broken, Δt > smallest                    undo the step, Δt ← Δt · reduce
@@ -42,8 +42,8 @@ pub struct StepControl {
     calm: u64,
     /// Number of steps that were rolled back since the start of the run.
     pub undone: u64,
-    /// Largest number of bonds of one point that broke in one step since the last row of the history, without
-    /// the steps that were rolled back.
+    /// Largest number of bonds of one point that broke in one step, since the last row of the history. Steps
+    /// that were rolled back do not count.
     pub most_broken: u64,
 }
 

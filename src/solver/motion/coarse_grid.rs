@@ -3,14 +3,14 @@
 //! A grid of box cells covers all bodies. Each edge of a cell is at least one horizon long, except along an
 //! axis with a single cell. Displacements are defined at the nodes and are linear along each axis within a
 //! cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
-//! averages over its points by volume. Each point contributes its constants times its fraction of intact
-//! bonds. A supported component of a point acts as a spring at the position of the point in its cell. Forces
-//! on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
+//! volume-weighted averages over its points. Each point contributes its constants times its fraction of
+//! intact bonds. A supported component of a point acts as a spring at the position of the point in its cell.
+//! Forces on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
 //! interpolated to the points (prolongation) with the same weights, so the preconditioner is symmetric.
 //!
-//! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
-//! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of
-//! ranks and threads.
+//! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. The
+//! terms of sums over points are [rounded](crate::comm::rounded_sum::Unit) to multiples of a unit, so the
+//! sums do not depend on the number of ranks and threads.
 
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ const GROWTH: f64 = 1.1;
 /// evaluation needs for a point with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// Number of multiply-adds to solve with the factored matrix that is allowed even with few points.
+/// This number of multiply-adds to solve with the factored matrix is always allowed, even with few points.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.
@@ -85,8 +85,8 @@ struct CellPosition<const D: usize> {
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Create a grid that covers all points. The edges of its cells are at least `horizon` (m), except along
-    /// axes with a single cell, and long enough that the matrix is small. Collective.
+    /// Create a grid that covers all points. The edges of its cells are long enough that the matrix is small.
+    /// They are at least `horizon` (m), except along axes with a single cell. Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -267,7 +267,7 @@ impl<const D: usize> CoarseGrid<D> {
         (0..1 << D).map(of).sum()
     }
 
-    /// Cell position of an owned point.
+    /// The cell of an owned point, and the position of the point in the cell.
     fn place(&self, model: &Model<D>, point: usize) -> CellPosition<D> {
         let mut place = CellPosition {
             cell: 0,
@@ -370,14 +370,14 @@ struct Shape<const D: usize> {
     cell_strides: [usize; D],
     /// Number of rows of the stiffness matrix.
     size: usize,
-    /// Number of entries of a row of the stiffness matrix left of the diagonal.
+    /// Number of entries left of the diagonal in a row of the stiffness matrix.
     band: usize,
 }
 
 impl<const D: usize> Shape<D> {
-    /// Create the shape for a box with these lengths (m) and cells with at least this edge (m); a shorter
-    /// axis has one cell. Nodes are numbered first along the axis with the fewest nodes, which gives the
-    /// narrowest band.
+    /// Create the shape for a box of the size `length` (m). The edges of its cells are at least `edge` (m);
+    /// an axis of the box that is shorter than `edge` has one cell. Nodes are numbered first along the axis
+    /// with the fewest nodes, which gives the narrowest band.
     fn new(length: [f64; D], edge: f64) -> Self {
         let cells = length.map(|length| ((length / edge) as usize).max(1));
         let mut axes: [usize; D] = std::array::from_fn(|d| d);

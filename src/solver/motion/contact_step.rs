@@ -5,18 +5,19 @@ use crate::problem::{Rigid, StepRule};
 use crate::solver::Simulation;
 use crate::solver::contact::Contact;
 
-/// Factor on the step that contact allows, because the contact stiffness usually increases further.
+/// The step that contact allows is multiplied by this factor, because the contact stiffness usually increases
+/// further.
 const CONTACT_RESERVE: f64 = 0.95;
 
-/// Largest ratio of successive steps when the step grows again. If the step grew at once, a vibrating surface
-/// could reverse its motion and touch again within the first long step.
+/// Largest ratio of successive steps when the step grows again. If the step grew to its full length at once,
+/// a vibrating surface could reverse its motion and touch again within the first long step.
 const GROWTH: f64 = 2.0;
 
 /// Number of consecutive adaptive steps that contact does not limit, after which the step may grow by any
 /// factor.
 const LONG_CALM: u64 = 400;
 
-/// Contact does not limit a step that is below this fraction of the step that contact allows.
+/// A step counts as not limited by contact if it is below this fraction of the step that contact allows.
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
@@ -49,9 +50,9 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// Length that the next step may have if contact does not limit it, s: the longer one of the steps of the
-    /// present and the next stage. In an adaptive stage: the step that the rule requests. The result is at
-    /// least the present step.
+    /// Largest length of the next step (s) if contact does not limit this step. This length is the longer one
+    /// of the step of the present stage and the step of the next stage. In an adaptive stage, it is the step
+    /// that the rule requests. The result is at least the present step.
     pub(in crate::solver) fn longest_next_step(&self) -> f64 {
         let stages = self.stages.steps.iter().skip(self.progress.stage).take(2);
         let of_stages = stages.map(|(step, _)| *step).fold(0.0, f64::max);
@@ -95,10 +96,10 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Upper bound of the next adaptive step, s. After a step that contact has limited, the step does not
-    /// grow for 100 steps that contact does not limit. Then the step at most doubles with each step. After
-    /// 400 such steps, it may grow by any factor. If [`Contact::is_felt`] is true, `CONTACT_RESERVE` times
-    /// the step that contact allows is also a bound.
+    /// Upper bound of the next adaptive step, s. The bound depends on the number n of consecutive steps that
+    /// contact did not limit. For n < 100, the step does not grow. For n from 100 to 399, it at most doubles.
+    /// For n ≥ 400, it may grow by any factor. If [`Contact::is_felt`] is true, the step is also at most
+    /// `CONTACT_RESERVE` times the step that contact allows.
     pub(in crate::solver) fn adaptive_limit(&self) -> f64 {
         let Some(contact) = &self.contact else {
             return f64::INFINITY;

@@ -113,7 +113,7 @@ macro_rules! fields {
     };
 }
 
-/// Description of a field of the state that a rollback restores.
+/// Description of a field that is part of the state and that a rollback restores.
 const STATE: Description = Description {
     name: "",
     unit: "",
@@ -247,8 +247,8 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density of the zero-energy control (the forces that resist zero-energy modes), J/m³, as if
-    /// plastic flow did not reduce the control; none without plasticity.
+    /// Energy density that the zero-energy control (the forces that resist zero-energy modes) would have if
+    /// plastic flow did not reduce the control, J/m³. None without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
@@ -557,8 +557,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Component `d` of the force density on an owned point without the reaction, N/m³: internal force,
-    /// external force and viscous damping.
+    /// Component `d` of the force density on an owned point, N/m³: internal force, external force and viscous
+    /// damping, but not the reaction.
     #[inline]
     pub fn acting(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let exerted = Exerted::new(&self.internal_force, self.external_force.as_ref(), d);
@@ -576,8 +576,8 @@ impl<const D: usize> Fields<D> {
     /// their overshoot energy. `step` is the length of the step, s.
     ///
     /// The force F of a breaking bond acted in the first half kick of the step, but not in the second. So the
-    /// points did not supply all of the energy that the bond had at the end of the step: ½ F·Δℓ is missing,
-    /// with the change Δℓ of the bond vector in the step. The released energy is reduced by this amount. On
+    /// points supplied less energy than the bond had at the end of the step. The difference is ½ F·Δℓ, where
+    /// Δℓ is the change of the bond vector in the step. The released energy is reduced by this amount. On
     /// average, a bond reaches its criterion in the middle of the step at whose end the break is detected.
     /// Therefore neither motion nor energy depends on the step length to first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
@@ -603,9 +603,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Add the contact forces on an owned point to the internal forces. The forces are the repulsion (N/m³)
-    /// with its potential energy (J), and the friction and damping that [`Self::book_dissipation`] has
-    /// recorded.
+    /// Add the contact forces on an owned point to the internal forces. The contact forces are `repulsion`
+    /// (N/m³), and the friction and damping that [`Self::book_dissipation`] has recorded. `energy` is the
+    /// potential energy of the repulsion, J.
     pub fn add_contact(&mut self, point: usize, repulsion: [f64; D], energy: f64) {
         let (Some(contact), Some(friction), Some(damping), Some(potential)) = (
             &mut self.contact_force,
@@ -653,9 +653,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s). Add the energy
-    /// that they dissipated in this step, by the trapezoidal rule, with the velocities in the middle of the
-    /// step.
+    /// Record friction and contact damping (N/m³) on an owned point at the end of a step of length `step`
+    /// (s). Add the energy that they dissipated in this step, by the trapezoidal rule, with the velocities in
+    /// the middle of the step.
     pub fn book_dissipation(
         &mut self,
         point: usize,
@@ -691,8 +691,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds of a further result to 0, given the index of this result among
-    /// the further results with such a count.
+    /// Reset the count of newly broken bonds of a further result to 0. `further` is the index of this result
+    /// among the further results with such a count.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);

@@ -18,7 +18,7 @@ const ROUND_OFF: f64 = 1e-9;
 /// angle. The arm of a point is its position relative to the centroid of the piece.
 const SMALL_TORQUE: f64 = 0.01;
 
-/// Loads on a piece along an axis in which no support holds the piece.
+/// Loads on a piece along one axis. No support holds the piece along this axis.
 struct UnheldLoad {
     piece: Piece,
     component: usize,
@@ -39,8 +39,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Collective.
     ///
     /// # Errors
-    /// If a piece is loaded along an axis in which no support holds it. Of several such pieces, the message
-    /// names the one with the smallest point id.
+    /// If a piece is loaded along an axis, but no support holds it along this axis. Of several such pieces,
+    /// the message names the one with the smallest point id.
     pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
         for stage in 0..self.stages.all.len() {
             let found = self.at_load_steps(stage, |simulation, pieces, time| {
@@ -118,9 +118,9 @@ impl<const D: usize> Simulation<'_, D> {
         self.apply_loads(time, true);
     }
 
-    /// Return an error if a piece is loaded along an axis in which no support holds it. The message begins
-    /// with `failure`. Of several such pieces, the message names the one with the smallest point id.
-    /// Collective.
+    /// Return an error if a piece is loaded along an axis, but no support holds it along this axis. The
+    /// message begins with `failure`. Of several such pieces, the message names the one with the smallest
+    /// point id. Collective.
     pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
         let pieces = self.find_pieces(self.unloaded_points());
         self.unheld_load(&pieces).map_or(Ok(()), |unheld| {
@@ -139,8 +139,9 @@ impl<const D: usize> Simulation<'_, D> {
             && self.check_pieces_are_held("").is_err()
     }
 
-    /// Find a piece that is loaded along an axis in which no support holds it. Loads within the tolerance of
-    /// the stage are ignored. Of several pieces, return the one with the smallest point id. Collective.
+    /// Find a piece that is loaded along an axis, but that no support holds along this axis. Loads within the
+    /// tolerance of the stage are ignored. Of several pieces, return the one with the smallest point id.
+    /// Collective.
     fn unheld_load(&self, pieces: &Pieces<D>) -> Option<UnheldLoad> {
         let allowed = self.allowed_force();
         let is_suspect = |point: usize, d: usize| {
@@ -175,8 +176,8 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Largest norm of unbalanced forces (N) that is within the tolerance of the present stage, with the
-    /// present loads and without reactions. Collective.
+    /// Tolerance of the present stage times ‖loads‖ for the present loads, N: the largest allowed norm of the
+    /// unbalanced forces if there are no reactions. Collective.
     fn allowed_force(&self) -> f64 {
         let tolerance = match self.time_rule().method {
             Method::Relaxation(Relaxation { tolerance, .. })
@@ -266,9 +267,10 @@ impl<const D: usize> Simulation<'_, D> {
         std::array::from_fn(|d| self.model.reference[d][point] + displacement[d][point])
     }
 
-    /// Return the index of the condition with the largest load on `points`, the ascending local indices of
-    /// points. Loads are compared by the magnitude of the sum of `weight` over the points. The arguments of
-    /// `weight` are a point and the force of the load on this point (N). Collective.
+    /// Return the index of the condition with the largest load on a set of points. `points` contains the
+    /// local indices of these points in ascending order. Loads are compared by the magnitude of the sum of
+    /// `weight` over the points. The arguments of `weight` are a point and the force of the load on this
+    /// point (N). Collective.
     fn largest_load(&self, points: &[usize], weight: impl Fn(usize, [f64; D]) -> f64) -> usize {
         let (conditions, mut sums) = self.conditions.load_sums(&self.model, points, weight);
         let sums = reduce(self.comm, &mut sums).into_iter();

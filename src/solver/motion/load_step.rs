@@ -3,15 +3,15 @@
 //! A load step advances the time, which is the load parameter; loads and supports follow the time. A method
 //! then solves for the equilibrium: [`super::relaxation`] or [`super::newton`].
 //!
-//! Bonds break only at equilibria. When bonds reach their criterion at an equilibrium, they break, and the
-//! next equilibrium is found at the same load, until no bond breaks. The history of bonds and points is part
-//! of the equilibrium. Iterations compute the forces from a trial history: the history after a step from the
-//! last equilibrium to the present positions. The history is stored at equilibrium.
+//! Bonds break only at equilibria. Bonds that reach their criterion at an equilibrium break. The next
+//! equilibrium is then found at the same load. This is repeated until no bond breaks. The history of bonds
+//! and points is part of the equilibrium. Iterations compute the forces from a trial history: the history
+//! after a step from the last equilibrium to the present positions. The history is stored at equilibrium.
 //!
 //! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖), with the total forces f on the
-//! points. In a free body that only moves rigidly, loads and reactions are 0, and both sides are round-off.
-//! Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is also accepted as equilibrium, with the volume V and the
-//! displacement u of a point. The fictitious density ρ (N/m⁴) is an upper bound of the stiffness of a point.
+//! points. If a free body only moves rigidly, f, the loads and the reactions are 0 apart from round-off.
+//! Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is also accepted as equilibrium. V is the volume, ρ the fictitious
+//! density (N/m⁴) and u the displacement of a point. ρ is an upper bound of the stiffness of a point.
 //! So ε ‖V ρ u‖, with the machine precision ε, bounds the forces that come from rounding u.
 
 use rayon::prelude::*;
@@ -217,8 +217,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Evaluate forces and reactions at the present positions, with the history for an equilibrium at these
-    /// positions. Collective.
+    /// Evaluate forces and reactions at the present positions, with the history that the bonds would have if
+    /// these positions were an equilibrium. Collective.
     pub(super) fn evaluate_at_rest(&mut self) {
         self.evaluate(self.bond_update_at_rest());
         self.apply_velocities();
@@ -308,8 +308,8 @@ impl<const D: usize> Simulation<'_, D> {
     ///
     /// # Errors
     /// If the load step has failed. In runs without contact, the message names a piece that is loaded along
-    /// an axis in which no support holds it. If there is no such piece, or in runs with contact, the message
-    /// names the residual, or says that forces are not finite.
+    /// an axis, but that no support holds along this axis. In all other cases, the message names the
+    /// residual, or says that forces are not finite.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.progress.load_step.has_failed {
             return Ok(());
@@ -382,7 +382,8 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Add the work of loads and supports in the present load step, at one of its equilibria; see [`Work`].
+    /// Add the work of loads and supports in the present load step. This function is called at an
+    /// equilibrium. `work` selects the formula; see [`Work`].
     fn add_work_since_equilibrium(&mut self, work: Work) {
         let (then, now) = (self.clock.time_before(), self.clock.time());
         // The columns are taken out of `fields` while they are read.

@@ -13,23 +13,23 @@
 //! reactions, so f is 0 for supported components. All force evaluations use the history that an equilibrium
 //! at the displaced positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that
 //! yield. ε is chosen such that the largest component of ε v is `SHIFT` times the shortest horizon. The
-//! relative error of the difference is then of the order of `SHIFT` for bonds that rotate, and of the order
-//! of (machine ε)/`SHIFT` from rounding.
+//! difference then has two relative errors: an error of the order of `SHIFT` from bonds that rotate, and an
+//! error of the order of (machine precision)/`SHIFT` from rounding.
 //!
 //! K is symmetric if the forces of the law derive from an energy. In a body that softens or buckles, K may
 //! not be positive definite. The conjugate gradients then stop at the first direction of negative curvature.
-//! The preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
-//! (`coarse_grid.rs`), for long waves.
+//! The preconditioner is the sum of two terms. The inverse of the diagonal of K is effective for short waves
+//! of the displacement. A coarse grid (`coarse_grid.rs`) is effective for long waves.
 //!
-//! A load step begins with a prediction of the displacements. The points repeat their motion of the last load
-//! step if the load steps have the same size and no bond broke in the last load step. Otherwise, and in the
-//! first load step of a stage, the prediction is the solution of the problem that is linearized about the
-//! last equilibrium. The change of the prescribed displacements is then part of x.
+//! A load step begins with a prediction of the displacements. If the last load step had the same size and no
+//! bond broke in it, the points repeat their motion of that load step. Otherwise, and in the first load step
+//! of a stage, the prediction is the solution of the problem that is linearized about the last equilibrium.
+//! The change of the prescribed displacements is then part of x.
 //!
 //! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. The
 //! smaller load steps continue up to the end of the original load step. A load step in which bonds have
-//! broken is not repeated, because an equilibrium at its full load was then found. A load step is not
-//! repeated either if no support holds a loaded piece of a body.
+//! broken is not repeated: bonds break only at an equilibrium, so an equilibrium at the full load was found.
+//! A load step is also not repeated if a loaded piece of a body is not held by supports.
 
 use std::time::Instant;
 
@@ -73,13 +73,13 @@ const LEAST_INTACT: f64 = 1e-3;
 /// State of Newton's method between iterations; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonState {
-    /// Number of force evaluations of the present load step, with any method; in explicit stages, of the
-    /// present time step.
+    /// Number of force evaluations of the present load step (with any method), or of the present time step in
+    /// explicit stages.
     pub evaluations: u64,
     /// η of the next solution of a linear problem.
     forcing: f64,
-    /// Mean of the diagonal of K, divided by the mean of the product of fictitious density and fraction of
-    /// intact bonds; NaN until it is computed.
+    /// Mean of the diagonal of K, divided by the mean of ρ φ, where ρ is the fictitious density and φ the
+    /// fraction of intact bonds of a point; NaN until it is computed.
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,
@@ -308,7 +308,7 @@ impl<const D: usize> Vectors<D> {
     /// Improve x by conjugate gradients until ‖f − K x‖ is at most η times its initial value, or at most
     /// `LINEAR_TOLERANCE_SHARE` times `allowed`. `allowed` is the norm ‖f‖ (N) that is accepted as
     /// equilibrium. The method also stops at a direction of negative curvature, and after
-    /// `MAX_CG_ITERATIONS`. Returns ‖f − K x‖ before and after. Collective.
+    /// `MAX_CG_ITERATIONS`. Returns ‖f − K x‖ before and after the iterations. Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
@@ -591,8 +591,8 @@ struct Linear {
 }
 
 impl NewtonState {
-    /// Choose the next η from the norm `force` of the forces at the new positions (N), and from the norms of
-    /// the linear problem.
+    /// Choose the next η from `force`, which is ‖f‖ at the new positions (N), and from the norms of the
+    /// linear problem.
     fn adapt(&mut self, linear: Linear, force: f64) {
         let forcing = (force - linear.last).abs() / linear.first;
         if forcing.is_finite() {

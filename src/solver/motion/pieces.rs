@@ -59,8 +59,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Call `visit` with each suspected piece, in the order of the smallest point ids of the pieces, until
-    /// `visit` returns a value. Return this value. `is_suspect` is called with the local index of a point,
-    /// and must be the same at all points of a piece. Collective.
+    /// `visit` returns a value. Return this value. `is_suspect` is called with the local index of a point.
+    /// Its result must be the same for all points of a piece. Collective.
     pub(super) fn first_of_pieces<T>(
         &self,
         pieces: &Pieces<D>,

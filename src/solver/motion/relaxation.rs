@@ -12,9 +12,9 @@
 //!
 //! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1, times a reserve. ρ follows
 //! from the largest eigenvalue of the matrix D of each point. c is the critical damping of the present
-//! motion. The quotient is a Rayleigh quotient of the tangent stiffness ¹K with u̇ rather than u, because
-//! differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the result is bitwise independent of
-//! ranks and threads.
+//! motion. The quotient under the root is a Rayleigh quotient of the tangent stiffness ¹K. It uses u̇ rather
+//! than u, because differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the result is bitwise
+//! independent of ranks and threads.
 //!
 //! [`super::load_step`] defines the equilibrium and when bonds break.
 //!

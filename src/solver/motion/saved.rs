@@ -22,8 +22,8 @@ pub struct Saved {
 /// Column of one component of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedColumn {
-    /// Name of the field, `_`, and index of the component. For a count of newly broken bonds of a further
-    /// result: `newly_broken_of_` and the name of this result.
+    /// Name of the field, `_`, and index of the component. A column that counts newly broken bonds for a
+    /// further result is named `newly_broken_of_` followed by the name of this result.
     pub name: String,
     /// Values of the points, ordered by id.
     pub values: Vec<f64>,

@@ -1,7 +1,7 @@
 //! Velocity Verlet: half a kick, a drift, a force evaluation, half a kick. A kick changes the velocities, and
 //! a drift changes the displacements.
 //!
-//! See Silling & Askari 2005. The method is second order in the step and time-reversible, and velocities
+//! See Silling & Askari 2005. The method is time-reversible and of second order in the time step. Velocities
 //! are known at full steps. With viscous damping at a rate r, the equation of motion is ρ ü = f − r ρ u̇
 //! (Emmrich & Weckner 2006, eq. 11).
 

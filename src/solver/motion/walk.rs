@@ -113,7 +113,7 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Compute the power of viscous damping at the present velocities. Add the energy that damping has
-    /// dissipated in a step (s), by the trapezoidal rule.
+    /// dissipated in a time step of length `step` (s), by the trapezoidal rule.
     pub fn add_damped_energy(&mut self, step: f64) {
         let (model, first) = (self.model, self.first);
         let Some([powers, energies]) = &mut self.damping else {
@@ -180,7 +180,7 @@ pub fn parts(owned: usize) -> usize {
     owned.div_ceil(PART)
 }
 
-/// One or several adjacent parts, with one entry of `each` of [`walk`] per part.
+/// One or several adjacent parts, and their entries of the argument `each` of [`walk`]: one entry per part.
 type Parts<'a, C, const D: usize> = (Part<'a, D>, &'a mut [C]);
 
 /// Split several parts into two halves; a single part is not split.

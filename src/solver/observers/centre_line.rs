@@ -230,7 +230,7 @@ fn drop_stubs(parts: &mut [Part]) {
     }
 }
 
-/// Join the centroids of successive parts to branches.
+/// Construct the branches: lines that join the centroids of successive parts.
 fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
     // The vertex of a part is its centroid. For a part without children, the vertex is moved along the line
     // from the previous vertex through the centroid, up to the farthest point of the part along this line.
@@ -300,7 +300,7 @@ mod tests {
         section_length: 3.0,
     };
 
-    /// Two rows of points of unit spacing along a straight line.
+    /// Two rows of points along a straight line, with unit spacing.
     fn band(from: [f64; 2], to: [f64; 2]) -> Vec<Damaged> {
         let way = [to[0] - from[0], to[1] - from[1]];
         let length = libm::hypot(way[0], way[1]);

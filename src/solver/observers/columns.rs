@@ -35,15 +35,15 @@ pub struct GlobalState {
     pub force_evaluations: u64,
     /// Number of steps rolled back so far.
     pub undone_steps: u64,
-    /// Largest number of bonds of one point that broke in one step since the last row.
+    /// Largest number of broken bonds of one point in one step; only steps since the last row count.
     pub most_broken: u64,
-    /// Energy that changes of the density scale have added, J.
+    /// Energy added by changes of the density scale, J.
     pub density_scale_energy: f64,
     /// Number of points.
     pub points: u64,
-    /// Energy that refinements have added, J.
+    /// Energy added by refinements, J.
     pub refinement_energy: f64,
-    /// Force of the supports on each set of `reactions` by component, N.
+    /// For each set in `reactions` of the deck, the components of the force of the supports on this set, N.
     pub reactions: Vec<Vec<f64>>,
     /// For each `[history.force.NAME]` of the deck, the component of the support force in the requested
     /// direction, N.
@@ -54,14 +54,14 @@ pub struct GlobalState {
     pub statistics: Vec<Vec<f64>>,
     /// Position of each front, m.
     pub fronts: Vec<f64>,
-    /// Two values per crack: length (m) and number of branches in 2-D; area (m²) and reach (m), see
-    /// [`Surface::reach`](super::Surface::reach), in 3-D.
+    /// Two values per crack. In 2-D: length (m) and number of branches. In 3-D: area (m²) and
+    /// [`Surface::reach`](super::Surface::reach) (m).
     pub cracks: Vec<[f64; 2]>,
     /// State of each crack tip.
     pub tips: Vec<TipNow>,
     /// J integrals, J/m².
     pub j_integrals: Vec<f64>,
-    /// Contact quantities, of all contacts and by pair of bodies.
+    /// Contact quantities: for all contacts together, and for each pair of bodies.
     pub contact: ContactNow,
     /// Fragments; empty if the history does not contain them.
     pub fragments: Fragments,

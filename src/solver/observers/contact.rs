@@ -1,10 +1,11 @@
 //! Detection of bodies that pass through each other in runs without `[contact]`. This module finds two points
-//! of bodies without common bonds that are nearer than their spacing, the mean edge of their cells. For
-//! bodies whose common bonds have broken, the limit is half the spacing. [`Contact`] states the exact limits.
+//! of different bodies whose distance is below a limit. For bodies without common bonds, the limit is the
+//! spacing of the two points: the mean of the edges of their cells. For bodies whose common bonds have
+//! broken, the limit is half the spacing. [`Contact`] states the exact limits.
 //!
-//! Where the bounding boxes of two bodies overlap or nearly touch, their points are distributed to the ranks
-//! by spatial cells, so that each rank compares a part of the points. A point of the second body is sent to
-//! the ranks of all cells that can contain a point of the first body which is too near.
+//! If the bounding boxes of two bodies overlap or nearly touch, the points in this region are distributed to
+//! the ranks by spatial cells. Each rank then compares the points of its cells. A point of the second body
+//! may be too near to points of the first body in several cells. It is sent to the ranks of all these cells.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -68,9 +69,10 @@ struct Pair {
 #[derive(Clone, Copy)]
 struct Meeting {
     pair: Pair,
-    /// Largest distance of two points that is compared, m.
+    /// Largest distance at which two points are compared, m.
     radius: f64,
-    /// Lower corner of a box that contains the points of each body within `radius` of the other body, m.
+    /// Lower corner of a box, m. The box contains the points of each body that are within
+    /// `radius` of the other body.
     lower: [f64; 3],
     /// Upper corner of this box, m.
     upper: [f64; 3],
@@ -151,8 +153,8 @@ impl ContactWatch {
         agree_on_nearest(comm, nearest)
     }
 
-    /// Find the pairs of bodies whose bounding boxes overlap, or are at most the mean of the largest spacings
-    /// of the two bodies apart. Collective.
+    /// Find the pairs of bodies whose bounding boxes overlap or have a small gap. The gap along each axis may
+    /// be at most the mean of the largest spacings of the two bodies. Collective.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();
@@ -212,8 +214,8 @@ fn place_of<const D: usize>(
     place
 }
 
-/// Select the owned points in the boxes where bodies may touch, packed for each rank. If bonds joined the
-/// bodies, select only points with broken bonds.
+/// Select the owned points in the boxes where bodies may touch. If bonds joined the bodies, select only
+/// points with broken bonds. Returns the points as bytes, one buffer for each receiving rank.
 fn candidates<const D: usize>(
     simulation: &Simulation<'_, D>,
     meetings: &[Meeting],
@@ -277,8 +279,8 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
     homes
 }
 
-/// Find the nearest pair among the given points of two bodies. Only pairs whose distance is below the limit
-/// count, see [`Contact`]; `None` if there is no such pair.
+/// Find the nearest pair among the given points of two bodies. A pair must have a distance below the limit,
+/// see [`Contact`]; `None` if there is no such pair.
 fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
     if first.is_empty() || second.is_empty() {
         return None;

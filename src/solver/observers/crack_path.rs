@@ -10,7 +10,7 @@ use crate::solver::Simulation;
 use super::centre_line::{Branch, Damaged, Reach, branches};
 use super::crack_points::{link, points_of, spacings};
 
-/// Minimum, in spacings, of the distance up to which damaged points are connected. With this minimum,
+/// Lower limit of the distance up to which damaged points are connected, in spacings. With this limit,
 /// diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.5;
 

@@ -8,8 +8,8 @@
 //! g = C⁻¹ Σ_broken (ξ − ξ̄) ω Ṽ,   C = Σ (ξ − ξ̄) ⊗ (ξ − ξ̄) ω Ṽ over all bonds,   area = Σ |g| V.
 //!
 //! On a cubic lattice, C is isotropic, and the area of a plane crack is exact for any direction of its
-//! normal. Points without intact bonds have g = 0. Therefore the area of a crack that contains such points,
-//! or that has a width, is counted once.
+//! normal. Points without intact bonds have g = 0. Therefore the area is counted only once, even if the crack
+//! contains such points or has a width.
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Vector3};
@@ -30,7 +30,7 @@ use super::snapshot::Snapshot;
 
 type Vector = Vector3<f64>;
 
-/// Minimum, in spacings, of the distance up to which damaged points are connected. With this minimum,
+/// Lower limit of the distance up to which damaged points are connected, in spacings. With this limit,
 /// diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.8;
 
@@ -49,7 +49,7 @@ pub struct CrackSurface {
     points: Vec<u32>,
     /// Distance up to which damaged points are connected, m.
     link: f64,
-    /// Radius of the surroundings of a point in which damaged points are considered, m; at most one horizon.
+    /// Radius around a point within which damaged points are considered, m; at most one horizon.
     radius: f64,
     /// Minimum distance between points of the front, m.
     front_spacing: f64,
@@ -77,7 +77,7 @@ struct FrontPoint {
 }
 
 impl CrackSurface {
-    /// Create the crack, and find the points of the set in which the crack is searched. Collective.
+    /// Create the crack, and find the points of the set in which the crack is searched for. Collective.
     ///
     /// # Errors
     /// If the set is empty; the error is the same on all ranks.

@@ -36,8 +36,8 @@ impl Cracked {
         cracked
     }
 
-    /// Lower and upper corner (m) of the bounding box of the cracked points of all ranks, at their reference
-    /// positions; NaN if there are no cracked points. Collective.
+    /// Lower and upper corner (m) of the bounding box of all cracked points, over all ranks. The box uses the
+    /// reference positions. The corners are NaN if there are no cracked points. Collective.
     pub fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
         comm::min(comm, &mut self.lower);
         comm.max(&mut self.upper);

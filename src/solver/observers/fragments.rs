@@ -22,7 +22,7 @@ pub struct Fragments {
     pub largest_momentum: Vec<f64>,
 }
 
-/// Id of a fragment, and number of points of a rank in this fragment.
+/// Id of a fragment, and number of its points on one rank.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Share {

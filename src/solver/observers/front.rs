@@ -37,7 +37,7 @@ impl Front {
         })
     }
 
-    /// Position along the line (m) up to which the absolute value of the field's component exceeds the
+    /// Farthest position along the line (m) at which the absolute value of the field's component exceeds the
     /// threshold; NaN if no absolute value exceeds the threshold. Collective.
     pub fn position<const D: usize>(
         &self,

@@ -56,8 +56,9 @@ pub struct HistoryObserver {
     surfaces: Vec<CrackSurface>,
     tips: Vec<Tip>,
     j_integrals: JIntegrals,
-    /// Energies minus work in the first row (J), see [`Energies::error`], and number of bonds that were
-    /// intact before any bond could break, counted at both ends. `None` before the first row.
+    /// Two reference values: energies minus work in the first row (J; see [`Energies::error`]), and number of
+    /// bonds that were intact before any bond could break. Each bond counts twice. `None` before the first
+    /// row.
     start: Option<(f64, u64)>,
 }
 
@@ -82,9 +83,9 @@ pub struct Energies {
     /// Energy dissipated by viscous damping, plastic flow, softening, viscoelasticity, friction and contact
     /// damping.
     pub dissipated: f64,
-    /// Error of the energy balance: change of kinetic + rigid + strain + contact + fracture + dissipated −
-    /// work since the first row, minus the energy that refinements and changes of the density scale have
-    /// added. An exact integrator has the error 0.
+    /// Error of the energy balance: the change of E since the first row, minus the energy that refinements
+    /// and changes of the density scale have added. E is kinetic + rigid + strain + contact + fracture +
+    /// dissipated − work. An exact integrator has the error 0.
     pub error: f64,
 }
 
@@ -99,8 +100,8 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Energies minus work in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
-    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step in addition
-    /// to the counted work. The trapezoidal rule, which integrates the work, misses this energy.
+    /// Upper estimate of the kinetic energy that loads and prescribed motions add in a step without counted
+    /// work, J. The trapezoidal rule, which integrates the work, misses this energy.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
@@ -233,9 +234,9 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Reference values for all rows: energies minus work in the first row (J), see [`Energies::error`], and
-    /// the number of bonds that were intact before any bond could break, counted at both ends. `None` before
-    /// the first row.
+    /// Two reference values for all rows: energies minus work in the first row (J; see [`Energies::error`]),
+    /// and number of bonds that were intact before any bond could break. Each bond counts twice. `None`
+    /// before the first row.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
@@ -286,8 +287,8 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// Compute the present row. Then reset the largest number of bonds broken in one step to 0, so that the
-    /// next row contains the largest number since this row. Collective.
+    /// Compute the present row. Then reset to 0 the largest number of bonds that one point lost in one step.
+    /// The next row therefore contains the largest number since this row. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

@@ -1,15 +1,16 @@
 //! Nonlocal J integrals over boxes around crack tips (in 3-D, around pieces of crack fronts): energy released
 //! per area of crack growth.
 //!
-//! Each box has a weight q. Over a layer along the faces, inside the box, q rises from 0 at the faces to 1.
+//! Each box has a weight q. In a layer inside the faces of the box, q rises from 0 at the faces to 1.
 //! Farther inside, q is 1. With the unit vector e in the direction of growth, the strain energy density W and
 //! the force states T, the integral is
 //!
 //! J = −(1/L) Σ_i V_i (∂q/∂e W_i + q_i Σ_j T_i⟨ξ⟩·(∂u_j/∂e − ∂u_i/∂e) Ṽ_j)
 //!
-//! L is the thickness in plane problems, and the integral of q along the crack front in 3-D. In an
-//! equilibrium without loads in the box, J is the mean, over 0 < s < 1, of the integrals of Silling & Lehoucq
-//! (2010) for the boxes {q > s}; see `docs/src/theory/j_integral.md`.
+//! V_i is the volume of point i, Ṽ_j the corrected volume of neighbour j, and u the displacement. L is the
+//! thickness in plane problems, and the integral of q along the crack front in 3-D. Each number s between 0
+//! and 1 defines a box {q > s}. In an equilibrium without loads in the box, J is the mean, over all s, of the
+//! integrals of Silling & Lehoucq (2010) for these boxes; see `docs/src/theory/j_integral.md`.
 
 use crate::comm;
 use crate::comm::sum::{ExactSum, reduce};
@@ -23,8 +24,8 @@ use crate::solver::Simulation;
 use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
-/// Tolerance of the components of the direction of growth, and, in horizons, of the distance between the box
-/// and the ends of the bodies.
+/// Tolerance of the components of the direction of growth. Also the tolerance, in horizons, of the distance
+/// between the box and the ends of the bodies.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.

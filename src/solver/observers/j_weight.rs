@@ -56,8 +56,8 @@ pub fn edges<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> [f
     spacing.unwrap_or([problem.dimension.edge(model.volume[point]); 3])
 }
 
-/// Return the length √Σ(a n)² of a cell with the edges a along the direction n, m. The components of n beyond
-/// the dimension of the problem are 0.
+/// Return the length (m) of a cell along a direction: √Σ(a n)², with the edges a of the cell and the
+/// direction n. The components of n beyond the dimension of the problem are 0.
 fn extent(edges: [f64; 3], direction: [f64; 3]) -> f64 {
     let squares = edges.iter().zip(direction);
     let squares = squares.map(|(edge, component)| (component * edge).powi(2));
@@ -116,8 +116,8 @@ fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (range.start < range.end).then_some(range)
 }
 
-/// Return the range of distances a (m) on the line {a · `direction`} that the cell of the point at `position`
-/// (m) covers. `None` if the point is more than one edge away from the line.
+/// Return the range of a (m) in which the cell of the point at `position` (m) covers the line
+/// {a · `direction`}. `None` if the point is more than one edge away from the line.
 fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
     let across = (0..3).map(|d| (position[d] - along * direction[d]).powi(2));
@@ -125,8 +125,8 @@ fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (across.sum::<f64>() <= edges[0].powi(2)).then_some(along - half..along + half)
 }
 
-/// Integrate q along the part of a line that lies in the bodies, m. The line passes through the centre of the
-/// box in the direction `front`. Collective.
+/// Integrate q along a line from one end of the bodies to the other, m. Gaps along the line are included. The
+/// line passes through the centre of the box in the direction `front`. Collective.
 ///
 /// # Errors
 /// If no body lies on the line in the box. The error is the same on all ranks.

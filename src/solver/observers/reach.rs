@@ -8,8 +8,8 @@ use crate::problem::Line;
 
 use crate::solver::Simulation;
 
-/// Tolerance of distances, in horizons. Points whose distances differ by less count as equally far. A point
-/// at a limit counts as within the limit.
+/// Tolerance of distances, in horizons. Points whose distances differ by at most the tolerance count as
+/// equally far. A point beyond a limit by at most the tolerance counts as within the limit.
 const TOLERANCE: f64 = 1e-9;
 
 /// This rank's points along a line, and the coordinate of each point along the line (m).
@@ -65,11 +65,11 @@ impl Course {
     /// result is bitwise the same for any number of ranks. Collective.
     ///
     /// The search starts at the farthest point above the threshold; if several are equally far, at the one
-    /// with the smallest id. The next points are the nearest points ahead of this point along the line,
-    /// within one horizon of this point. The values are interpolated linearly between the farthest and the
-    /// next points to find the threshold. If several points are equally far along the line, the largest of
-    /// their values is used. When values grow, the position therefore grows without jumps, even when the next
-    /// point exceeds the threshold.
+    /// with the smallest id. Of the points ahead of this point and within one horizon of this point, the
+    /// next points are those that are nearest along the line. The values are interpolated linearly between
+    /// the farthest and the next points to find the threshold. If several points are equally far along the
+    /// line, the largest of their values is used. When values grow, the result therefore moves along the line
+    /// without jumps, even when the next point exceeds the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -53,9 +53,9 @@ impl Snapshot {
         Self { stored }
     }
 
-    /// Damage φ of an owned point: the fraction of its family's volume with broken bonds (Dipasquale et al.
-    /// 2014, eq. 7). A bond that softens contributes V_j times the fraction of its stiffness that it has
-    /// lost. Damage is 0 for a point without a family.
+    /// Damage φ of an owned point: the volume of the neighbours whose bonds to the point are broken, divided
+    /// by the volume of the family (Dipasquale et al. 2014, eq. 7). A bond that softens contributes V_j
+    /// times the fraction of its stiffness that it has lost. Damage is 0 for a point without a family.
     pub fn damage(&self, family_volume: &PaletteColumn, point: usize) -> f64 {
         let softened = self.stored.softened.get(point).copied().unwrap_or(0.0);
         match family_volume[point] {
@@ -282,8 +282,9 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_plane:
 }
 
 /// Thermal stretch of an owned point in 3-D, in plane stress, or in a bar that can expand sideways; 0 without
-/// temperatures. Under plane or uniaxial strain, the result is 0, because the determinant of F is then also
-/// the determinant of the 3-D deformation.
+/// temperatures. Under plane or uniaxial strain, the result is 0. The stretch perpendicular to the plane or
+/// bar is then 1, so the determinant of F is also the determinant of the 3-D deformation. No thermal
+/// correction is needed.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],
@@ -291,8 +292,8 @@ fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) ->
     }
 }
 
-/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa, with Young's modulus E,
-/// the coefficient of thermal expansion α, the temperature T and the reference temperature T₀.
+/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa. E is Young's modulus, α
+/// the coefficient of thermal expansion, T the temperature, and T₀ the reference temperature.
 fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let Some(temperature) = &simulation.fields.temperature else {
         return 0.0;

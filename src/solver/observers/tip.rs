@@ -100,10 +100,10 @@ impl Tip {
 /// latest row in which the crack was at least one horizon shorter. If there is no such row, the interval
 /// begins at the latest row in which the crack was not longer than in the first row with a tip.
 ///
-/// Over less growth than one horizon, the speed would show the jumps of the tip from point to point of the
-/// lattice. Over a fixed number of rows, the speed would depend on the time between rows. A crack that has
-/// not grown has speed 0. After a crack stops, its speed is about one horizon divided by the duration of the
-/// interval, which grows from row to row.
+/// In an interval with less growth than one horizon, the speed would show the jumps of the tip from point to
+/// point of the lattice. In an interval with a fixed number of rows, the speed would depend on the time
+/// between rows. A crack that has not grown has speed 0. After a crack stops, its speed is about one horizon
+/// divided by the duration of the interval. This duration grows from row to row.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.

@@ -102,10 +102,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if it has been
-    /// outside the horizons of triggering points and of points with broken bonds for the time
-    /// `coarsen_after`. Return the numbers of created and removed points; `None` if the grids do not change.
-    /// Collective.
+    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if, for at
+    /// least the time `coarsen_after`, it has been outside the horizons of triggering points and of points
+    /// with broken bonds. Return the numbers of created and removed points; `None` if the grids do not
+    /// change. Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
@@ -268,7 +268,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Break the bonds that were broken before the refinement, and new bonds that cross facets. `rows` are
     /// the rows of [`GridState`] of the owned points. `broken` contains the ids of the neighbours j of all
-    /// broken bonds, and `lengths` the number of these ids for each owned point. Collective.
+    /// broken bonds. `lengths` contains the number of these ids for each owned point. Collective.
     fn inherit(
         &mut self,
         rows: &[f64],

@@ -17,16 +17,17 @@ pub struct Past {
     /// For each column, the rule by which new points get their values.
     births: Vec<Birth>,
     /// Local index by body and grid index (in steps of the finest level). The map contains only points in the
-    /// level-0 cells of [`Grids::changed`], before or after the refinement.
+    /// level-0 cells that [`Grids::changed`] returns for the grids before or after the refinement.
     at: FxHashMap<(usize, GridIndex), usize>,
     /// Whether each local point is removed.
     is_removed: Vec<bool>,
 }
 
 impl Past {
-    /// Collect the state before the nodes `removed` are removed. Each node consists of its body, its
-    /// canonical level, and its grid index in steps of the finest level. Nodes of the finest level must come
-    /// first. All ranks pass the same nodes. Collective.
+    /// Collect the state of the points. `removed` are the nodes that the refinement will remove; the values
+    /// of these nodes are added to their parents. Each node consists of its body, its canonical level, and
+    /// its grid index in steps of the finest level. Nodes of the finest level must come first. All ranks pass
+    /// the same nodes. Collective.
     pub fn new<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
@@ -184,7 +185,7 @@ impl Past {
         (ids, rows)
     }
 
-    /// Return the index in `born.rows` of the first number in the row of a new point. If the row does not
+    /// Return the index in `born.rows` at which the row of a new point starts. If the row does not
     /// exist yet, create it as the mean of the rows of the point's parents. The entries for fields of
     /// [`Birth::FoundAnew`] are 0, and the entry for the block is [`NOWHERE`].
     fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
@@ -221,7 +222,7 @@ impl Past {
 /// The rows of new points, one after the other.
 #[derive(Default)]
 struct Born {
-    /// Index of the first number of each row, by body and grid index.
+    /// Index in `rows` at which each row starts, by body and grid index.
     at: FxHashMap<(usize, GridIndex), usize>,
     rows: Vec<f64>,
 }

@@ -38,8 +38,8 @@ const MOST_PLACES: f64 = 1e4;
 ///
 /// # Errors
 /// If the horizon contains too many spacings, if initial values are read from a file, or if loads or
-/// temperatures act on sets given by ids or by groups of meshes. With a trigger, further errors are
-/// strengths that scatter, load steps and an adaptive step.
+/// temperatures act on sets given by ids or by groups of meshes. With a trigger, also if strengths
+/// scatter, or if the run has load steps or an adaptive step.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
@@ -130,9 +130,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.trigger().is_some()
     }
 
-    /// Select nodes to refine at the points within the horizon of a triggering point. Select nodes to coarsen
-    /// at refined points that have been outside the horizons of triggering points, and of points with broken
-    /// bonds, for the time [`Trigger::coarsen_after`]. Collective.
+    /// For each point within the horizon of a triggering point, select the node to refine. For each refined
+    /// point that meets the condition of [`Trigger::coarsen_after`], select the node to coarsen. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
         let pick = |block, position| self.grids.refining(block, position);
@@ -164,8 +163,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Wanted { finer, coarser }
     }
 
-    /// Return the nodes that `pick` selects for the marked points of all ranks, given the block and the
-    /// position of a point. Collective.
+    /// Return the nodes that `pick` selects for the marked points of all ranks. `pick` takes the block and
+    /// the position (m) of a point. Collective.
     fn picks(
         &self,
         marked: &[bool],

@@ -154,7 +154,8 @@ const FAST_PATH_BACKOFF: usize = 7;
 /// Choice between the fast path and the full loop for the next lane group. Lists have no fast path, because
 /// loading points j takes most of the time.
 struct FastPathGate {
-    /// Whether the kernel may skip its criterion, and removes no thermal stretches from bonds.
+    /// Whether the fast path is allowed: the kernel may skip its criterion, and it removes no thermal
+    /// stretches from the bonds.
     is_allowed: bool,
     /// Number of lane groups that must still skip the fast path.
     skipped: usize,
@@ -282,7 +283,7 @@ struct BreakingInVectors<'a, const D: usize> {
 struct BrokenOfVector<'t, 'v, 'p, const D: usize> {
     breaking: &'t BreakingInVectors<'p, D>,
     vector: &'t mut VectorBonds<'v>,
-    /// The breaking bonds that the first loop noted.
+    /// The breaking bonds that [`WholeVector`] noted.
     noted: &'t BreakingBits,
 }
 

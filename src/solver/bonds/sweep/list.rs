@@ -125,7 +125,7 @@ struct BreakingInRows<'a, const D: usize> {
 struct BrokenOfRow<'t, 'r, 'p, const D: usize> {
     breaking: &'t BreakingInRows<'p, D>,
     row: &'t mut Row<'r>,
-    /// The breaking bonds that the first loop noted.
+    /// The breaking bonds that `OverRows::run` noted.
     noted: &'t BreakingBits,
 }
 

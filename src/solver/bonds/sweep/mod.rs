@@ -1,7 +1,7 @@
 //! Sweeps: a kernel runs over the bonds between two blocks, on all threads.
 //!
 //! Each task owns the bonds of some points i and the results of these points, so no locks or atomics are
-//! needed. The sum of each point is the same sequence of operations for any division into tasks.
+//! needed. The sum of each point takes the same sequence of operations for any division into tasks.
 
 use std::ops::Range;
 
@@ -45,7 +45,7 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// The columns over the points to which a kernel adds its sums.
+/// Columns over the points. A kernel adds its sums to these columns.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// A part of the bonds of two blocks.
