@@ -1,4 +1,5 @@
-//! Components and invariants of vectors and tensors, in the order in which a result stores their values.
+//! Components and invariants of vectors and tensors. The order of the components is the order in which a
+//! result stores them.
 
 use nalgebra::Matrix3;
 

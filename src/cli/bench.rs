@@ -19,9 +19,9 @@ use super::{BenchArguments, Verbosity, launch, machine_limits};
 pub enum Law {
     /// Prototype microelastic: bond-based, one pass over the bonds.
     Pmb,
-    /// Linear peridynamic solid, the deck's `ordinary`: state-based, two passes.
+    /// Linear peridynamic solid (`ordinary` in a deck): state-based, two passes.
     Lps,
-    /// Correspondence with the zero-energy control of Wan et al.: two passes; bonds break by energy.
+    /// Correspondence with the zero-energy control of Wan et al.: two passes, energy-based damage.
     Correspondence,
 }
 
@@ -80,7 +80,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// Return the name in the deck.
+    /// Return the name of this storage in a deck.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -90,8 +90,8 @@ impl Family {
     }
 }
 
-/// Largest allowed fraction of the points that touch other points. With this limit, the distance of adjacent
-/// cracks is larger than the horizon.
+/// Largest allowed fraction of the points that touch other points. With this limit, the distance between
+/// adjacent cracks is larger than the horizon.
 const MOST_TOUCHING: f64 = 0.25;
 
 /// Initial strain of the block along x in a benchmark with contact. The strain presses the faces of each
@@ -105,23 +105,23 @@ pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
     share.ok_or_else(|| format!("must be a number, 0 to {MOST_TOUCHING}"))
 }
 
-/// Return the number of cracks normal to x, such that the points on the faces of the cracks are about the
-/// requested fraction of all points.
+/// Return the number of cracks normal to x. With this number, about the requested fraction of all points is
+/// on the faces of the cracks.
 fn cracks(arguments: &BenchArguments) -> u64 {
     let share = arguments.contact.unwrap_or(0.0);
     (0.5 * share * arguments.points[0] as f64).round() as u64
 }
 
-/// Minimum memory traffic of the motion in 3-D per point and step, bytes. Displacement, velocity and force
-/// density are read and written, the number of the block is read, and displacement is written once more for
+/// Minimum memory traffic of the phase `motion` in 3-D, bytes per point and step. Displacement, velocity and
+/// force density are read and written. The number of the block is read. Displacement is written once more for
 /// the bond loops.
 const MOTION_BYTES: u64 = 170;
-/// Estimate of the minimum memory traffic of a pass over the bonds in 3-D per point, bytes, without the
-/// bonds. Reference position, displacement and volume are read, and the sums of the pass are read and
-/// written. The estimate assumes that these sums are four numbers.
+/// Estimate of the minimum memory traffic of a pass over the bonds in 3-D, bytes per point. The stored bonds
+/// are not included. Reference position, displacement and volume are read, and the sums of the pass are read
+/// and written. The estimate assumes that these sums are four numbers.
 const PASS_BYTES: u64 = 120;
 
-/// Parse `N` or `X,Y,Z` into the edges of a block, in points.
+/// Parse `N` or `X,Y,Z` into the numbers of points along the edges of a block.
 pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     let numbers: Option<Vec<u64>> = text
         .split(',')

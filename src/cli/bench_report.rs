@@ -63,8 +63,8 @@ pub struct Figures {
     pub set_up: f64,
     /// Phases of the time loop; the last entry is the total.
     pub phases: Vec<Phase>,
-    /// Memory of all ranks by name, bytes: the memory of the processes at several times, and the stored
-    /// bonds. The last entry is the peak.
+    /// Names and sizes (bytes, sum over the ranks) of the memory of the processes at several times, and of
+    /// the stored bonds. The last entry is the peak.
     pub memory: Vec<(&'static str, f64)>,
     /// Bytes that all ranks send per step in halo exchanges.
     pub halo_bytes: f64,
@@ -122,7 +122,7 @@ impl Figures {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Print the figures as a table, or as one line of JSON if `json`.
+    /// Print the figures as a table, or as one line of JSON if `json` is true.
     pub fn print(&self, json: bool) {
         if json {
             outln!("{}", self.json())
@@ -219,7 +219,7 @@ impl Figures {
         }
     }
 
-    /// Return the figures as one JSON object. The name of a figure with a unit includes this unit.
+    /// Return the figures as one JSON object. If a figure has a unit, its name includes the unit.
     fn json(&self) -> String {
         let mut entries = Map::new();
         let mut add =

@@ -17,7 +17,8 @@ use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
 /// Largest number of lattice cells for which `check` makes a dry run (the set-up of a run on one rank).
-/// Within this limit, [`MAX_POINTS`] and [`MAX_BONDS`], a dry run takes some seconds and 1 GB.
+/// If this limit, [`MAX_POINTS`] and [`MAX_BONDS`] are not exceeded, a dry run takes some seconds and needs
+/// 1 GB.
 const MAX_CELLS: f64 = 1e7;
 /// Largest number of points for which `check` makes a dry run.
 const MAX_POINTS: f64 = 2e6;
@@ -77,7 +78,7 @@ pub struct Request<'a> {
 pub struct TimeEstimate {
     /// Stable step of the first stage, with the scaled density of this stage, s.
     pub stable_step: f64,
-    /// First time step (s), and number of time steps or load steps, of each stage.
+    /// For each stage: the first time step (s), and the number of time steps or load steps.
     pub steps: Vec<(f64, f64)>,
     pub cost: Cost,
 }

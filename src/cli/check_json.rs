@@ -223,7 +223,7 @@ fn warnings(deck: &Deck, warnings: &[fissure::error::Warning]) -> Value {
     warnings.iter().map(text).collect()
 }
 
-/// Return the entries of a JSON object; no entries for any other value.
+/// Return the entries of `value`. If `value` is not a JSON object, return no entries.
 fn object(value: Value) -> Map<String, Value> {
     match value {
         Value::Object(entries) => entries,

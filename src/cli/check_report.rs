@@ -19,8 +19,8 @@ use fissure::survey::{BodyFigures, Cost, Interior, Seconds, Survey};
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
-/// Append the path, the title, the dimension and the horizon of the deck; in 1-D, also the condition
-/// perpendicular to the bar.
+/// Append the path, the title, the dimension and the horizon of the deck; in 1-D, also the constraint
+/// (uniaxial stress or uniaxial strain).
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.heading(format_args!(
         "{} is a valid deck: {}",
@@ -177,8 +177,8 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
     }
 }
 
-/// Append the separation energy ratios of a body with energy-based damage: for opening, and in 2-D and 3-D
-/// also for sliding if compressed bonds can break.
+/// Append the separation energy ratio for opening, if the body has energy-based damage. In 2-D and 3-D, if
+/// compressed bonds can break, also append the ratio for sliding.
 pub fn separation_energy(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
@@ -200,8 +200,8 @@ pub fn separation_energy(report: &mut Report, problem: &Problem, body: usize) {
 /// Largest number of bodies for which the contact rule of every pair is listed.
 const MOST_PAIRS: usize = 6;
 
-/// Append the numbers of bonds between bodies, and the damage thresholds of the pairs of bodies for which the
-/// deck gives the damage.
+/// Append the number of bonds between each pair of bodies. If the deck gives the damage of a pair, also
+/// append the damage thresholds of this pair.
 pub fn bonds_between_bodies(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;

@@ -16,8 +16,8 @@ use super::{Verbosity, outln, print, result_file};
 /// Compare two results, for example of two versions or machines.
 ///
 /// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
-/// largest difference with its point and time, and the ratio of this difference to the largest absolute value
-/// in A. Does not compare attributes, which describe the run.
+/// largest difference with its point and time. Also prints the ratio of this difference to the largest
+/// absolute value in A. Does not compare attributes, which describe the run.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -100,8 +100,8 @@ impl<'a> Tolerances<'a> {
 /// Compare two results.
 ///
 /// # Errors
-/// Of kind `Run` if the results differ. All other errors are of kind `Input`, for example if a file cannot be
-/// read or a tolerance has an unknown name.
+/// If the results differ, the error is of kind `Run`. All other errors are of kind `Input`, for example if a
+/// file cannot be read or a tolerance has an unknown name.
 pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
     let as_input = |error: Error| Error {
         kind: ErrorKind::Input,
@@ -214,7 +214,7 @@ fn report(
     text
 }
 
-/// Largest number of names in a printed list. The list ends with the number of further names.
+/// Largest number of names in a printed list. A longer list ends with the number of further names.
 const LONGEST_LIST: usize = 8;
 
 /// Append a line with the entries of `list`, which only the result `name` (A or B) has. `what` is the kind of

@@ -30,7 +30,7 @@ pub fn si(value: f64, unit: &str) -> String {
     }
 }
 
-/// A number that prints with as many significant digits as the format precision.
+/// A number. The precision in the format string is the number of significant digits.
 struct Digits(f64);
 
 impl std::fmt::Display for Digits {

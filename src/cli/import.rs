@@ -53,8 +53,10 @@ enum From {
 /// Translate a deck and write the new deck.
 ///
 /// # Errors
-/// If the deck cannot be translated, if the new deck exists and may not be replaced, if its path is that of
-/// the source deck or of a file that the new deck reads, or if it cannot be written.
+/// - If the deck cannot be translated.
+/// - If the new deck exists and may not be replaced.
+/// - If the path of the new deck is that of the source deck, or of a file that the new deck reads.
+/// - If the new deck cannot be written.
 pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let target = arguments.output.clone();
     let target = target.unwrap_or_else(|| default_target(&arguments.deck));

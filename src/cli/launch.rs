@@ -153,8 +153,8 @@ pub fn cores_in(list: &str) -> usize {
     ranges.map(range).sum()
 }
 
-/// Print a warning if this rank has more threads than cores, or if the ranks of this host are not bound to
-/// cores and have more threads together than this host has cores.
+/// Print a warning if this rank has more threads than cores. Also print a warning if the ranks of this host
+/// are not bound to cores and together have more threads than the host has cores.
 pub fn warn(threads: usize) {
     if let Some(warning) = warning(threads) {
         errln!("warning: {warning}");

@@ -123,7 +123,7 @@ fn triad_any(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
 }
 
 /// Number of independent sums. This number exceeds the latency (4 or 5 cycles) times the throughput (2 per
-/// cycle) of multiply-adds, so that no multiply-add waits for the result of another multiply-add.
+/// cycle) of multiply-adds. Therefore, no multiply-add waits for the result of another multiply-add.
 const SUMS: usize = 12;
 
 /// Multiply-adds per sum and repetition; a repetition takes some 30 ms.

@@ -233,10 +233,10 @@ struct DeckArguments {
 
 /// Measure the speed of the time loop on a fixed problem, alone or under mpirun.
 ///
-/// The problem is a cubic lattice with 122 neighbours within the horizon, a fixed time step and no output.
-/// Prints the bond updates per second and core, the time by phase, the memory of all processes and the
-/// halo traffic. Also measures the memory bandwidth and the arithmetic rate that the same threads can
-/// reach, and prints which fractions of these limits the time loop reaches.
+/// The problem is a cubic lattice with 122 neighbours within the horizon. The time step is fixed, and no
+/// output is written. Prints the bond updates per second and core, the time by phase, the memory of all
+/// processes and the halo traffic. Also measures the memory bandwidth and the arithmetic rate that the same
+/// threads can reach, and prints which fractions of these limits the time loop reaches.
 /// docs/src/developers/performance.md explains the numbers.
 #[derive(Args)]
 #[command(after_help = "\
@@ -266,12 +266,12 @@ struct BenchArguments {
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Number of points of a cube, rounded to a cube number, or numbers of points X,Y,Z along the edges of a
-    /// block.
+    /// Size of the block. N is the number of points of a cube; it is rounded to a cube number. X,Y,Z are the
+    /// numbers of points along the edges.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 
-    /// Number of measured time steps; a tenth as many warm-up steps precede them.
+    /// Number of measured time steps. Before these steps, N/10 warm-up steps (rounded up) are run.
     #[arg(short, long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
 

@@ -121,8 +121,8 @@ impl Progress {
     }
 }
 
-/// Return the time of the line that follows a line printed at the time `elapsed`. Both times are measured
-/// from the start, s.
+/// Return the time of the next line after a line at the time `elapsed`. Both times are measured from the
+/// start, s.
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE

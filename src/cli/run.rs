@@ -1,4 +1,4 @@
-//! `fissure run`: from a deck to a result.
+//! `fissure run`: run a deck and write a result.
 
 use crate::cli::{errln, outln};
 use std::path::Path;
@@ -221,7 +221,7 @@ impl Observer for Log {
     }
 }
 
-/// Print the figures of a run and the paths of its files.
+/// Print the summary of a run and the paths of its files.
 fn report(outcome: &Outcome, threads: usize, verbosity: Verbosity) {
     if outcome.summary.steps > 0 {
         summary::print(outcome, threads);

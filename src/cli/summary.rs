@@ -1,11 +1,11 @@
-//! Printed figures of a run.
+//! Printed summary of a run.
 
 use crate::cli::outln;
 use fissure::run::{Outcome, Phases, Summary};
 
 use super::format::{count, si};
 
-/// Print the figures of a run with at least one step. Call on rank 0 only.
+/// Print the summary of a run with at least one step. Call on rank 0 only.
 pub fn print(outcome: &Outcome, threads: usize) {
     let summary = &outcome.summary;
     let (energies, largest, broken) = match &outcome.last_row {

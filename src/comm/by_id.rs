@@ -1,8 +1,9 @@
-//! Redistribution of point values between owners and ranges of consecutive global ids.
+//! Redistribution of point values from the owners of the points to an order by global id, and back. In this
+//! order, each rank has one range of consecutive ids.
 //!
-//! Files store points by id, so files do not depend on the number of ranks. Points of refined levels have the
-//! id m + k n, where n is the number of level-0 points and k ≥ 1. In files, such a point follows the level-0
-//! point m.
+//! Files store points by id, so files do not depend on the number of ranks. A point of a refined level has
+//! the id m + k n. Here m is the id of a level-0 point, n is the number of level-0 points, and k ≥ 1. In
+//! files, such a point follows the level-0 point m.
 
 use std::ops::Range;
 
@@ -18,8 +19,8 @@ pub struct IdOrder {
     /// For each rank q: the local indices of the points that this rank owns and whose ids are in the range of
     /// q.
     owned: Vec<Vec<u32>>,
-    /// For each rank q: the positions, within this rank's range of ids, of the points that q owns, in the
-    /// order in which q lists these points.
+    /// For each rank q: positions in this rank's range of ids. These are the positions of the points that q
+    /// owns, in the order of `owned` on rank q.
     rows_in_range: Vec<Vec<u32>>,
 }
 
@@ -149,9 +150,9 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
 /// Send rows of `values` to the other ranks, and write the received rows to a new array of length `size`.
 /// Rows that stay on this rank are copied. Collective.
 ///
-/// For each rank q, `from_rows` lists the rows of `values` to send to q, and `to_rows` lists the rows of the
-/// result to receive from q, in the order in which q sends these rows. `from` and `to` map a row to its range
-/// of values.
+/// For each rank q, `from_rows` lists the rows of `values` to send to q. `to_rows` lists the rows of the
+/// result to receive from q, in the order in which q sends them. `from` and `to` map a row to its range of
+/// values.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),

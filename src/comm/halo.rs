@@ -1,7 +1,7 @@
 //! The halo plan: the owned points sent to each rank, and the ghosts received from each rank.
 //!
-//! Ghosts follow the owned points, grouped by owner and sorted by id. Therefore the ghosts of one owner are
-//! one contiguous range.
+//! Ghosts follow the owned points. The ghosts are grouped by owner and, in each group, sorted by id.
+//! Therefore the ghosts of one owner are one contiguous range.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -114,7 +114,8 @@ impl Halo {
         self.sent.time += start.elapsed() - working;
     }
 
-    /// Copy the received values to the ghost entries of the packed arrays, in the same order.
+    /// Copy the received values to the ghost entries of `components`. The arrays must be in the same order as
+    /// in [`Self::pack`].
     pub fn unpack<'a>(&self, components: impl Iterator<Item = &'a mut [f64]>) {
         for (k, component) in components.enumerate() {
             for (neighbour, buffers) in self.neighbours.iter().zip(&self.buffers) {

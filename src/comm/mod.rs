@@ -113,8 +113,8 @@ pub struct Found<T, const N: usize = 1> {
 }
 
 /// Find the candidate with the smallest key over all ranks. Among candidates with equal keys, the ids decide,
-/// in lexicographic order. `own` is the candidate of this rank. `None` if there are no candidates. The result
-/// is the same on all ranks. Collective.
+/// in lexicographic order. `own` is the candidate of this rank. Return `None` if no rank has a candidate. The
+/// result is the same on all ranks. Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,

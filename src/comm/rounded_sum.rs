@@ -1,8 +1,9 @@
 //! Sums of terms that are rounded to multiples of one unit.
 //!
 //! A sum of integers does not depend on the order of the terms. It is therefore bitwise the same for any
-//! number of ranks and threads. A rounded sum needs 8 bytes, an [`ExactSum`](super::ExactSum) 552 bytes. The
-//! error is at most half a unit per term. Use rounded sums if the sum must be reproducible but not exact.
+//! number of ranks and threads. A rounded sum needs 8 bytes, and an [`ExactSum`](super::ExactSum) needs 552
+//! bytes. The error is at most half a unit per term. Use rounded sums if the sum must be reproducible but
+//! need not be exact.
 
 /// Number of bits for the magnitude of a sum.
 const BITS: i32 = 62;
@@ -21,8 +22,8 @@ pub struct Unit {
 
 impl Unit {
     /// Return a unit for which the sum of `terms` terms does not overflow. The absolute value of a term must
-    /// not exceed `magnitude`. The unit is a power of 2 close to the smallest possible one, and at least
-    /// 2⁻¹⁰⁰⁰. `None` if the magnitude is 0 or not finite.
+    /// not exceed `magnitude`. The unit is a power of 2. It is close to the smallest unit without overflow,
+    /// and at least 2⁻¹⁰⁰⁰. `None` if the magnitude is 0 or not finite.
     pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
         if magnitude == 0.0 || !magnitude.is_finite() {
             return None;

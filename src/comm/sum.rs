@@ -2,14 +2,16 @@
 //!
 //! Every finite `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide fixed-point integer represents any sum
 //! exactly. Integer addition is associative, so the result is bitwise the same for any number of ranks and
-//! threads. The result is within one unit in the last place of the exact sum.
+//! threads. At the end, the integer is converted to `f64`, with an error of at most one unit in the last
+//! place.
 
 use super::Communicator;
 
 const LIMB_BITS: usize = 32;
-/// The range 2⁻¹⁰⁷⁴ … 2¹⁰²³ needs 2098 bits. Two more limbs hold the carries of 2⁶³ terms.
+/// The range 2⁻¹⁰⁷⁴ … 2¹⁰²³ needs 2098 bits. Two more limbs hold the carries of up to 2⁶³ terms.
 const LIMBS: usize = 2098_usize.div_ceil(LIMB_BITS) + 2;
-/// Each term adds less than 2³² to a limb, so 2³⁰ terms fit before a carry.
+/// Number of terms after which carries must be propagated. Each term adds less than 2³² to a limb, so 2³⁰
+/// terms do not overflow its `i64`.
 const TERMS_BEFORE_CARRY: u32 = 1 << 30;
 
 /// An exact accumulator of finite `f64` terms.

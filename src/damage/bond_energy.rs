@@ -15,7 +15,7 @@ use crate::dimension::Dimension;
 pub enum Calibration {
     /// Breaking all bonds across a unit area dissipates the fracture energy.
     Energy,
-    /// Opening a crack dissipates the fracture energy, so w_c of [`Self::Energy`] is divided by the
+    /// Opening a crack dissipates the fracture energy: w_c is the w_c of [`Self::Energy`], divided by the
     /// separation energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run;
     /// `None` until then.
     Opening(Option<f64>),
@@ -38,7 +38,7 @@ pub struct BondEnergy {
     /// Factor α in the threshold of a point, see [`Self::threshold`]. α multiplies the smallest stretch s_min
     /// of the point's intact bonds.
     pub alpha: f64,
-    /// Critical stretch s0 for the same fracture energy; the threshold depends on α s_min/s0.
+    /// Critical stretch s0 for the same fracture energy as w_c; the threshold depends on α s_min/s0.
     pub stretch: f64,
     /// Rule for breaking bonds by their work.
     pub rule: WorkRule,
@@ -54,8 +54,7 @@ impl Calibration {
         }
     }
 
-    /// Return the energy that breaking all bonds across a unit area dissipates, divided by the fracture
-    /// energy.
+    /// Return the energy dissipated by breaking all bonds across a unit area, divided by the fracture energy.
     pub fn energy_ratio(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         match (self, dimension) {
@@ -85,8 +84,9 @@ impl BondEnergy {
             }
     }
 
-    /// Return the threshold (J/m⁶) of a point with strength f and the smallest stretch s_min of its intact
-    /// bonds. The threshold is w_c ((f s0 − α s_min)/s0)², or 0 if f s0 < α s_min. Without scatter f = 1.
+    /// Return the threshold (J/m⁶) of a point, from its strength factor f and the smallest stretch s_min of
+    /// its intact bonds. The threshold is w_c ((f s0 − α s_min)/s0)², or 0 if f s0 < α s_min. Without scatter
+    /// f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength_factor: f64, smallest: f64) -> f64 {
         let share = (strength_factor - self.alpha * smallest / self.stretch).max(0.0);
@@ -100,8 +100,8 @@ mod tests {
     use crate::damage::{BreakableBonds, WorkMeasure};
     use crate::dimension::Constraint;
 
-    /// Return the energy of breaking all bonds across a unit area, by the midpoint rule, divided by the
-    /// fracture energy.
+    /// Return the energy of breaking all bonds across a unit area, divided by the fracture energy. The energy
+    /// is integrated by the midpoint rule.
     fn taken(dimension: Dimension) -> f64 {
         let (horizon, energy, cells) = (3e-3, 135.0, 1500_u32);
         let critical = BondEnergy::from_energy(dimension, energy, horizon);

@@ -1,10 +1,12 @@
 //! Criteria that break bonds. Both ends of a bond evaluate its criterion with the same operations, so that
 //! the results at both ends agree.
 //!
-//! - Stretches are compared by the relative square extension x, see [`crate::material::bond`]. No root is
-//!   needed for x.
-//! - Energies are compared by the work of the force states of the ends that act on the bond.
-//! - Stresses are compared by the mean of the stress measures of the ends that act on the bond.
+//! - Stretch criteria compare the relative square extension x of the bond with its critical value, see
+//!   [`crate::material::bond`]. No root is needed for x.
+//! - Energy criteria compare the work of the force states with the critical work. Only the ends that act on
+//!   the bond contribute.
+//! - Stress criteria compare the mean stress measure with the strength. Only the ends that act on the bond
+//!   contribute to the mean.
 
 use super::direction::DirectionFactors;
 use super::stress::MeanStress;
@@ -23,15 +25,16 @@ pub enum Criterion {
     Stretch(f64),
     /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
     /// of both blocks, 0 for a block without critical stretch. A law that scales thresholds scales only these
-    /// critical stretches, not the part of the threshold with α.
+    /// critical stretches, not the term of the threshold that contains α.
     Thresholds([f64; 2], Directions),
     /// Same as [`Self::Stretch`], with a separate critical stretch of each block; ∞ for a block without
     /// critical stretch.
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for thresholds that belong to different horizons.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
-    /// Bonds break when the work of the force states of the acting ends reaches the sum of the shares of
-    /// these ends in the critical work. The numbers are the shares of points i and j, J/m⁶.
+    /// Each acting end contributes the work of its force state, and a share of the critical work. Bonds break
+    /// when the sum of the works reaches the sum of the shares. The numbers are the shares of points i and j,
+    /// J/m⁶.
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the shares computed from the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
@@ -42,9 +45,9 @@ pub enum Criterion {
     StressThresholds(StressRule),
 }
 
-/// Factors w_c/w of the critical work by direction, at points i and j; see [`ToughnessByDirection`]. `None`
-/// if the fracture energy of neither body depends on the direction. The factors multiply work thresholds;
-/// their square roots multiply stretch thresholds.
+/// Factors w_c/w of the critical work at points i and j, as functions of the bond's direction; see
+/// [`ToughnessByDirection`]. `None` if the fracture energy of neither body depends on the direction. The
+/// factors multiply work thresholds; their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
 /// Factors that convert a work threshold or a stretch threshold to another horizon. Entry `[e][k]` converts
@@ -133,7 +136,7 @@ impl BreakableBonds {
         }
     }
 
-    /// Return `bits` without the bonds that cannot break in this sense.
+    /// Return `bits`, with the bits of all bonds that this setting does not allow to break cleared.
     #[inline(always)]
     fn select<const D: usize>(self, bits: u8, bond: &Bond<D>) -> u8 {
         match self {
@@ -143,7 +146,8 @@ impl BreakableBonds {
     }
 }
 
-/// Data that criteria read at both ends of eight bonds, in addition to laws and point numbers.
+/// Data that criteria read at both ends of eight bonds, in addition to the laws and the numbers
+/// [`Law::Point`].
 #[derive(Clone, Copy)]
 pub struct Ends<'a> {
     /// Data of points i and j.
@@ -224,7 +228,7 @@ impl Criterion {
     }
 
     /// Limit of |x|: bonds above this limit are marked in [`Bond::beyond_series`]. x is the relative square
-    /// extension, see [`crate::material::bond`]. If [`Self::marks_all`], only marked bonds break.
+    /// extension, see [`crate::material::bond`]. If [`Self::marks_all`] is true, only marked bonds break.
     #[inline(always)]
     pub fn limit(&self) -> f64 {
         match *self {
@@ -252,8 +256,9 @@ impl Criterion {
         }
     }
 
-    /// Return one bit per bond, set if the bond meets the criterion. `laws` and `points` are the laws and the
-    /// point numbers of points i and j. `work` (J/m⁶) is read only if [`Self::reads_work`].
+    /// Return one bit per bond, set if the bond meets the criterion. `laws` are the laws of points i and j,
+    /// and `points` the numbers [`Law::Point`] of these points. `work` (J/m⁶) is read only if
+    /// [`Self::reads_work`] is true.
     #[inline(always)]
     pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
         &self,
@@ -372,10 +377,11 @@ impl Criterion {
         }
     }
 
-    /// Return the fraction of the energy of each broken bond that exceeds the criterion: 1 − (s_c/s)²,
-    /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0, with the threshold s_c, w_c or σ_c. Bonds exceed the criterion
-    /// because the criterion is checked only once per step. Criteria of stretch read [`Bond::stretch`] and
-    /// `scale`, the factor [`Law::toughness_scale`] of laws that scale critical stretches.
+    /// Return, for each broken bond, the part of its energy above the threshold, as a fraction of its energy:
+    /// 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)², at least 0. s, w and σ are the stretch, work and stress of
+    /// the bond, and s_c, w_c and σ_c are their thresholds. Bonds exceed the threshold because the criterion
+    /// is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`, the factor
+    /// [`Law::toughness_scale`] of laws that scale critical stretches.
     #[inline(always)]
     pub fn overshoot<S: Simd, const D: usize>(
         &self,

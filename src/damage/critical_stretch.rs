@@ -1,11 +1,11 @@
 //! Stretch criterion: a bond breaks irreversibly when its stretch reaches f s0 − α s_min.
 //!
-//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s_min is the smallest stretch of the intact bonds
-//! of a point, and f its strength (1 without scatter). If the horizons of both points are equal, the smaller
-//! threshold of points i and j holds for a bond, so that both ends agree. Otherwise
-//! [`StretchConversion`](crate::damage::StretchConversion) converts the thresholds. α = 0 is the plain
-//! critical stretch of Dipasquale et al. 2014, eq. 6. The comparison is in
-//! [`Criterion::breaking`](crate::damage::Criterion::breaking).
+//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s0 is the critical stretch. s_min is the smallest
+//! stretch of the intact bonds of a point. f is the strength factor of the point, 1 without scatter. If the
+//! horizons of both points are equal, the smaller threshold of points i and j holds for a bond, so that both
+//! ends agree. Otherwise [`StretchConversion`](crate::damage::StretchConversion) converts the thresholds.
+//! With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6. The comparison
+//! is in [`Criterion::breaking`](crate::damage::Criterion::breaking).
 
 use std::f64::consts::PI;
 
@@ -50,7 +50,7 @@ impl CriticalStretch {
     }
 
     /// Return s0 of an ordinary state-based law from the fracture energy G0 (J/m²) and the horizon δ (m).
-    /// Pulling a body apart with this critical stretch dissipates G0 per area.
+    /// Pulling apart a body whose bonds break at this stretch dissipates G0 per area.
     pub fn from_energy_ordinary(
         law: &Ordinary,
         influence: Influence,
@@ -91,7 +91,7 @@ impl CriticalStretch {
     }
 
     /// Return the ratio of stress to strain in tension along one direction, Pa. The transverse stresses are
-    /// 0, except in directions in which the dimension allows no strain.
+    /// 0, except in directions without strain (plane strain and uniaxial strain).
     pub fn tensile_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
         let (modulus, nu) = (elastic.youngs_modulus, elastic.poisson_ratio);
         match dimension {
@@ -109,8 +109,8 @@ impl CriticalStretch {
         }
     }
 
-    /// Return the threshold f s0 − α s_min of a point, from its strength f and the smallest stretch s_min of
-    /// its intact bonds. Without scatter f = 1.
+    /// Return the threshold f s0 − α s_min of a point, from its strength factor f and the smallest stretch
+    /// s_min of its intact bonds. Without scatter f = 1.
     #[inline(always)]
     pub fn threshold(&self, strength_factor: f64, smallest: f64) -> f64 {
         strength_factor * self.critical - self.alpha * smallest

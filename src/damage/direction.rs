@@ -10,8 +10,8 @@
 //! a have the larger fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
 //!
 //! A crack with the normal N breaks all bonds that cross its plane. Its fracture energy is proportional to
-//! the mean of w_c(n) over all directions n with the weight |n·N|. The mean of c^k is a product over j = 1 …
-//! k of these factors, for N parallel (∥) and perpendicular (⊥) to a:
+//! the mean of w_c(n) over all directions n with the weight |n·N|. The mean of c^k is the product of the
+//! following factors over j = 1 … k, for N parallel (∥) or perpendicular (⊥) to a:
 //!
 //! | c | N | plane | space |
 //! |---|---|---|---|
@@ -20,9 +20,9 @@
 //! | 1 − (n·a)² | ∥ a | (2j − 1)/(2j + 1) | j/(j + 1) |
 //! | 1 − (n·a)² | ⊥ a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
 //!
-//! p and q follow from the fracture energies of cracks along and across a. k is 1 if p is then at least 0.1,
-//! otherwise 2. Fracture energies with p < 0.1 for k = 2 are rejected: bonds in the weak direction would
-//! break at small strains, far from any crack. A critical stretch is multiplied by √(w_c/w).
+//! p and q follow from k and the fracture energies of cracks along and across a. k is 1 if p is at least 0.1
+//! with k = 1, otherwise 2. If p < 0.1 with k = 2 too, the fracture energies are rejected: bonds in the weak
+//! direction would break at small strains, far from any crack. A critical stretch is multiplied by √(w_c/w).
 
 use std::f64::consts::PI;
 
@@ -96,7 +96,7 @@ impl ToughnessByDirection {
         })
     }
 
-    /// Compute w_c/w of eight bonds from ξ and `inverse`, 1/|ξ|. Both ends of a bond compute the same bits.
+    /// Compute w_c/w of eight bonds from ξ and `inverse`, 1/|ξ|. The results at both ends are bit-identical.
     #[inline(always)]
     fn factor<S: Simd, const D: usize>(&self, simd: S, xi: [Lanes; D], inverse: Lanes) -> Lanes {
         let mut along = xi[0] * self.axis[0];
@@ -184,8 +184,8 @@ pub(super) struct DirectionFactors<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> DirectionFactors<'a, D> {
-    /// Copy ξ and 1/|ξ| of the bonds. With a reference to the bonds, all their data would stay in memory
-    /// instead of registers.
+    /// Copy ξ and 1/|ξ| of the bonds. A reference to the bonds would keep all their data in memory instead of
+    /// registers.
     #[inline(always)]
     pub(super) fn new<S: Simd>(
         simd: S,

@@ -2,8 +2,8 @@
 //!
 //! The criterion reads a scalar measure of the Cauchy stress σ = P Fᵀ/det F of a point. P is the first
 //! Piola–Kirchhoff stress of the point, and F is the deformation gradient of its family. In plane problems, σ
-//! and det F include the direction perpendicular to the plane. The mean of the measures at the ends that act
-//! on the bond is compared with the strength. Strength and horizon determine the energy per area that a
+//! and det F include the direction perpendicular to the plane. The strength is compared with the mean of the
+//! measures at the ends that act on the bond. Strength and horizon determine the energy per area that a
 //! growing crack dissipates.
 
 use nalgebra::Matrix3;

@@ -14,16 +14,17 @@ use crate::message::format_number;
 use crate::points::{BodyPoints, Columns};
 use crate::problem;
 
-/// Largest number of bodies. Some tables have an entry for each pair of bodies, such as the length of the
-/// longest bond in the bond search. These tables grow with the square of the number of bodies.
+/// Largest number of bodies. Some tables have an entry for each pair of bodies. For example, the bond search
+/// reads the length of the longest bond of each pair. These tables grow with the square of the number of
+/// bodies.
 const MOST_BODIES: usize = 256;
 
-/// Validate the bodies. `spacing` has the edges of a lattice cell in `[grid]`, m.
+/// Validate the bodies. `spacing` is the spacing in `[grid]`: the edges of a lattice cell, m.
 ///
 /// # Errors
 /// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
 /// the material does not support, an invalid number or shape, or a body without exactly one source of points.
-/// On a missing spacing, an unknown ending of the name of a mesh file, and a key that does not belong to the
+/// On a missing spacing, a mesh file whose name has an unknown ending, and a key that does not belong to the
 /// source of points. If two bodies request the same rows or elements of a file, or name different columns of
 /// the same file.
 pub fn bodies(
@@ -91,11 +92,12 @@ pub fn bodies(
     })
 }
 
-/// Validate the sources of the bodies' points without the other keys of the bodies. `spacing` has the edges
-/// of a lattice cell in `[grid]`, m.
+/// Validate the sources of the bodies' points without the other keys of the bodies. `spacing` is the spacing
+/// in `[grid]`: the edges of a lattice cell, m.
 ///
 /// # Errors
-/// As [`bodies`] for the sources of points, except that spacings are not compared with the horizon.
+/// On the errors that [`bodies`] finds in the sources of points. However, spacings are not compared with the
+/// horizon.
 pub fn point_sources(
     scope: &Scope,
     deck: &Deck,
@@ -139,9 +141,9 @@ fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
 }
 
 /// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin, so that
-/// their points stay aligned. In each direction, the origin depends on the first body with this spacing that
-/// is a whole number of cells long between flat faces. The origin is 0 if a grid with the origin 0 fills this
-/// body exactly, otherwise the lower face of the body. Without such a body, the origin is 0.
+/// their points stay aligned. In each direction, one of these bodies determines the origin: the first body
+/// that has two flat faces a whole number of cells apart. The origin is 0 if a grid with the origin 0 fills
+/// this body exactly, otherwise the lower face of the body. Without such a body, the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -191,7 +193,7 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 }
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
-/// faces normal to this axis. Across the sides of a prism or polygon, the positions are the smallest and the
+/// faces normal to this axis. For a prism or polygon, the positions along x or y are the smallest and the
 /// largest coordinate of the corners, even if the sides are slanted. A union has the lowest and the highest
 /// face of its parts, and no flat faces if a part has none. A difference has the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {

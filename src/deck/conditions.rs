@@ -168,8 +168,8 @@ fn on_a_layer(condition: &grammar::Condition) -> bool {
     condition.traction.is_some() || condition.pressure.is_some()
 }
 
-/// Return the thickness of the layer on which a condition acts; `None` for a condition without a layer. A
-/// `depth` of such a condition is an error.
+/// Return the thickness of the layer on which a condition acts; `None` for a condition without a layer. The
+/// key `depth` of a condition without a layer is an error.
 fn depth(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Option<Depth>> {
     match &condition.depth {
         Some(depth) if on_a_layer(condition) => {

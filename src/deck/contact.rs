@@ -27,7 +27,7 @@ pub(super) struct Keys<'a> {
 /// # Errors
 /// On numbers out of range, and on invalid or repeated pairs. On friction in a relaxation, and on methods or
 /// grids that do not support contact or rigid bodies. On a pair that inherits the stiffness of `[contact]`
-/// but has another model than `[contact]`; only the model `"none"` is allowed then.
+/// but has another model than `[contact]`, unless this other model is `"none"`.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
@@ -197,8 +197,8 @@ pub(super) fn rule(
     }))
 }
 
-/// Return the names of the two bodies of a pair; return an error on an unknown body, or unless there are
-/// exactly two names.
+/// Return the names of the two bodies of a pair. An unknown body is an error, and so is a number of names
+/// other than two.
 fn pair(
     scope: &Scope,
     key: &str,

@@ -20,7 +20,7 @@ type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
 ///
 /// # Errors
 /// On an invalid number, an unknown set, or a table without exactly one measure of toughness. On a
-/// calibration or a toughness by direction that is not available in this dimension, on incomplete keys of a
+/// calibration or a toughness by direction that is not available in this dimension. On incomplete keys of a
 /// toughness by direction, and on a seed without `weibull_modulus`.
 pub fn damage(
     scope: &Scope,

@@ -209,9 +209,9 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the depth of a traction or pressure, m; `None` for a condition without a depth. If the depth is the
-/// spacing of each body, return this spacing only if all bodies that may have points in the set have the same
-/// single spacing; otherwise, return `None`.
+/// Return the depth of a traction or pressure, m; `None` for a condition without a depth. The depth may be
+/// the spacing of each body. If all bodies that may have points in the set have the same single spacing, this
+/// spacing is returned, otherwise `None`.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

@@ -19,10 +19,10 @@
 //! mean `(not x) < 1`. A `!` at the start of a comparison therefore requires parentheses.
 //!
 //! The variables are `x`, `y`, `z` and `t`, where the deck allows these. The only constant is `pi`. These
-//! names hide parameters of the same name, but names of functions do not. In keys that are functions of the
-//! length of a bond, `r` is the only variable. Elsewhere, `r` can be a parameter. The name of a
-//! [table](Table) stands for the value of the table at the time `t`, and is allowed where `t` is allowed. The
-//! functions are:
+//! names hide parameters of the same name. Names of functions do not hide parameters. In keys that are
+//! functions of the length of a bond, `r` is the only variable. Elsewhere, `r` can be a parameter. The name
+//! of a [table](Table) stands for the value of the table at the time `t`, and is allowed where `t` is
+//! allowed. The functions are:
 //!
 //! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;

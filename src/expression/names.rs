@@ -8,7 +8,7 @@ use super::{Table, Variable};
 /// Largest number of known names in an error message.
 const MOST_NAMES_LISTED: usize = 16;
 
-/// A function, as the instruction that evaluates it; the variant gives the number of arguments.
+/// A function, stored as the operation that evaluates it. The variant gives the number of arguments.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Function {
     /// One argument.

@@ -259,7 +259,7 @@ impl Parser<'_> {
         Err(ExpressionError::new(name.start, close.end, message))
     }
 
-    /// Return the error for a next token that is not a value.
+    /// Return the error for a missing value: the next token cannot start a value.
     fn missing_value(&self) -> ExpressionError {
         let token = self.peek();
         let after = match self.next.checked_sub(1) {
@@ -273,8 +273,8 @@ impl Parser<'_> {
         token.error(message)
     }
 
-    /// Return the error for a next token that follows a value inside the parenthesis `open`, but does not
-    /// close this parenthesis.
+    /// Return the error for an unclosed parenthesis `open`: the next token follows a value inside the
+    /// parenthesis, but does not close the parenthesis.
     fn unclosed(&self, open: Token) -> ExpressionError {
         if self.peek().kind == Kind::End {
             return open.error("unbalanced parenthesis: this `(` is never closed");
@@ -282,7 +282,7 @@ impl Parser<'_> {
         self.misplaced()
     }
 
-    /// Return the error for a next token that cannot follow a value.
+    /// Return the error for a misplaced token: the next token cannot follow a value.
     fn misplaced(&self) -> ExpressionError {
         let token = self.peek();
         let text = self.text_of(token);

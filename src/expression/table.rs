@@ -47,8 +47,8 @@ impl Table {
     }
 
     /// Return the value at a time (s). The first and the last segment extend beyond the rows. Times beyond
-    /// the rows occur, because the last step of a run may pass the end of the run, and the velocity of a
-    /// support is computed from values before and after a time.
+    /// the rows occur for two reasons. The last step of a run may pass the end of the run. The velocity of a
+    /// support at a time is computed from values before and after this time.
     pub(super) fn at(&self, time: f64) -> f64 {
         let k = self.segment(time);
         let [from, to] = [self.values[k], self.values[k + 1]];

@@ -403,7 +403,7 @@ fn deep_nesting_is_an_error_and_long_sums_are_not() {
     assert_eq!(value(&format!("min(9{})", ", x".repeat(100_000))), 2.0);
 }
 
-/// A syntax tree with direct evaluation, as a reference.
+/// A syntax tree. Its direct evaluation is the reference for parsed expressions.
 #[derive(Debug, Clone)]
 enum Tree {
     /// A nonnegative number.
@@ -509,8 +509,8 @@ impl Tree {
         }
     }
 
-    /// Return the text. If `minimal`, parentheses enclose only the operands that need them; otherwise, all
-    /// operands.
+    /// Return the text. If `minimal` is true, parentheses enclose only the operands that need them. If it is
+    /// false, parentheses enclose all operands.
     fn text(&self, names: &[&str; 4], minimal: bool) -> String {
         let operand = |tree: &Self, needed: bool| {
             let text = tree.text(names, minimal);
@@ -628,7 +628,7 @@ fn jumbles() -> impl Strategy<Value = String> {
     prop::collection::vec(prop::sample::select(words), 0..60).prop_map(|words| words.concat())
 }
 
-/// Test whether the text is evaluated, or rejected with a range inside the text.
+/// Test whether the text is evaluated, or rejected with an error whose byte range lies inside the text.
 fn is_handled(text: &str) -> bool {
     let _ = Expression::names(text);
     match parse(text) {

@@ -7,8 +7,8 @@ use crate::partition::Domain;
 
 use super::grid::GridFrame;
 
-/// Number of lines per tile in y and in z. The points are sorted tile by tile, because the points of a tile
-/// and their neighbours fit in the cache.
+/// Width of a tile in y and in z, in lines. A tile contains `TILE` × `TILE` lines. The points are sorted tile
+/// by tile, because the points of a tile and their neighbours fit in the cache.
 const TILE: i64 = 8;
 
 /// Local index and sort keys of a grid point.
@@ -39,7 +39,7 @@ impl GridPoint {
 ///   point, all of them count as border points.
 /// - Interior points come before border points.
 /// - The interior points begin with the points that are on no grid, in their previous order; the points of
-///   each grid follow. The border points have the same order.
+///   each grid follow. The border points are sorted in the same way.
 pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     if frames.is_empty() {
         return;
@@ -80,7 +80,7 @@ pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     domain.reorder(&order, interior);
 }
 
-/// Split points in line order into groups of up to eight that are adjacent along x.
+/// Split points that are sorted by `GridPoint::line` into groups of up to eight points adjacent along x.
 fn vectors_mut(points: &mut [GridPoint]) -> impl Iterator<Item = &mut [GridPoint]> {
     let adjacent = |a: &GridPoint, b: &GridPoint| {
         let (grid, [z, y, x]) = a.line();

@@ -1,4 +1,4 @@
-//! Errors of building families.
+//! Errors that occur while families are built.
 
 use crate::error::Error;
 use crate::memory::Shortage;
@@ -11,7 +11,7 @@ use crate::problem::{Body, PointSource};
 /// spacings in 3-D and 80 in 2-D.
 pub const MOST_NEIGHBOURS: f64 = 20_000.0;
 
-/// An error of building families.
+/// An error that occurs while families are built.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
     /// Two points with the same position.
@@ -29,8 +29,8 @@ pub enum Fault {
     },
     /// Bonds that do not fit in memory.
     TooLittleMemory {
-        /// The pair of blocks whose lattice or weights do not fit. If the lists or bond histories of all
-        /// pairs do not fit together, this is the pair that takes most memory.
+        /// The pair of blocks whose lattice or weights do not fit. If the lists or bond histories of
+        /// all pairs need more memory in total than is available, this is the pair that takes most memory.
         blocks: [usize; 2],
         /// Needed and available memory.
         shortage: Shortage,

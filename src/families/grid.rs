@@ -35,7 +35,8 @@ pub struct GridFrame {
 }
 
 impl GridFrame {
-    /// The cell whose centre is nearest to a position (m), counted from [`Self::origin`].
+    /// Indices of the cell whose centre is nearest to a position (m). The cell at [`Self::origin`] has the
+    /// indices 0, 0, 0.
     pub fn cell(&self, position: [f64; 3]) -> [i64; 3] {
         std::array::from_fn(|k| ((position[k] - self.origin[k]) / self.spacing[k]).round() as i64)
     }
@@ -52,9 +53,9 @@ struct Run {
 /// A line of slots.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
-    /// Number of the band, and y and z of the cells.
+    /// Number of the band, then the y and z indices of the cells of the line.
     pub(super) at: [i64; 3],
-    /// x of the cell of the first slot.
+    /// x index of the cell of the first slot.
     pub(super) first: i64,
     /// The first slot.
     pub(super) start: usize,
@@ -64,8 +65,8 @@ pub(super) struct Line {
 
 /// The layout of a grid's local points, including ghosts.
 ///
-/// Holes pad the layout at both ends. Therefore a load of eight slots is in bounds at any offset of a bond
-/// from an occupied slot.
+/// Holes pad the layout at both ends. Therefore a load of eight slots is in bounds if it starts at an
+/// occupied slot plus the offset of any bond.
 #[derive(Debug)]
 pub struct Grid {
     /// Origin, spacing and blocks of the grid.
@@ -74,10 +75,11 @@ pub struct Grid {
     pub(super) lines: Vec<Line>,
     /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
-    /// For owned points and for ghosts: the runs by slot, and the index of the first run of each chunk of
-    /// [`CHUNK`] slots, followed by the number of runs.
+    /// Two entries: one for the owned points, one for the ghosts. An entry contains the runs, sorted by slot,
+    /// and the index of the first run of each chunk of [`CHUNK`] slots. The number of runs follows the last
+    /// index.
     runs: [(Vec<Run>, Vec<u32>); 2],
-    /// The runs of the owned points, by local index.
+    /// The runs of the owned points, sorted by local index.
     by_point: Vec<Run>,
 }
 
@@ -259,7 +261,7 @@ impl Grid {
     }
 }
 
-/// A cursor that maps slots to local indices; it caches the last run.
+/// A cursor that maps slots to local indices; it caches the run of the previous call.
 pub(super) struct Lookup<'a> {
     grid: &'a Grid,
     last: Run,
@@ -326,8 +328,8 @@ fn by_point(runs: &[Run]) -> Vec<Run> {
     sorted
 }
 
-/// Return the longest runs of the selected slots, split at the boundaries of chunks of [`CHUNK`] slots. Also
-/// return the index of the first run of each chunk, followed by the number of runs.
+/// Split the selected slots into runs. Each run is as long as possible within a chunk of [`CHUNK`] slots.
+/// Also return the index of the first run of each chunk, followed by the number of runs.
 fn runs(points: &[u32], selected: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut starts = Vec::new();

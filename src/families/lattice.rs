@@ -22,7 +22,7 @@ const CHUNK: usize = 256;
 /// The bonds from points i of one block to points j of one block, both on the same grid.
 #[derive(Debug, Clone)]
 pub struct BondLattice {
-    /// Block of the points i, which sum over these bonds.
+    /// Block of the points i, whose sums run over these bonds.
     pub block_i: usize,
     /// Block of the neighbours j.
     pub block_j: usize,
@@ -41,8 +41,8 @@ pub struct BondLattice {
     vectors: Vec<Vector>,
     /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
-    /// Shift for each line of the grid and each line offset. The shift is added to the slot of a point in the
-    /// line, and gives the slot at the same x in the line at this offset.
+    /// Shift for each line of the grid and each line offset. For a point in the line, the slot of the point
+    /// plus the shift is the slot at the same x in the line at this offset.
     shifts: Vec<i32>,
     /// State of the bonds: a group of eight bonds for each lane group and offset.
     pub(super) store: Store,
@@ -265,8 +265,8 @@ impl BondLattice {
         }
     }
 
-    /// Index of the lane group whose [`Self::points_of`] contain a point; `None` if no lane group contains
-    /// the point.
+    /// Index of the lane group whose range [`Self::points_of`] contains a point; `None` if no such range
+    /// contains the point.
     fn vector_of(&self, point: usize) -> Option<usize> {
         let k = self.vectors_below(point + 1).checked_sub(1)?;
         (point < self.points_of(k).end).then_some(k)
@@ -353,8 +353,8 @@ impl BondLattice {
         bit_bytes(self.offsets.len()) + self.offsets.len() * self.store.history_bytes_per_bond()
     }
 
-    /// Call `visit(point, vector, lane)` for each point with bonds. The arguments are the local index, the
-    /// index of the lane group, and the lane of the point.
+    /// Call `visit(point, vector, lane)` for each point with bonds. The arguments are the local index of the
+    /// point, the index of its lane group, and its lane.
     pub fn for_each_point(&self, mut visit: impl FnMut(usize, usize, usize)) {
         for (k, vector) in self.vectors.iter().enumerate() {
             for lane in (0..WIDTH).filter(|lane| vector.members >> lane & 1 == 1) {

@@ -13,7 +13,7 @@ const CHUNK: usize = 512;
 /// The bonds from points i of one block to points j of one block.
 #[derive(Debug, Clone, Default)]
 pub struct BondList {
-    /// Block of the points i, which sum over these bonds.
+    /// Block of the points i, whose sums run over these bonds.
     pub block_i: usize,
     /// Block of the neighbours j.
     pub block_j: usize,
@@ -155,7 +155,7 @@ impl BondList {
         }
     }
 
-    /// Memory of the weights of `ends` ends, bytes.
+    /// Memory of the weights, bytes. `ends` is the number of ends with weights of their own.
     pub fn weight_bytes(&self, ends: usize) -> u64 {
         (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
     }

@@ -1,8 +1,8 @@
 //! Families: the bonds between points.
 //!
-//! Bonds are stored per ordered pair of blocks, so all bonds ij of a [`BlockBonds`] have the same law at
-//! point i, and the same law at point j. The bonds of a point are sorted by the global id of the neighbour in
-//! lists, and by offset in lattices. Therefore the sum over the bonds of a point has the same order of
+//! Bonds are stored per ordered pair of blocks, so in a [`BlockBonds`] all points i have one law, and all
+//! points j have one law. In lists, the bonds of a point are sorted by the global id of the neighbour; in
+//! lattices, they are sorted by offset. Therefore the sum over the bonds of a point has the same order of
 //! operations on any number of ranks.
 
 mod arrange;
@@ -42,7 +42,7 @@ pub enum BlockBonds {
     Lattice(BondLattice),
 }
 
-/// Call the same method for either storage of the bonds.
+/// Evaluate the same expression for both types of bond storage.
 macro_rules! with {
     ($all:expr, $bonds:ident => $body:expr) => {
         match $all {
@@ -53,8 +53,8 @@ macro_rules! with {
 }
 
 impl BlockBonds {
-    /// Indices of two blocks: the block of the points i, which sum over these bonds, and the block of the
-    /// points j.
+    /// Indices of two blocks: the block of the points i, whose sums run over these bonds, and the block of
+    /// the points j.
     pub fn blocks(&self) -> [usize; 2] {
         with!(self, bonds => [bonds.block_i, bonds.block_j])
     }
@@ -80,8 +80,8 @@ impl BlockBonds {
         with!(self, bonds => bonds.cut(selected, cut));
     }
 
-    /// Call `visit(i, j)` with the local indices of every intact bond, for each point i. A bond between two
-    /// owned points of the same block is visited twice, as (i, j) and (j, i).
+    /// Call `visit(i, j)` for every intact bond ij of each point i; i and j are local indices. A bond between
+    /// two owned points of the same block is visited twice, as (i, j) and (j, i).
     pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
         with!(self, bonds => bonds.for_each_intact(visit));
     }
@@ -92,8 +92,8 @@ impl BlockBonds {
     }
 
     /// The range of owned points whose bonds are computed together with the bonds of a point. In a lattice,
-    /// these are the points of its lane group, up to the last point with bonds. In a list, or for a point
-    /// without bonds, the range contains this point only.
+    /// the range contains the points of this point's lane group, up to the last point with bonds. In a list,
+    /// or for a point without bonds, the range contains this point only.
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,
@@ -101,8 +101,8 @@ impl BlockBonds {
         }
     }
 
-    /// Call `visit(i, j)` with the local indices of every broken bond, for each point i. A bond between two
-    /// owned points of the same block is visited twice, as (i, j) and (j, i).
+    /// Call `visit(i, j)` for every broken bond ij of each point i; i and j are local indices. A bond between
+    /// two owned points of the same block is visited twice, as (i, j) and (j, i).
     pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
         with!(self, bonds => bonds.for_each_broken(visit));
     }

@@ -14,8 +14,8 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
 use super::neighbours::Neighbours;
 
-/// Relative tolerance of the cutoff. Without this tolerance, round-off would decide whether bonds as long as
-/// the horizon exist.
+/// Relative amount by which the cutoff exceeds the horizon. Without this tolerance, round-off would decide
+/// whether two points at a distance of one horizon have a bond.
 const HORIZON_TOLERANCE: f64 = 1e-9;
 
 /// Number of points that one task searches.
@@ -35,7 +35,7 @@ pub fn cutoff(horizon: f64) -> f64 {
 struct Order {
     /// Local index of the point at each position in this order.
     local: Vec<u32>,
-    /// Position in this order of the first point of each block, followed by the number of points.
+    /// For each block, the position of its first point in this order. The last entry is the number of points.
     first: Vec<u32>,
     /// Bins of the points of each block. The bins contain indices in this order, counted from the block's
     /// first point. Each block has separate bins, so the neighbour search of a point skips the blocks to
@@ -72,8 +72,8 @@ impl Order {
         }
     }
 
-    /// Find another point of a block at the same position as the point with local index `index`. Without
-    /// another point, return the point itself.
+    /// Find another point of a block at the same position as the point with local index `index`. If there is
+    /// no other point, return the point itself.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
         let sorted = self.first[block] as usize..self.first[block + 1] as usize;
         let points = self.local[sorted].iter().map(|k| *k as usize);

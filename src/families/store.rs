@@ -72,7 +72,7 @@ impl Store {
         }
     }
 
-    /// Copy the state that a step can change to `saved`, for [`Self::undo`].
+    /// Copy the intact bits and the history to `saved`, for [`Self::undo`]. A step can change only these.
     pub fn keep(&self, saved: &mut (Vec<u8>, Vec<Lanes>)) {
         saved.0.clone_from(&self.intact);
         saved.1.clone_from(&self.history);

@@ -30,7 +30,8 @@ pub struct VectorBonds<'a> {
     pub point: usize,
     /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Range of this lane group in the bytes of `BondLattice::whole`, which has one byte per group of bonds.
+    /// Range of the bytes of this lane group in the result of `BondLattice::whole`. The result has one byte
+    /// per group of bonds.
     pub bits: Range<usize>,
     /// The offsets of the lattice.
     pub offsets: &'a [Offset],
@@ -45,7 +46,7 @@ pub struct VectorBonds<'a> {
 pub struct Vectors<'a> {
     pub(super) lattice: LatticeTables<'a>,
     pub(super) vectors: &'a [Vector],
-    /// Index in the lattice of the first lane group of the range.
+    /// Index of the first lane group of this range in the lattice.
     pub(super) first: usize,
     pub(super) groups: Groups<'a>,
 }
@@ -60,7 +61,8 @@ pub(super) struct LatticeTables<'a> {
     pub(super) lines: usize,
 }
 
-/// Create the lane groups of a grid, sorted by local index. All their points are members at first.
+/// Create the lane groups of a grid, sorted by local index. At first, `members` contains all
+/// their points.
 pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
     let mut vectors: Vec<Vector> = Vec::new();
     let mut line = 0;

@@ -1,8 +1,8 @@
-//! Volume correction: the factor Ṽ_j/V_j from the volume of a lattice cell to its corrected volume. Without
-//! correction, the factor is 1 within the horizon and 0 beyond.
+//! Volume correction: the factor Ṽ_j/V_j, with the volume V_j of a lattice cell and the corrected volume Ṽ_j.
+//! Without correction, the factor is 1 within the horizon and 0 beyond.
 //!
-//! - `linear`: with the cell edge dx, the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so
-//!   families contain points beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014).
+//! - `linear`: the factor falls linearly from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, where dx is the cell edge
+//!   (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). Families therefore contain points beyond the horizon.
 //!   `LinearInside` is the form of LAMMPS (Parks et al. 2008): the factor drops from 1/2 to 0 at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
 //!   Schweitzer 2016, eq. 2). This fraction has a closed form in 1-D and 2-D, and is computed by quadrature
@@ -33,8 +33,8 @@ const MOST_MULTIPLES: usize = 1 << 17;
 /// Bit pattern of a table entry that has not been computed.
 const UNKNOWN: u64 = u64::MAX;
 
-/// Length limit (m) of bonds with a positive factor, for a factor that falls to 0 at `length` (m). The limit
-/// is slightly below `length`, so bonds whose factor would be only round-off are excluded.
+/// Upper limit (m) for the length of bonds with a positive factor. The factor falls to 0 at `length` (m). The
+/// limit is slightly below `length`, so bonds whose factor would be only round-off are excluded.
 fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }
@@ -48,9 +48,9 @@ pub struct VolumeFactors {
     /// 1/([`RESOLUTION`] × edge), 1/m.
     per_resolution: f64,
     dimension: usize,
-    /// Square of the longest bond with a positive factor, m².
+    /// Square of the maximum length of bonds with a positive factor, m².
     reach_squared: f64,
-    /// Table entries per direction, one per quarter of the edge; 0 if the table would be too large.
+    /// Number of table entries per direction, one per quarter of the edge; 0 if the table would be too large.
     multiples: usize,
     /// Factors at multiples of a quarter of the edge, as bit patterns.
     table: OnceLock<Vec<AtomicU64>>,
@@ -80,9 +80,8 @@ impl VolumeFactors {
         factors
     }
 
-    /// The upper limit (m) of the length of bonds with a positive factor. For `exact`, a cell whose centre
-    /// lies at this distance from point i, along a diagonal of the cell, touches the ball of radius δ with a
-    /// corner.
+    /// Upper limit (m) for the length of bonds with a positive factor. For `exact`, a bond of this length is
+    /// parallel to a diagonal of cell j, and one corner of the cell touches the ball of radius δ.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {

@@ -23,9 +23,9 @@ pub struct Material {
 /// Criterion of a damage model.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Criterion {
-    /// Bonds break at this stretch, given as the value to write and as a number.
+    /// Critical stretch: the value to write, and the same stretch as a number.
     Stretch(Value, f64),
-    /// Bonds break at a work that follows from a fracture energy by PeriLab's formula.
+    /// Critical work of a bond. PeriLab's formula computes it from the fracture energy.
     Energy {
         /// Fracture energy, J/m².
         energy: Value,
@@ -72,8 +72,10 @@ const WITHOUT_CRITICAL_STRETCH: [&str; 3] = [
 const BOND_BASED: [&str; 1] = ["pmb"];
 
 /// Write the damage law of a body and return the name of the damage law. `horizon` is the horizon of the
-/// body, m. Return `None` if the criterion is a stretch, bonds of the material law cannot break by a critical
-/// stretch, and the elastic constants do not determine the fracture energy.
+/// body, m.
+///
+/// If bonds of the material law cannot break by a critical stretch, a stretch criterion is converted to a
+/// fracture energy. Return `None` if the elastic constants do not determine this energy.
 pub fn damage(
     translation: &mut Translation,
     model: &DamageModel,

@@ -6,7 +6,8 @@ use super::tree::Node;
 use crate::error::Result;
 
 /// Tolerance for the angle between the `Bottom Unit Vector` and the `Normal` of a rectangle. The two vectors
-/// count as perpendicular up to this cosine of the angle, and as parallel up to this sine.
+/// count as perpendicular if |cos| of the angle is at most this value. They count as parallel if its sine is
+/// at most this value.
 const SLANT: f64 = 1e-9;
 
 /// Write a pre-crack for each bond filter of a table.
@@ -61,7 +62,7 @@ fn scaled(vector: [f64; 3], factor: f64) -> [f64; 3] {
     vector.map(|component| factor * component)
 }
 
-/// Scale a vector to length 1; the zero vector stays.
+/// Scale a vector to length 1; the zero vector is returned unchanged.
 fn unit(vector: [f64; 3]) -> [f64; 3] {
     let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
     if length > 0.0 {
@@ -81,8 +82,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Write a rectangle as a pre-crack; in 2-D, write the bottom edge of the rectangle as a segment.
 ///
-/// From the corner, the bottom edge is b·ub and the side edge is a·(ub × n). ub is the bottom unit vector, n
-/// the normal, b the bottom length and a the side length.
+/// ub is the bottom unit vector, n the normal, b the bottom length and a the side length. The bottom edge is
+/// b·ub and the side edge is a·(ub × n). Both edges start at the corner.
 fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
     let written = translation.name("crack", name);
     let shape = match translation.dimension {

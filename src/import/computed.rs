@@ -61,8 +61,8 @@ impl<'n> Quantity<'n> {
         }
     }
 
-    /// Write the quantity to the new deck. `bodies` has pairs of the name of a block and the name of the body
-    /// of this block. `has_temperature` says whether points have temperatures.
+    /// Write the quantity to the new deck. Each pair in `bodies` is the name of a block and the name of its
+    /// body. `has_temperature` says whether points have temperatures.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.
@@ -120,8 +120,8 @@ impl<'n> Quantity<'n> {
         ))
     }
 
-    /// Write a probe, which records the variable at the nearest point. A probe records displacement and
-    /// velocity without further keys.
+    /// Write a probe, which records the variable at the nearest point. Every probe records displacement and
+    /// velocity, so these two need no key.
     fn probe(&self, translation: &mut Translation) -> Result<Written> {
         let mut position = Vec::new();
         for axis in ["X", "Y", "Z"].iter().take(translation.dimension) {

@@ -35,8 +35,8 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Names of the conditions in the new deck, with the numbers of the steps in which the conditions act;
-    /// empty for all steps.
+    /// Name of each condition in the new deck, and the numbers of the steps in which it acts. The list
+    /// of numbers is empty for all steps.
     pub written: Vec<(String, Vec<u64>)>,
     /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,

@@ -217,8 +217,8 @@ impl Draft {
         self.sections.push(section);
     }
 
-    /// Return the text of the deck, which starts with comments: the lines of `heading`, then the outcomes
-    /// `entries` of the keys.
+    /// Return the text of the deck. The text starts with comments: the lines of `heading`, then `entries`,
+    /// which are the outcomes of the keys.
     pub fn text(&self, heading: &[String], entries: &[Entry]) -> String {
         let mut text = String::new();
         let comment = |text: &mut String, line: &str| {

@@ -90,8 +90,9 @@ impl Constants {
     /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return false if
     /// the constants determine neither modulus.
     ///
-    /// With `factor`, a bulk modulus is the modulus of a plane problem, and `factor` is Young's modulus
-    /// divided by this bulk modulus. Without `factor`, a bulk modulus is the modulus of a solid in 3-D.
+    /// `factor` is used only if the bulk modulus is the only constant. With `factor`, the bulk modulus is
+    /// that of a plane problem, and `factor` is Young's modulus divided by this bulk modulus. Without
+    /// `factor`, the bulk modulus is that of a solid in 3-D.
     pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {

@@ -1,7 +1,8 @@
 //! Translation of expressions of other codes into Fissure's grammar.
 //!
-//! Peridigm uses statements of C, such as `if(t<=1){value=2*t;} else{value=2;}`. PeriLab uses Julia, and the
-//! short form `if t>2 0 else 20 end`. LAMMPS uses formulas of variables.
+//! Peridigm uses statements of C, such as `if(t<=1){value=2*t;} else{value=2;}`. PeriLab uses Julia,
+//! including `if` on one line, such as `if t>2 0 else 20 end`. LAMMPS uses the formulas of its `variable`
+//! commands.
 
 use crate::expression::{Expression, Variable, number_length};
 
@@ -166,8 +167,9 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// Translate the statements from `at` to the end or a `}`. `value` is the expression that earlier
-    /// statements assign to `value`. Return the new expression and the index after the last statement.
+    /// Translate the statements from `at` to the end or a `}`. The parameter `value` is the expression that
+    /// earlier statements assign to the name `value`. Return the new expression and the index after the last
+    /// statement.
     fn block(
         &self,
         tokens: &[Token],
@@ -258,8 +260,8 @@ impl Rewriter<'_> {
         }
     }
 
-    /// Translate a formula. The name `value` in the formula is replaced by the expression `value`, or by 0 if
-    /// there is no such expression.
+    /// Translate a formula. The name `value` in the formula is replaced by the parameter `value`, or by 0 if
+    /// the parameter is `None`.
     fn with_value(
         &self,
         tokens: &[Token],
@@ -320,8 +322,8 @@ impl Rewriter<'_> {
         self.formula(tokens, depth)
     }
 
-    /// Find the end of the condition in `if a b`, which is where two operands follow one another without an
-    /// operator. `None` if there is no such position.
+    /// Find the end of the condition `a` in `if a b`: the first position between two operands that have no
+    /// operator between them. Return `None` if there is no such position.
     fn condition_end(&self, tokens: &[Token]) -> Option<usize> {
         let mut level = 0_i64;
         for (index, pair) in tokens.windows(2).enumerate() {

@@ -10,11 +10,11 @@ use crate::error::excerpt;
 /// Outcome of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// The new deck has the same meaning.
+    /// The new deck expresses the key without a change of meaning.
     Taken,
-    /// The new deck has a similar meaning.
+    /// The new deck expresses the key with a similar meaning.
     Approximated,
-    /// The new deck lacks the meaning of this key.
+    /// The new deck does not express the key.
     LeftOut,
 }
 
@@ -80,7 +80,8 @@ pub(super) const OTHER_INFLUENCE: &str =
 /// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
-/// Lines of the losses that change the results: keys that are left out, and files that are read in part.
+/// Line numbers of the losses that change the results. A loss is a key that is left out, or a file that is
+/// read in part.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.
@@ -245,7 +246,7 @@ impl Log {
         self.note(node, Fate::Approximated, note);
     }
 
-    /// Log that the new deck lacks the meaning of a node.
+    /// Log that the new deck does not express a key (`node`).
     pub(super) fn left_out(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::LeftOut, note);
     }

@@ -84,7 +84,7 @@ impl Import {
             .count()
     }
 
-    /// Return the lines of the keys that are left out and change the results.
+    /// Return the line numbers of the losses that change the results.
     pub fn losses(&self) -> Losses {
         Losses::of(&self.entries)
     }

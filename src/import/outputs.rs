@@ -96,7 +96,7 @@ const GLOBALS: [(&str, &str); 3] = [
 /// Reason for leaving out temperatures.
 pub(super) const NO_TEMPERATURE: &str = "no temperature acts on a material that expands";
 
-/// Suffixes for the components of tensors, such as `Cauchy_StressXX`.
+/// Suffixes of variables that are tensor components, such as `XX` in `Cauchy_StressXX`.
 const TENSOR_PARTS: [&str; 9] = ["XX", "XY", "XZ", "YX", "YY", "YZ", "ZX", "ZY", "ZZ"];
 
 /// Interval of outputs.
@@ -164,7 +164,7 @@ pub struct Outputs {
     intervals: Vec<Frequency>,
     /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,
-    /// Whether points have temperatures: temperatures are prescribed, and a material expands.
+    /// Whether temperatures are prescribed and a material expands; only then do points have temperatures.
     has_temperature: bool,
     /// Computed quantities: name, outcome and note.
     computed: Vec<(String, Fate, String)>,
@@ -182,7 +182,7 @@ impl Outputs {
     }
 
     /// Read a table of computed quantities. The name of a quantity is its key `Output Label`, or else the
-    /// name of its table. `bodies` has pairs of the name of a block and the name of the body of this block.
+    /// name of its table. Each pair in `bodies` is the name of a block and the name of its body.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.
@@ -293,8 +293,9 @@ impl Outputs {
         Ok(())
     }
 
-    /// Return the largest interval of the outputs with fields, or of all outputs if none has fields. Log the
-    /// other intervals. Return `None` if no output has an interval.
+    /// Return the largest interval in `intervals` of an output with fields. If none of these outputs has
+    /// fields, return the largest of all `intervals`. Log the other intervals. Return `None` if there is no
+    /// interval.
     fn interval(&self, translation: &Translation) -> Option<Interval> {
         let with_fields = self.intervals.iter().any(|frequency| frequency.has_fields);
         let candidates = self.intervals.iter();

@@ -17,7 +17,7 @@ const LONGEST: usize = 1 << 16;
 pub struct Command {
     /// Words of the command, without quotes and with variables replaced.
     pub words: Vec<String>,
-    /// Node of the command in the log.
+    /// Node under which the log stores the outcome of the command.
     pub node: Node,
 }
 
@@ -43,7 +43,7 @@ pub struct Script {
 /// Time step before the first `timestep`, s: the default of LAMMPS in SI units.
 const DEFAULT_STEP: f64 = 1e-8;
 
-/// State of variables and time step at a command of a script.
+/// Values that the variables and the time step have at one command of a script.
 #[derive(Debug, Default)]
 pub struct Variables {
     /// Formulas and values by name.
@@ -102,8 +102,8 @@ fn without_comment(row: &str) -> &str {
     row
 }
 
-/// Split a text that begins with a quote, `'`, `"` or `"""`, into the quoted text and the text after the
-/// closing quote; `None` without a closing quote.
+/// Split a text that begins with a quote (`'`, `"` or `"""`) into the quoted text and the text after the
+/// closing quote. Return `None` if there is no closing quote.
 fn quoted(text: &str) -> Option<(&str, &str)> {
     let triple = "\"\"\"";
     let mark = if text.starts_with(triple) {

@@ -1,4 +1,4 @@
-//! Node sets of a source deck: in the deck, in files and in the mesh.
+//! Node sets of a source deck, defined in the deck, in files or in the mesh.
 
 use super::draft::{Section, Value};
 use super::expression::Dialect;
@@ -22,10 +22,11 @@ pub struct Sets<'n> {
     defined: Vec<Defined<'n>>,
     /// Sets of the mesh: name in the mesh and name in the new deck.
     of_mesh: Vec<(String, String)>,
-    /// Prefix of the names of sets of the mesh in the new deck; `None` if the points come from no mesh.
+    /// Prefix that the new deck needs before the name of a set of the mesh; `None` if the points do not come
+    /// from a mesh.
     mesh_prefix: Option<&'static str>,
-    /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set; `None` if
-    /// one node in the set is enough.
+    /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set. `None` if
+    /// an element belongs to a set when at least one of its nodes is in the set.
     ids_by_name: Option<Vec<(String, Vec<u64>)>>,
 }
 
@@ -41,9 +42,9 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Set the ids of the points of each node set of the mesh, by the name of the set. Call this function for
+    /// Store the names of the node sets of the mesh, each with the ids of its points. Call this function for
     /// PeriLab, in which an element belongs to a node set only if all nodes of the element are in the set. A
-    /// set that is not in the list is written as a set of the mesh and logged as approximated.
+    /// set that is not in `sets` is written as a set of the mesh and logged as approximated.
     pub fn set_ids_by_name(&mut self, sets: Vec<(String, Vec<u64>)>) {
         self.ids_by_name = Some(sets);
     }
@@ -59,7 +60,8 @@ impl<'n> Sets<'n> {
         });
     }
 
-    /// Return the set of the new deck for a node set; write the set at its first use.
+    /// Return the name that a node set of the source deck has in the new deck. Write the set at its first
+    /// use.
     ///
     /// # Errors
     /// If neither the source deck nor the mesh has this set, or its definition is invalid.
@@ -126,8 +128,9 @@ impl<'n> Sets<'n> {
         Ok(written)
     }
 
-    /// Return the number of points of a set whose ids are known: a node set of the mesh with ids, or a list
-    /// of point numbers in the deck or in a file. Return `None` for other sets.
+    /// Return the number of points of a node set if the ids of its points are known. The ids are known for
+    /// the sets passed to [`Self::set_ids_by_name`], and for lists of point numbers in the deck or in a file.
+    /// Return `None` for other sets.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
         let mut of_mesh = self.ids_by_name.iter().flatten();
         if let Some((_, ids)) = of_mesh.find(|(known, _)| known == name) {

@@ -288,9 +288,9 @@ fn note_unread_keys(translation: &Translation, solver: &Node) {
 
 /// Write the stages of a run.
 ///
-/// `conditions` holds the names of the conditions and the numbers of the steps in which they act; empty for
-/// all steps. Equilibria are found by Newton's method in runs without contact, and by relaxation in runs with
-/// contact.
+/// `conditions` holds the name of each condition and the numbers of the solver steps in which it acts. A
+/// condition without numbers acts in all steps. Equilibria are found by Newton's method in runs without
+/// contact, and by relaxation in runs with contact.
 pub fn write(
     translation: &mut Translation,
     stages: &[Stage],

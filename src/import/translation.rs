@@ -12,7 +12,8 @@ use crate::deck::Source;
 use crate::error::{Error, Result, excerpt};
 use crate::expression::{POSITION, POSITION_AND_TIME};
 
-/// Longest name of a table before a suffix such as `_2` is added. Names in decks have at most 64 characters.
+/// Maximum length of the name of a table before a suffix such as `_2` is added, characters. Names in decks
+/// have at most 64 characters.
 const LONGEST_NAME: usize = 56;
 
 /// State of an import.
@@ -33,7 +34,7 @@ pub struct Translation<'a> {
     pub start: f64,
     /// Files that the new deck reads, relative to the working directory or absolute.
     pub files: RefCell<Vec<PathBuf>>,
-    /// Start of the current condition's step in the time of the run, s.
+    /// Time of the run at which the solver step of the current condition starts, s.
     pub step_start: f64,
     /// Names of tables: section, name in the source deck, and name in the new deck.
     names: Vec<(&'static str, String, String)>,
@@ -159,8 +160,8 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// Translate an expression of position and time, evaluated at the start of the run; the error is a
-    /// message.
+    /// Translate an expression of position and time, and replace the time by the start of the run. `Err`
+    /// holds a message.
     pub fn at_start(&self, text: &str) -> std::result::Result<Value, String> {
         let start = self.start;
         let names = |name: &str| (name == "t").then(|| format!("({start:?})"));

@@ -46,7 +46,7 @@ impl Node {
         }
     }
 
-    /// Return name and value of those entries of a table that are tables.
+    /// Return the names and values of the entries whose values are tables.
     pub fn tables(&self) -> impl Iterator<Item = (&str, &Self)> {
         let entries = self.entries().iter();
         entries

@@ -1,4 +1,4 @@
-//! Parser of Teuchos parameter lists (XML) to parameter trees.
+//! Parser that converts Teuchos parameter lists (XML) to parameter trees.
 
 use roxmltree::{Document, ParsingOptions};
 

@@ -1,4 +1,4 @@
-//! Parser of YAML to parameter trees.
+//! Parser that converts YAML to parameter trees.
 
 use saphyr_parser::{Event, Parser, StrInput};
 

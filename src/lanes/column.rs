@@ -15,10 +15,10 @@ const LINE: usize = 8;
 /// One of several columns of numbers that loops read at the same index.
 ///
 /// The allocator requests large arrays from the system one by one (arrays of 1 MB and more in the `fissure`
-/// command). All these arrays start at the same offset within a page. Entries with the same index in many
-/// such columns would then lie in the same set of the cache, and a set holds only eight or twelve lines.
-/// Therefore, the columns do not begin at the starts of their arrays, but at different numbers of cache lines
-/// after the starts.
+/// command). All these arrays start at the same offset within a page. If every column began at
+/// the start of its array, entries with the same index would lie in the same set of the cache. A set holds
+/// only eight or twelve lines. Therefore, each column begins after a different number of unused cache lines
+/// at the start of its array.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,

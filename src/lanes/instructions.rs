@@ -57,8 +57,8 @@ impl Instructions {
         Self::up_to(BUILT.len() - 1)
     }
 
-    /// Return the largest set of this machine up to a level, an index in [`BUILT`]; `None` if the machine has
-    /// none of the sets.
+    /// Return the largest set of this machine whose index in [`BUILT`] is at most `level`; `None` if the
+    /// machine has none of the sets.
     #[cfg(target_arch = "x86_64")]
     fn up_to(level: usize) -> Option<Self> {
         match Avx512::detect() {

@@ -1,4 +1,5 @@
-//! Tuples of [`Lanes`], and the columns of numbers that loops read as tuples and to which they add tuples.
+//! Tuples of [`Lanes`], and columns of numbers. Loops read tuples from the columns, or add tuples to the
+//! columns.
 
 use std::ops::{Deref, DerefMut};
 
@@ -65,8 +66,8 @@ pub trait LaneTuple: Copy + Send + Sync {
         Self::load_first::<Self>(columns, take)
     }
 
-    /// Same as [`Self::load`], from the first columns of another type of tuple, which has at least as many
-    /// quantities.
+    /// Same as [`Self::load`], but read the first columns of a tuple of type `T`, which has at least as many
+    /// quantities as `Self`.
     #[inline(always)]
     fn load_first<T: LaneTuple>(columns: &T::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
         const { assert!(Self::COUNT <= T::COUNT) };

@@ -70,8 +70,8 @@ impl Lanes {
         self.map(libm::exp)
     }
 
-    /// Return the power of each lane with this exponent, computed by `libm::pow`, which gives the same result
-    /// on every processor.
+    /// Raise each lane to the power `exponent` by `libm::pow`, which gives the same result on every
+    /// processor.
     #[inline(always)]
     pub fn pow(self, exponent: f64) -> Self {
         self.map(|base| libm::pow(base, exponent))

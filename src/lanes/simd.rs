@@ -9,7 +9,7 @@ use super::Lanes;
 /// Proof that the machine has an instruction set. The methods are the operations that depend on this
 /// instruction set.
 pub trait Simd: Copy + Send + Sync + 'static {
-    /// Return a b + c, rounded once except by [`Portable`] without fused multiply-add.
+    /// Return `a * b + c`. The result is rounded once, except by [`Portable`] without fused multiply-add.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
 
     /// Return one bit per lane, set if `a` is at least as large as `b`.
@@ -22,7 +22,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
         bits
     }
 
-    /// Select the lanes of `a` whose bit is set, and the other lanes of `otherwise`.
+    /// Take the lanes whose bit is set from `a`, and the other lanes from `otherwise`.
     #[inline(always)]
     fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
         let mut result = otherwise;
@@ -59,8 +59,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
 
 /// Work that can run out of line with an instruction set.
 /// [`Self::run`] must be `#[inline(always)]`. A closure is not sufficient, because it is a separate function
-/// that is compiled without these instructions. If the compiler does not inline a large closure, every vector
-/// operation in it is a call.
+/// that is compiled without the instruction set. If the compiler does not inline a large closure, every
+/// vector operation in it is a call.
 pub trait Task {
     /// Type of the result.
     type Output;
@@ -271,8 +271,8 @@ mod x86 {
         unsafe { std::mem::transmute(a) }
     }
 
-    /// Masks of four lanes. The index has one bit per lane, and all 64 bits of a lane are set if this bit is
-    /// set.
+    /// Masks of four lanes. The index has one bit per lane. If the bit of a lane is set, all 64 bits of this
+    /// lane are set in the mask.
     static MASKS: [[u64; 4]; 16] = {
         let mut masks = [[0; 4]; 16];
         let mut bits = 0;
@@ -431,9 +431,9 @@ mod x86 {
 
     /// Return the value, but hide from the compiler that it is unchanged. The compiler then keeps the
     /// operations before and after this call in whole vectors, instead of splitting them by lane. Measured
-    /// with rustc 1.95 on AMD Zen 3 (AVX2): without this call, the law `pmb` in lists runs at 0.68 times the
-    /// speed, and `ordinary` in lattices at 0.75 times. `pmb` in lattices does not need the call, and
-    /// `correspondence` is faster without the call.
+    /// with rustc 1.95 on AMD Zen 3 (AVX2): without this call, the law `pmb` for bonds in lists runs at 0.68
+    /// times the speed. The law `ordinary` for bonds in lattices runs at 0.75 times the speed. `pmb` in
+    /// lattices does not need the call, and `correspondence` is faster without the call.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {

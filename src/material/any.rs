@@ -45,7 +45,8 @@ impl Counts {
         }
     }
 
-    /// Return the larger of each size. `central` is true only if it is true in both arguments.
+    /// Return, for each size, the larger value of the two arguments. `central` is true only if it is
+    /// true in both arguments.
     const fn or_more(self, other: Self) -> Self {
         const fn more(a: usize, b: usize) -> usize {
             if a > b { a } else { b }

@@ -8,8 +8,9 @@
 //!   s, a force c s Y/|Y| is (c/|ξ|) P(x) Y.
 //!
 //! For |x| ≤ [`NEAR`] both functions are computed as Taylor series. The first omitted term is below 6·10⁻¹⁸
-//! times the result. For larger |x| the closed forms P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)) are
-//! used, which avoid cancellation. Both ends of a bond compute the same bits of x, and therefore of P and Q.
+//! times the result. For larger |x|, the code uses closed forms that avoid cancellation:
+//! P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)). Both ends of a bond compute the same bits of
+//! x, and therefore of P and Q.
 
 use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
@@ -316,7 +317,8 @@ fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     }))
 }
 
-/// Task of [`with_far`] for the lanes with |x| above [`NEAR`]. Each pair is a number and its rounding error.
+/// Task of [`with_far`] for the lanes with |x| above [`NEAR`]. `other` receives and
+/// returns pairs of a number and its rounding error.
 struct ClosedForm<O> {
     relative_square_extension: Lanes,
     beyond_series: u8,

@@ -44,7 +44,7 @@ pub struct History {
 impl History {
     /// Create the table `/history` and the CSV file. The CSV file replaces an existing file. Collective.
     ///
-    /// The header of the CSV file is like `time [s],step [1],kinetic_energy [J]`.
+    /// Example of the header of the CSV file: `time [s],step [1],kinetic_energy [J]`.
     ///
     /// # Errors
     /// If the table exists or a file cannot be written.

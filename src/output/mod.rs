@@ -1,5 +1,5 @@
-//! Result files and checkpoints in HDF5, written collectively. Of the other folders, only `mesh` calls HDF5,
-//! to read meshes.
+//! Result files and checkpoints in HDF5, written collectively. The only other folder that calls HDF5 is
+//! `mesh`, which reads meshes.
 //!
 //! A result file has the VTKHDF layout and contains a history. An XDMF side-car is written for older viewers.
 

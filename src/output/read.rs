@@ -1,4 +1,4 @@
-//! Serial reader of result files. A step of a result is an output, as in VTKHDF.
+//! Serial reader of result files. As in VTKHDF, the word "step" means an output, not a time step.
 
 use super::failure::{innermost, system_error};
 use super::field::{Number, POINT_DATA};
@@ -159,7 +159,7 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Values"))
     }
 
-    /// Return the number of the solver's time step at each complete output.
+    /// Return the solver's time step number at each complete output.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -168,7 +168,7 @@ impl ResultReader {
     }
 
     /// Return the rows of a dataset that belong to a range of points at one of the [times](Self::times).
-    /// `offsets` is the path of the table with the first row of each step in the dataset.
+    /// `offsets` is the path of the table that holds, for each step, its first row in the dataset.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);
@@ -199,8 +199,8 @@ impl ResultReader {
         Ok(values.as_chunks::<3>().0.to_vec())
     }
 
-    /// Return the global ids of the points at one of the [times](Self::times), in the order of all point
-    /// data.
+    /// Return the global ids of the points at one of the [times](Self::times). All point data have the same
+    /// order.
     ///
     /// # Errors
     /// If the file is damaged or has no ids.
@@ -238,8 +238,8 @@ impl ResultReader {
             .collect()
     }
 
-    /// Return the values of a field at one of the [times](Self::times), [points, components] row-major.
-    /// Integers are converted to floats.
+    /// Return the values of a field at one of the [times](Self::times), as a row-major array
+    /// [points, components]. Integers are converted to floats.
     ///
     /// # Errors
     /// If the field or time is missing, or the file is damaged.
@@ -286,7 +286,8 @@ impl ResultReader {
         read.map_err(|error| self.damaged(&path, &error))
     }
 
-    /// Return the columns of the history in the order of the file; empty without a history.
+    /// Return the columns of the history in their order in the file. The list is empty if the file has no
+    /// history.
     ///
     /// # Errors
     /// If the file is damaged.

@@ -1,8 +1,8 @@
 //! Reservation of disk space before collective writes.
 //!
-//! If the disk fills up inside a collective write, most of Open MPI 4.1's components for collective writes
-//! (the default `vulcan`, `dynamic_gen2`, `two_phase` and ROMIO) hang on some ranks. A reservation by one
-//! rank fails with an ordinary error instead.
+//! If the disk fills up during a collective write, most components of Open MPI 4.1 for collective writes hang
+//! on some ranks: `vulcan` (the default), `dynamic_gen2`, `two_phase` and ROMIO. If one rank reserves the
+//! space before the write, a full disk causes an ordinary error instead.
 
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
@@ -56,8 +56,8 @@ impl Reservation {
         Ok(())
     }
 
-    /// Update the reservation after a truncation of the file to its length. The truncation frees the reserved
-    /// space behind the end of the file.
+    /// Update the reservation after HDF5 has truncated the file. The truncation frees the reserved space
+    /// behind the end of the file.
     pub fn truncated(&mut self) {
         let length = self.file.metadata().map_or(0, |metadata| metadata.len());
         self.bytes = self.bytes.min(length);

@@ -14,7 +14,8 @@ use crate::error::{Error, Result};
 /// First word of a seal, which distinguishes a seal from other bytes at the end of a file.
 const MAGIC: u64 = u64::from_le_bytes(*b"FISSSEAL");
 
-/// Size of a seal, bytes: magic, number of sealed bytes, checksum, and the caller's number.
+/// Size of a seal, bytes. A seal has four words: magic, number of sealed bytes, checksum, and a number given
+/// by the caller.
 const SEAL_BYTES: u64 = 32;
 
 /// Size of the read buffer, bytes.
@@ -40,8 +41,8 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// Read the caller's number from the seal of a file, without a check of the sealed bytes; `None` without a
-/// seal.
+/// Read the caller's number from the seal of a file, or return `None` if the file has no seal. The sealed
+/// bytes are not checked.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -50,7 +51,7 @@ pub fn number(path: &Path) -> Result<Option<u64>> {
     Ok(seal.map(|seal| seal.number))
 }
 
-/// Check the bytes of a file against its seal; false without a seal. Collective.
+/// Check the bytes of a file against its seal. Return false if the file has no seal. Collective.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -74,7 +75,7 @@ struct Seal {
     number: u64,
 }
 
-/// Read the seal at the end of a file; `None` without a seal.
+/// Read the seal at the end of a file. Return `None` if the file has no seal.
 fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     let mut file = File::open(path)?;
     let Some(sealed) = length(path)?.checked_sub(SEAL_BYTES) else {
@@ -124,8 +125,8 @@ fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
     Ok(crate::comm::total(comm, own))
 }
 
-/// Sum the 8-byte words `first` to `end` − 1 of the first `length` bytes of a file, each word mixed with its
-/// index. The last word of these bytes is padded with zeros.
+/// Sum the 8-byte words `first` to `end` − 1 of a file. Before the sum, each word is mixed with its index.
+/// Only the first `length` bytes of the file are read; an incomplete last word is padded with zeros.
 fn sum_words(path: &Path, first: u64, end: u64, length: u64) -> std::io::Result<u64> {
     let mut file = File::open(path)?;
     file.seek(SeekFrom::Start(8 * first))?;

@@ -1,5 +1,5 @@
-//! The XDMF 3 side-car, with which ParaView before 5.12 opens a result file. A step is an output here, as in
-//! VTKHDF.
+//! The XDMF 3 side-car, with which ParaView before 5.12 opens a result file. As in VTKHDF, the word "step"
+//! means an output, not a time step.
 
 use super::field::{FieldDescription, Number};
 use super::read::StoredField;

@@ -10,8 +10,8 @@ const ALWAYS_ALLOWED: usize = 100_000;
 /// Above this number of cells per rank, the borders between ranks do not get smoother.
 const SUFFICIENT_PER_RANK: usize = 2000;
 
-/// Above this total number of cells, the number of cells per rank is reduced, because one rank partitions all
-/// cells, and every rank stores the owners of all cells.
+/// Above this total number of cells, the number of cells per rank is reduced. The reason: one rank partitions
+/// all cells, and every rank stores the owners of all cells.
 const LARGE_TOTAL: usize = 4_000_000;
 
 /// Number of cells per rank that an even partition needs.
@@ -24,8 +24,8 @@ pub fn max_cells(ranks: usize) -> usize {
         .min(LARGE_TOTAL.max(MIN_PER_RANK * ranks))
 }
 
-/// A grid of cells over all points, equal on all ranks. Points closer than the cutoff lie in the same cell or
-/// in adjacent cells. A cell consists of equal boxes.
+/// A grid of cells over the points of all ranks. Every rank has the same grid. Points closer than the cutoff
+/// lie in the same cell or in adjacent cells. A cell consists of equal boxes.
 #[derive(Debug, Clone)]
 pub struct Cells {
     lower: [f64; 3],
@@ -38,7 +38,7 @@ pub struct Cells {
     counts: [usize; 3],
 }
 
-/// Computing times of the ranks and owners of the cells before a rebalance.
+/// State before a rebalance: the computing time of each rank, and the owner of each cell.
 pub struct Loads {
     /// Measured computing time of each rank, ns.
     pub times: Vec<u64>,
@@ -111,8 +111,8 @@ impl Cells {
         (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
-    /// The cells that share a face, an edge or a corner with `cell`. Each item is the index of such a cell,
-    /// and for each direction, whether the cell is displaced from `cell` in this direction.
+    /// The cells that share a face, an edge or a corner with `cell`. Each item is the index of such a cell
+    /// and three flags. The flags state whether the cell is displaced from `cell` along x, y and z.
     pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
         let position = [cell % nx, cell / nx % ny, cell / nx / ny];
@@ -143,7 +143,8 @@ impl Cells {
         occupation
     }
 
-    /// Times of the ranks and present owners of the cells. `time` is the time of this rank, ns. Collective.
+    /// The computing time of each rank, and the present owner of each cell. `time` is the time of this rank,
+    /// ns. Collective.
     pub fn loads(&self, comm: &dyn Communicator, points: &[Point], time: u64) -> Loads {
         let mut owners = vec![-1.0; self.count()];
         for point in points {

@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! If a cell of rank p is adjacent to a cell of rank q, rank p sends the points of its cell to rank q. Of
-//! these points, rank q then requests as ghosts the points within the cutoff of a point of rank q.
+//! If a cell of rank p is adjacent to a cell of rank q, rank p sends the points of its cell to rank q. Rank q
+//! then requests some of these points as ghosts: those within the cutoff of a point that rank q owns.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -23,7 +23,7 @@ const HALO_WIDTH: usize = 3;
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
 /// `owned` are this rank's points after migration, `owner` is the rank of each cell, `total` is the number of
-/// points of all ranks, and `cutoff` (m) is the length of the longest bond.
+/// points of all ranks, and `cutoff` (m) is slightly longer than the longest bond.
 pub fn domain(
     comm: &dyn Communicator,
     cells: &Cells,

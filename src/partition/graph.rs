@@ -9,8 +9,8 @@ use super::cells::{Cells, Loads};
 /// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
-/// Additional factor on the weight of graph edges between cells that differ along x. Cuts between such cells
-/// are costly, because they cut lane groups, which lie along x.
+/// Additional factor on the weight of graph edges between cells at different x positions. Cuts between such
+/// cells are costly, because they cut lane groups, which lie along x.
 const ALONG_X: f64 = 1.5;
 
 /// Owner of cells without points.
@@ -26,9 +26,10 @@ const FEW_CELLS_PER_PART: usize = 30;
 /// - `occupation` is the number of points in each cell.
 /// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
 ///   edge is proportional to the estimated number of bonds across it, multiplied by `ALONG_X` if its cells
-///   differ along x.
-/// - With measured loads, the weight of a cell is multiplied by the measured time per estimated bond of the
-///   rank that has the cell at present. Parts are numbered so that few points migrate.
+///   have different x positions.
+/// - With measured loads, the weight of a cell is multiplied by a time per bond: the measured time of the
+///   present owner of the cell, divided by the estimated number of bonds of this owner. Parts are numbered so
+///   that few points migrate.
 ///
 /// # Errors
 /// If METIS fails.
@@ -103,8 +104,8 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Multiply the estimated numbers of bonds of the occupied cells by the measured time per estimated bond of
-/// the rank that has the cell at present, divided by the mean of this time over all bonds.
+/// Multiply the estimated number of bonds of each occupied cell by a relative time per bond. This is the
+/// measured time per estimated bond of the cell's present owner, divided by the mean time per bond.
 fn weight_by_time(bonds: &mut [f64], occupied: &[usize], loads: &Loads) {
     let rank_of = |cell: usize| loads.owners[cell] as usize;
     let mut sums = vec![0.0; loads.times.len()];
@@ -120,8 +121,8 @@ fn weight_by_time(bonds: &mut [f64], occupied: &[usize], loads: &Loads) {
     }
 }
 
-/// Renumber parts so that few points migrate. `current` receives the index of a cell in `part`, and returns
-/// the present rank of the cell and its number of points.
+/// Renumber parts so that few points migrate. `current(k)` returns the present rank and the number of points
+/// of the cell with index k in `part`.
 fn renumber(part: &mut [metis::Idx], ranks: usize, current: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {

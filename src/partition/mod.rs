@@ -15,8 +15,8 @@ use cells::{Cells, Loads, max_cells};
 
 /// Partition the points, migrate them to their owners and find the ghosts. Collective.
 ///
-/// `pieces` are this rank's points, `total` is the number of points of all ranks, and `cutoff` (m) is the
-/// length of the longest bond.
+/// `pieces` are this rank's points, `total` is the number of points of all ranks, and `cutoff` (m) is
+/// slightly longer than the longest bond.
 ///
 /// # Errors
 /// If METIS fails; the error is the same on all ranks.

@@ -32,7 +32,7 @@ const LONGEST_ARROW: f64 = 2.4;
 /// arrow.
 const SPACING: f64 = 3.0;
 
-/// Shortest arrow, in pixels.
+/// Length of the shortest arrow that is drawn, in pixels.
 const SHORTEST_ARROW: f64 = 2.0;
 
 /// Length and half width of the head of an arrow, in text sizes.
@@ -93,7 +93,7 @@ struct Root {
 }
 
 /// Return at most one of the candidates for each square cell of the picture. The returned candidates are at
-/// least `reach` away from each other. The edge `cell` of a cell and `reach` are in pixels, and `reach` is at
+/// least `reach` away from each other. `cell` (the edge of a cell) and `reach` are in pixels. `reach` is at
 /// most `cell`.
 ///
 /// In each cell, the candidate nearest to the camera is chosen. Among candidates of equal depth, the
@@ -159,7 +159,7 @@ fn arrow(image: &mut Image, middle: [f64; 2], vector: [f64; 2], text: f64, thick
     }
 }
 
-/// Draw the legend below the picture: name of the field, an arrow, length of the vector that this arrow
+/// Draw the legend at the bottom of the picture: name of the field, an arrow, length of the vector that this arrow
 /// represents, and a note if arrows are cut.
 fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout: &Layout) {
     let (length, mut label) = legend_entry(longest, vectors.unit);

@@ -156,8 +156,8 @@ impl Pen<'_> {
         }
     }
 
-    /// Draw the directions of the axes x, y and z of an orthographic view in the upper left or upper right
-    /// corner of the frame. Draw nothing if the box `bounds` covers both corners.
+    /// Draw the triad of an orthographic view: the directions of the axes x, y and z. The triad lies in the
+    /// upper left or upper right corner of the frame. Draw nothing if the box `bounds` covers both corners.
     pub fn triad(&mut self, layout: &Layout, bounds: &Bounds, view: Projection) {
         let length = 2.4 * self.text;
         let axes = [Axis::X, Axis::Y, Axis::Z].map(|axis| {

@@ -149,9 +149,9 @@ impl Image {
     }
 }
 
-/// Return the rows of pixels of a convex polygon in a picture of this height (pixels). For each row, also
-/// return the first column of the polygon and the first column after the polygon. [`Image::fill_polygon`]
-/// defines which pixels belong to a polygon.
+/// Return the pixel rows that a convex polygon covers in a picture of the given height (pixels). For each
+/// row, also return the first column of the polygon and the first column after the polygon.
+/// [`Image::fill_polygon`] defines which pixels belong to a polygon.
 pub fn spans(corners: &[[f64; 2]], height: i64) -> impl Iterator<Item = (i64, [i64; 2])> + '_ {
     let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
     let rows = first_centre(top).max(0)..first_centre(bottom).min(height);

@@ -11,12 +11,13 @@ use super::points::Colouring;
 use super::projection::Projection;
 use super::scene::Mark;
 
-/// Largest distance between a point and a pixel of its cell, divided by the size of the point (the edge of a
-/// cube with the volume of the point, or in 2-D of a square with its area). In comparison, the square cells
-/// of a lattice end at 0.5 to 0.71 times this size.
+/// Largest distance between a point and a pixel of its cell, divided by the size of the point. The size is
+/// the edge of a cube with the volume of the point. In 2-D, the size is the edge of a square with the area of
+/// the point. In comparison, the border of a square lattice cell is 0.5 to 0.71 sizes away from the point.
 const REACH: f64 = 0.6;
 
-/// The same ratio as [`REACH`], for pixels that have points within this larger distance on all sides.
+/// Larger limit of the ratio in [`REACH`], for pixels between points. Such a pixel has points on all sides
+/// within the larger distance.
 const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
@@ -55,7 +56,7 @@ struct Point {
     centre: [f64; 2],
     /// Distance of the point from the drawn plane.
     depth: f64,
-    /// Edge of a cube with the volume of the point, or in 2-D of a square with the area of the point.
+    /// Edge of a cube with the volume of the point; in 2-D, edge of a square with the area of the point.
     size: f64,
     colour: Colour,
 }
@@ -143,8 +144,8 @@ impl Pixels {
     }
 }
 
-/// Return the number (0 to 7) of the eighth of a full turn that contains a direction in the picture. `along`
-/// is the component to the right, `down` the component downwards.
+/// Divide a full turn into eighths, and return the number (0 to 7) of the eighth that contains a direction in
+/// the picture. `along` is the component to the right, `down` the component downwards.
 fn eighth(along: f64, down: f64) -> u32 {
     match (along >= 0.0, down >= 0.0, along.abs() >= down.abs()) {
         (true, true, true) => 0,
@@ -169,8 +170,8 @@ fn is_surrounded(directions: u8) -> bool {
 mod tests {
     use super::*;
 
-    /// Return for each pixel of a frame the number of the point whose colour the pixel has; `None` for a
-    /// pixel outside of all cells. The points are given by centre, size and depth.
+    /// Return one entry for each pixel of a frame: the number of the point that gives the pixel its colour,
+    /// or `None` for a pixel outside of all cells. The points are given by centre, size and depth.
     fn shown(points: &[([f64; 2], f64, f64)]) -> Vec<Option<usize>> {
         let mut pixels = Pixels::new([10, 20], [40, 30]);
         for (number, (centre, size, depth)) in (0..).zip(points) {

@@ -46,8 +46,8 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the square that marks an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points of a curve. The samples show which of the possible
-/// places of the legend the curve crosses.
+/// Number of samples on each line between two points of a curve. The samples are used to find the possible
+/// places of the legend that the curve crosses.
 const LINE_SAMPLES: usize = 32;
 
 /// Distance in pixels below which consecutive points of a curve are drawn as one point.
@@ -75,13 +75,13 @@ pub struct Series {
 /// Curves over a common axis.
 #[derive(Debug, Clone, Copy)]
 pub struct Chart<'a> {
-    /// Line above the frame; may be empty.
+    /// Line of text above the frame; may be empty.
     pub title: &'a str,
     /// The horizontal axis.
     pub x: Label<'a>,
     /// The vertical axis.
     pub y: Label<'a>,
-    /// The curves. More than one curve adds a legend.
+    /// The curves. A chart with more than one curve has a legend.
     pub series: &'a [Series],
     /// Width of the picture in pixels, from 200 to 16384.
     pub width: u32,
@@ -373,8 +373,9 @@ impl Chart<'_> {
         shapes
     }
 
-    /// Draw the legend in the corner of the frame where the legend covers the fewest of the points `drawn`.
-    /// `columns` and `rows` are the edges of the frame, and `text` is the text size, pixels.
+    /// Draw the legend in the corner of the frame where the legend covers the fewest samples of the curves.
+    /// `drawn` contains these samples. `columns` and `rows` are the edges of the frame, and `text` is the
+    /// text size, all in pixels.
     fn legend(
         &self,
         shapes: &mut Vec<Shape>,

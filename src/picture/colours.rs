@@ -5,15 +5,16 @@ use super::canvas::Colour;
 /// A colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColourMap {
-    /// Dark violet over green to yellow, perceptually uniform.
+    /// From dark violet through green to yellow, perceptually uniform.
     Viridis,
-    /// Rainbow from dark blue over green to dark red, smoother than "jet".
+    /// Rainbow from dark blue through green to dark red, smoother than "jet".
     Turbo,
-    /// Blue over light grey to red: diverging, for values on both sides of a reference value.
+    /// From blue through light grey to red: a diverging map, for values on both sides of a reference value.
     Coolwarm,
-    /// Almost black to light grey.
+    /// From almost black to light grey.
     Grey,
-    /// Light grey over orange and red to almost black: even a crack with the width of one point is visible.
+    /// From light grey through orange and red to almost black. Even a crack with the width of one point is
+    /// visible.
     Damage,
 }
 
@@ -106,8 +107,8 @@ fn viridis(fraction: f64) -> Colour {
     colour.map(|channel| (channel * 255.0).round() as u8)
 }
 
-/// Red, green and blue value at the low and the high end of the grey map. The high end is darker than the
-/// white background.
+/// Common value of red, green and blue, at the low and at the high end of the grey map. The high end is
+/// darker than the white background.
 const GREY: [f64; 2] = [24.0, 226.0];
 
 /// Equally spaced colours of the diverging map of K. Moreland, "Diverging color maps for scientific
@@ -149,7 +150,7 @@ const COOLWARM: [Colour; 33] = [
 ];
 
 /// Equally spaced colours of "turbo" (A. Mikhailov, Google AI Blog, 2019; Apache-2.0). Interpolated colours
-/// differ from the published 256 colours by 2 of 255 at most.
+/// differ from the published 256 colours by at most 2 of 255.
 const TURBO: [Colour; 33] = [
     [48, 18, 59],
     [57, 42, 115],
@@ -186,7 +187,8 @@ const TURBO: [Colour; 33] = [
     [122, 4, 3],
 ];
 
-/// Return the colour at a fraction from 0 to 1 of equally spaced colours, by linear interpolation.
+/// Interpolate linearly between equally spaced colours. `fraction` is 0 at the first colour and 1 at the last
+/// colour.
 fn between(colours: &[Colour; 33], fraction: f64) -> Colour {
     let at = fraction * (colours.len() - 1) as f64;
     let lower = (at as usize).min(colours.len() - 2);

@@ -1,10 +1,11 @@
-//! Lines of equal value between points in the plane.
+//! Contour lines of values at points in the plane.
 
 use delaunator::{Point, triangulate};
 use rustc_hash::FxHashMap;
 
-/// Longest edge of a triangle in which values are interpolated, in cell edges. In a square lattice, the
-/// longest edge has 1.41 cell edges. Edges longer than the limit lie across holes, notches and open cracks.
+/// Longest edge of a triangle in which values are interpolated, divided by the mean cell edge of the two
+/// ends. In a square lattice, this ratio is at most 1.41. Edges longer than the limit lie across holes,
+/// notches and open cracks.
 const LONGEST_EDGE: f64 = 2.2;
 
 /// A point in the plane with a value.
@@ -18,9 +19,9 @@ pub struct Sample {
     pub value: f64,
 }
 
-/// Return the samples that no later returned sample covers. A sample covers the positions within half its
-/// cell edge. A slice between two layers of points shows both layers. Later samples are nearer to the plane
-/// of the slice.
+/// Return the samples that are not covered. A sample that is not covered itself covers all earlier samples
+/// within half its cell edge. Covered samples occur because a slice between two layers of points shows both
+/// layers. Later samples are nearer to the plane of the slice.
 pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
     let largest = samples
         .iter()
@@ -90,7 +91,7 @@ fn crossing([one, other]: &[Sample; 2], level: f64) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// Return samples of a function at the points of a lattice of 41 by 41 points in the unit square.
+    /// Return samples of a function on a lattice of 41 by 41 points in the unit square.
     fn lattice(value: impl Fn(f64, f64) -> f64) -> Vec<Sample> {
         let place = |k: usize| k as f64 / 40.0;
         let sample = |k: usize| {

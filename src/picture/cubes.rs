@@ -5,21 +5,21 @@ use super::colours::shaded;
 use super::points::{OVERLAP, edges};
 use super::projection::{Camera, Projection};
 
-/// Edge of the larger cube that is painted behind each cube, divided by the edge of the cube. A drawn
-/// deformation opens gaps between cubes; the larger cubes fill these gaps.
+/// Edge of the larger cube that is painted behind each cube, divided by the edge of the cube. If a body is
+/// deformed, there are gaps between its cubes; the larger cubes fill these gaps.
 const BACKING: f64 = 1.3;
 
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
 const LEAST_CUBE: f64 = 2.0;
 
-/// Brightness of the faces of a cube with a normal along x, y and z.
+/// Brightness of a face of a cube, for a face normal along x, y and z.
 const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 
-/// Smallest edge of a cube whose faces have one brightness each, pixels. For smaller cubes, the brightness of
-/// the pixels is averaged.
+/// Smallest edge of a cube with uniform brightness on each face, pixels. For smaller cubes, the brightness of
+/// neighbouring pixels is averaged.
 const SMALL_CUBE: f64 = 10.0;
 
-/// Largest difference in depth between pixels whose brightness is averaged, in edges of a cube.
+/// Largest difference in depth between pixels whose brightness is averaged, divided by the edge of the cube.
 const SAME_SURFACE: f32 = 2.0;
 
 /// Limit of the cosine of the angle between the direction of view and the normal of a face. Below this limit,
@@ -40,7 +40,7 @@ pub struct Cubes<'a> {
     /// Decrease of depth along each of these edges: the cosine of the angle between the direction of view and
     /// the axis.
     cosines: [f64; 3],
-    /// Enlargement along x, y and z of the larger cube behind a cube with an edge of 1.
+    /// Enlargement of the larger cube along x, y and z, divided by the edge of the cube in front of it.
     growth: [f64; 3],
     /// Surface that each pixel shows.
     surfaces: Vec<Surface>,

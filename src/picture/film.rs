@@ -12,8 +12,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// Create the file of a film with `frames` frames of the size of `first`, each shown for 1/`rate` s. No
-    /// frame is written yet.
+    /// Create the file of a film with `frames` frames. All frames have the size of `first`, and each frame is
+    /// shown for 1/`rate` s. No frame is written yet.
     ///
     /// # Errors
     /// If the file cannot be written, or `frames` is 0.
@@ -33,7 +33,7 @@ impl Film {
     ///
     /// # Errors
     /// If the file cannot be written, if the frame has another number of pixels than the first frame, or if
-    /// all frames have been appended.
+    /// all frames of the film have already been appended.
     pub fn append(&mut self, frame: &Image) -> std::io::Result<()> {
         Ok(self.writer.write_image_data(&frame.rgb)?)
     }

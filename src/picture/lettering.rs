@@ -67,7 +67,7 @@ impl Lettering {
         (glyphs, f64::from(cursor))
     }
 
-    /// Return the length of a line of text with this text size, both in pixels.
+    /// Return the length of a line of text, pixels. `size` is the text size, pixels.
     pub fn length(&self, text: &str, size: f64) -> f64 {
         self.place(text, size).1
     }

@@ -199,7 +199,7 @@ fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)
 }
 
 /// Return the largest number (2 to 10) of intervals between the ticks of a ruler. `from` and `to` are the
-/// ends of the ruler, and `text` is the text size, pixels. Each label needs `spacing` text sizes.
+/// ends of the ruler, and `text` is the text size, all in pixels. Each label needs `spacing` text sizes.
 fn most_intervals_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     ((length / (spacing * text)) as usize).clamp(2, 10)

@@ -14,7 +14,8 @@ pub struct Colouring {
     pub map: ColourMap,
     /// Values at the ends of the map; above 0 if the scale is logarithmic.
     pub range: (f64, f64),
-    /// Colours follow the logarithm of the value. Values up to 0 have the colour of points without a value.
+    /// Colours follow the logarithm of the value. Values of 0 or less have the colour of points without a
+    /// value.
     pub is_logarithmic: bool,
 }
 
@@ -48,20 +49,20 @@ impl Colouring {
     }
 }
 
-/// Enlargement of cells on each side in the first of the two loops of [`paint`], pixels. Without this
+/// Enlargement of cells on each side in the first pass of [`paint`] over the points, pixels. Without this
 /// enlargement, a small strain would open gaps between cells, because their edges are rounded to pixels.
 pub const OVERLAP: f64 = 0.5;
 
-/// Enlargement of cells on each side in the second loop of [`paint`], pixels. This enlargement prevents gaps
-/// that result from the round-off of positions and sizes.
+/// Enlargement of cells on each side in the second pass of [`paint`] over the points, pixels. This
+/// enlargement prevents gaps that result from the round-off of positions and sizes.
 const TOLERANCE: f64 = 0.01;
 
 /// Height of the strip that represents a 1-D body, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Paint the cells of points: squares in flat views, cubes in orthographic views, and in 1-D rectangles with
-/// the height of the strip. In orthographic views, a nearer point covers a farther point. In the other views,
-/// a later point covers an earlier point.
+/// Paint the cells of points: squares in flat views, cubes in orthographic views, and rectangles with the
+/// height of the strip in 1-D. In orthographic views, a nearer point covers a farther point. In the other
+/// views, a later point covers an earlier point.
 pub fn paint(
     image: &mut Image,
     marks: impl Iterator<Item = Mark> + Clone,

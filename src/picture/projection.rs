@@ -58,10 +58,10 @@ impl Camera {
         dot(self.to_camera, position)
     }
 
-    /// Return the outer edge of a box for the ruler of an axis: the corner at the low end of the edge, and
-    /// the unit vector in the picture (to the right and down) that points away from the box. The corner has
-    /// one entry per axis, which is true at the high end of this axis. `None` if the axis is parallel to the
-    /// direction of view.
+    /// Find the outer edge of a box along which the ruler of an axis is drawn. Return the corner at the low
+    /// end of the edge, and a unit vector in the picture (to the right and down) that points away from the
+    /// box. The corner has one entry per axis: true at the high end of this axis, false at the low end.
+    /// `None` if the axis is parallel to the direction of view.
     ///
     /// An outer edge belongs to one face that the camera sees and to one face that the camera does not see.
     /// Of the two outer edges along an axis, the ruler is at the edge that is lower in the picture. If these
@@ -187,7 +187,7 @@ impl Bounds {
         (0..3).all(|axis| (self.low[axis]..=self.high[axis]).contains(&position[axis]))
     }
 
-    /// Return the largest absolute coordinate along some axes.
+    /// Return the largest absolute coordinate of the box along the given axes.
     pub fn magnitude(&self, axes: &[Axis]) -> f64 {
         axes.iter().fold(0.0, |largest, axis| {
             let index = axis.index();

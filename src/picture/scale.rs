@@ -1,4 +1,4 @@
-//! Ticks at round numbers and units with SI prefixes.
+//! Ticks at round numbers, and units with SI prefixes.
 
 /// A tick of a scale.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +43,8 @@ impl Scale {
     ///
     /// If the range contains three or more powers of ten, the ticks are at powers of ten, and there are at
     /// most max(`most_intervals`, 2) ticks. Otherwise, the ticks are at 1, 2 and 5 times powers of ten. If
-    /// there are fewer than two such ticks, there are at most `most_intervals + 1` ticks at round numbers.
+    /// the range contains fewer than two of these numbers, the ticks are at round numbers instead, and there
+    /// are at most `most_intervals + 1` ticks.
     pub fn logarithmic(low: f64, high: f64, unit: &str, most_intervals: usize) -> Self {
         let (exponent, unit) = prefixed(unit, high);
         let factor = 10_f64.powi(-exponent);
@@ -142,8 +143,8 @@ const PREFIXES: [(i32, &str); 10] = [
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
 /// Return the exponent of a power of ten that suits numbers up to `magnitude`, and the unit with this power.
-/// The power becomes a prefix, as in "MPa", or for units that take no prefix a factor, as in "×10⁻³ m²". A
-/// unit that takes no prefix stays as it is if `magnitude` is from 0.01 to 10⁴.
+/// The power becomes a prefix, as in "MPa". If the unit takes no prefix, the power becomes a factor, as in
+/// "×10⁻³ m²". A unit that takes no prefix stays as it is if `magnitude` is from 0.01 to 10⁴.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     let size = magnitude.abs();
     if !(size.is_finite() && size > 0.0) {

@@ -274,11 +274,11 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// Fraction of the vectors, from the shortest on, whose arrows are never cut.
+/// Fraction of the vectors whose arrows are never cut. These vectors are the shortest vectors.
 const WHOLE_ARROWS: f64 = 0.995;
 
-/// Arrows are cut only if the longest of all vectors is more than this many times as long as the longest of
-/// the vectors in the fraction [`WHOLE_ARROWS`].
+/// Let w be the length of the longest vector whose arrow is never cut (see [`WHOLE_ARROWS`]). Arrows are cut
+/// only if the longest of all vectors is longer than this ratio times w.
 const LONG_ARROWS: f64 = 4.0;
 
 /// The points of a scene to draw, in painting order.
@@ -314,9 +314,9 @@ impl Marks<'_> {
     /// Return the length, in the drawing plane, of the vector that the longest arrow represents; 0 without
     /// vectors.
     ///
-    /// Usually, this vector is the longest of the projected vectors. If few vectors are much longer than all
-    /// others, such as the velocities of splinters, the returned length is a percentile of the lengths, and
-    /// longer arrows are cut.
+    /// Usually, this vector is the longest of the projected vectors. However, a few vectors can be much
+    /// longer than all others, for example the velocities of splinters. The returned length is then a
+    /// percentile of the lengths, and the arrows of longer vectors are cut.
     pub fn longest_arrow(&self) -> f64 {
         let Some(vectors) = &self.scene.vectors else {
             return 0.0;

@@ -143,7 +143,7 @@ impl Bins {
 }
 
 /// Return the edge (m) of boxes, at least `min_edge` (m), and the number of boxes per direction. The total
-/// number of boxes is at most 2 `points` + 64.
+/// number of boxes is at most twice the number of points (`points`), plus 64.
 pub fn boxes(lower: [f64; 3], upper: [f64; 3], min_edge: f64, points: usize) -> (f64, [usize; 3]) {
     let mut edge = min_edge * (1.0 + 1e-6);
     loop {

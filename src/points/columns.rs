@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::error::excerpt;
 
-/// Coordinates in the order of their directions.
+/// Names of the columns of the coordinates, in the order of the directions.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
 
 /// Accepted names of the column of volumes.
@@ -15,7 +15,7 @@ const VOLUME: [&str; 2] = ["volume", "vol"];
 /// Accepted names of the column of block numbers.
 const BLOCK: [&str; 3] = ["block", "block_id", "block id"];
 
-/// First word of the header of a file of PeriLab.
+/// First word of the header in PeriLab files.
 const PERILAB_HEADER: &str = "header:";
 
 /// Optional first bytes of a UTF-8 file.
@@ -153,8 +153,8 @@ pub fn layout(
     Ok(Ok(layout))
 }
 
-/// The heading of a file: the first row that is neither empty nor a comment, if this row contains neither a
-/// number nor an empty entry.
+/// The heading of a file. The heading is the first row that is not empty and not a comment. If this row
+/// contains a number or an empty entry, the file has no heading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
     /// Entries of the heading, without quotes.
@@ -205,7 +205,7 @@ pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
     }
 }
 
-/// Test whether a row contains no point because it starts with `#`, or with `/` or `*` as in Peridigm.
+/// Test whether a row is a comment: it starts with `#`, or with `/` or `*` as in Peridigm.
 pub fn is_comment(row: &str) -> bool {
     row.trim_start().starts_with(['#', '/', '*'])
 }

@@ -13,8 +13,8 @@ const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.
 ///
-/// - For a crack without width, an end of a bond in the plane of the crack counts as on the side to which the
-///   normal points.
+/// - If an end of a bond lies in the plane of a crack without width, this end counts as on the side to which
+///   the normal points.
 /// - A bond crosses a slot if the bond touches the volume between the faces of the slot.
 /// - Pass the end with the lower id first, so that both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
@@ -121,8 +121,8 @@ fn between_faces(
     within(bond, height, [-0.5, 0.5])
 }
 
-/// Return the part of a segment on which a linear coordinate lies in an interval [low, high] of length 1,
-/// enlarged by [`RIM`]; `None` if there is no such part.
+/// Return the part of a segment on which a linear coordinate lies in an interval; `None` if there is no such
+/// part. The interval [low, high] has length 1, and is enlarged by [`RIM`] at both ends.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,

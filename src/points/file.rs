@@ -32,7 +32,7 @@ const PIECE: u64 = 1 << 16;
 /// Number of pieces that are sampled from a long file.
 const SAMPLED: u64 = 256;
 
-/// Largest absolute coordinate, m; squared distances then cannot overflow.
+/// Largest accepted absolute coordinate, m. This limit prevents an overflow of squared distances.
 const FARTHEST: f64 = 1e30;
 
 /// Return the columns that the deck names for the file of the body with index `user`; `None` if the deck
@@ -94,7 +94,7 @@ pub(super) fn for_each_point(
 /// Sample the points of a file. Return the sampled points, and the number of points of the file that each
 /// sampled point represents.
 ///
-/// From a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot be
+/// Only evenly spaced pieces of a long file are read. Invalid rows are skipped. `None` if the file cannot be
 /// read or its heading is invalid.
 pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     let bodies = BodyPoints::of(&problem.bodies);

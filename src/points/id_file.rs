@@ -14,8 +14,8 @@ const LONGEST: u64 = 1 << 32;
 /// Numbers are separated by white space, commas or semicolons. Comments and a heading are skipped.
 ///
 /// # Errors
-/// If the file cannot be read, is too long or not UTF-8 text, has no number, or has an entry that is not a
-/// number of at least `first`. The message names the file, and the line of a wrong entry.
+/// If the file cannot be read, is too long, is not UTF-8 text or contains no number. If an entry is not a
+/// whole number, or is below `first`. The message names the file, and the line of a wrong entry.
 pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     let name = path.display();
     let unreadable = |error: std::io::Error| format!("cannot read {name}: {error}");
@@ -59,7 +59,7 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     Ok(ids)
 }
 
-/// Return the first line (from 1) in which the number `number` is an entry; `None` if there is no such line
+/// Return the first line with the entry `number`; lines are counted from 1. `None` if there is no such line
 /// or the file cannot be read. Comments and the heading do not count.
 pub fn line_of(path: &Path, number: u64) -> Option<u64> {
     let heading = heading(path).ok()?.map(|heading| heading.line);

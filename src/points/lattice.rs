@@ -1,5 +1,5 @@
-//! Points of lattice bodies: one at the centre of each cell, or one at each Gauss point of the cell. Gauss
-//! points are at ±√3/3 of half the edge per direction (Emmrich & Weckner 2006, §4).
+//! Points of lattice bodies: one at the centre of each cell, or one at each Gauss point of the cell. In
+//! each direction, a Gauss point lies at ±√3/3 of half the edge from the centre (Emmrich & Weckner 2006, §4).
 
 use crate::comm::Communicator;
 use crate::error::{Error, Result};
@@ -11,8 +11,8 @@ use super::{MAX_PER_RANK, Point, distance_squared, shape};
 /// Binary logarithm of the maximum number of cells per rank. Testing so many cells takes some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
-/// Number of candidate cells that are sampled to estimate the fraction of candidate cells that belong to a
-/// body.
+/// Number of candidate cells in a sample. The sample gives an estimate of the fraction of candidate cells
+/// that belong to a body.
 const SAMPLES: u64 = 1 << 17;
 
 /// Step of a low-discrepancy sequence in [0, 1): the inverse of the golden ratio.
@@ -130,7 +130,7 @@ impl<'a> LatticeBody<'a> {
         })
     }
 
-    /// Test whether a position (m) is within the shape, and within the shape of no later body.
+    /// Test whether a position (m) is within the shape, but not within the shape of a later body.
     fn contains(&self, position: [f64; 3]) -> bool {
         let within = |shape: &Shape| shape::contains(shape, position, self.tolerance);
         within(self.shape) && !self.later.iter().any(|shape| within(shape))
@@ -175,8 +175,8 @@ impl<'a> LatticeBody<'a> {
         (0..self.dimension).map(width).product()
     }
 
-    /// Return the number of the body's points in cells whose centres are within a distance (m) of a position
-    /// (m).
+    /// Return the number of the body's points near a position (m). All points of a cell count if the centre
+    /// of the cell is at most `distance` (m) from the position.
     pub fn count_near(&self, position: [f64; 3], distance: f64) -> u64 {
         let range = |k: usize| {
             let all = self.region.range(k);
@@ -203,7 +203,7 @@ impl<'a> LatticeBody<'a> {
         count * self.points_of_cell()
     }
 
-    /// Estimate the volume of the shape, without the parts that later bodies occupy, m³. The estimate uses
+    /// Estimate the volume (m³) of the shape without the parts that later bodies occupy. The estimate uses
     /// evenly distributed positions.
     pub fn shape_volume(&self) -> f64 {
         let (region, all) = (&self.overlap, self.overlap.total() as f64);

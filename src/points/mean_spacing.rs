@@ -12,14 +12,14 @@ use super::{BodyPoints, Point, check_no_empty_body, file, mesh};
 ///
 /// The mean spacing of N points from a file or a mesh is (V/N)^(1/D) in D dimensions. V is the total volume
 /// of the points, divided in 2-D by the thickness and in 1-D by the cross-section. The mean spacing of a
-/// lattice is its spacing, or the geometric mean of the edges of a cell.
+/// lattice is the edge of a cell, or the geometric mean of the edges if they differ.
 ///
 /// Files and meshes are read, but no points are kept. Each rank reads a part of a file, and rank 0 reads the
 /// meshes. The result is the same on any number of ranks.
 ///
 /// # Errors
-/// If a file or mesh of a wanted body is unreadable or invalid, or a body with this file or mesh has no
-/// points. The error is the same on all ranks.
+/// If a file or mesh of a wanted body is unreadable or invalid. If a body that uses such a file or mesh has
+/// no points. The error is the same on all ranks.
 pub fn mean_spacings(
     bodies: &[BodyPoints],
     dimension: Dimension,
@@ -71,7 +71,7 @@ pub fn mean_spacings(
     Ok((0..bodies.len()).map(mean).collect())
 }
 
-/// Return the edge of a lattice cell, m, or the geometric mean of different edges.
+/// Return the edge of a lattice cell, m. If the edges differ, return their geometric mean.
 fn of_cell(edges: &[f64]) -> f64 {
     if edges.iter().all(|edge| *edge == edges[0]) {
         return edges[0];

@@ -114,7 +114,8 @@ pub(super) fn piece(
     })
 }
 
-/// Serialize sets: first the number of ranges of each set, plus 1, or 0 for a missing set; then all ranges.
+/// Serialize sets: first one count per set, then all ranges. The count is 0 for a missing set, otherwise the
+/// number of ranges of the set plus 1.
 fn pack(sets: &[Option<Runs>]) -> Vec<u8> {
     let ranges = |set: &Option<Runs>| {
         set.as_ref()
@@ -143,8 +144,8 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
 ///
 /// # Errors
 /// If the file name does not have the ending of a mesh format, or the file cannot be read or parsed. If an
-/// element is invalid, belongs to two bodies or coincides with another element. If the block of a body is no
-/// group with elements of the problem's dimension, or the name of a block or set is ambiguous.
+/// element is invalid, belongs to two bodies or coincides with another element. If a body's block is not a
+/// group with elements of the problem's dimension. If the name of a block or set is ambiguous.
 pub fn read(problem: &Problem, path: &Path) -> Result<PointsAndSets> {
     let bodies = BodyPoints::of(&problem.bodies);
     let MeshAndPoints {
@@ -304,10 +305,10 @@ fn bodies_of_elements(
     Ok(bodies)
 }
 
-/// Return the name of a part of the mesh that should belong to `rest`, the body without a block, but has only
-/// single-node elements without a volume. `None` if there is no such part.
+/// Find a part of the mesh that should belong to the body `rest`, but has only single-node elements without a
+/// volume. Return the name of the part; `None` if there is no such part. `rest` is the body without a block.
 ///
-/// The part is the whole rest of the mesh, if all elements that belong to no other body are such elements. In
+/// If all elements that belong to no other body are such elements, the part is the whole rest of the mesh. In
 /// files of Exodus, the part may also be a block of spheres that no other body selects. In other files,
 /// single-node elements may define sets, so only the whole rest of the mesh counts.
 fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {

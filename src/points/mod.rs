@@ -100,9 +100,9 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// are contiguous per file or mesh. Collective.
 ///
 /// # Errors
-/// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, cells of
-/// a lattice are too far from the origin to be numbered, or a rank has too many points. The error is the same
-/// on all ranks.
+/// If a body has no points, or a rank has too many points. If a file is unreadable or invalid. If a set has
+/// an unknown id or mesh group. If cells of a lattice are too far from the origin to be numbered. The error
+/// is the same on all ranks.
 pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let bodies = BodyPoints::of(&problem.bodies);
     let mut points = Vec::new();
@@ -178,7 +178,7 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     }
 }
 
-/// Set the point ids of the sets that name groups of meshes. `meshes` contains the points of each mesh and
+/// Store the point ids of the sets that name mesh groups. `meshes` contains the points of each mesh and
 /// the id of the first of these points.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Polygons with an index of their edges by strips, so that a containment test reads few edges.
+//! Polygons whose edges are indexed by strips, so that a containment test reads few edges.
 
 use std::ops::RangeInclusive;
 
@@ -10,7 +10,7 @@ const MOST_ENTRIES: f64 = 8.0;
 /// Round-off of the distance to an edge, as a fraction of the polygon's extent.
 const SLACK: f64 = 1e-12;
 
-/// A closed polygon in the plane, m. It may be concave and may intersect itself.
+/// A closed polygon in the plane; lengths in m. It may be concave and may intersect itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
     vertices: Vec<[f64; 2]>,
@@ -20,7 +20,7 @@ pub struct Polygon {
     axis: usize,
     /// Strips per m.
     strips_per_length: f64,
-    /// Index in `edges` of the first entry of each strip, followed by the number of entries.
+    /// For each strip, the index of its first entry in `edges`. The last element is the length of `edges`.
     starts: Vec<u32>,
     /// The edges that touch each strip; edge k starts at vertex k.
     edges: Vec<u32>,
@@ -48,7 +48,8 @@ impl Polygon {
         polygon
     }
 
-    /// Build the index along the axis with the smaller ratio of total edge length to extent.
+    /// Compute the ratio of total edge length to extent along each axis. Build the index along the axis with
+    /// the smaller ratio.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
         // For each axis, the total length of the edges in the direction of this axis, divided by the extent
@@ -181,7 +182,7 @@ mod tests {
             == 1
     }
 
-    /// Assert that the index gives the same results as all edges, at positions of a half-unit grid. The
+    /// Assert that the test with the index agrees with the test of all edges, on a half-unit grid. The
     /// positions include vertices and positions on edges.
     #[track_caller]
     fn assert_same(vertices: &[[f64; 2]], tolerance: f64) {

@@ -15,7 +15,7 @@ pub(super) const TOLERANCE: f64 = 1e-9;
 /// Largest cell number per direction; integers up to this number are exact in floating point.
 const FARTHEST: f64 = 1e15;
 
-/// Above this number of parts of a union, overlapping parts are merged per direction, to limit the number of
+/// If a union has more parts than this, overlapping parts are merged per direction. This limits the number of
 /// spans.
 const MANY_PARTS: usize = 32;
 
@@ -34,7 +34,7 @@ struct CellBox {
     end: [i64; 3],
 }
 
-/// Consecutive layers of cells along one direction. All layers of a span contain the same cells. The
+/// Consecutive layers of cells along one direction. The layers of a span differ only in position. The
 /// outermost spans lie along z, the spans within them along y, and the innermost along x.
 #[derive(Debug)]
 struct Span {
@@ -145,7 +145,7 @@ fn cells(
 }
 
 /// Compute the union of boxes as spans along `direction`, with nested spans along the lower directions. With
-/// more than [`MANY_PARTS`] boxes, the result may contain further cells.
+/// more than [`MANY_PARTS`] boxes, the result may also contain cells outside the boxes.
 fn spans_along(boxes: &[&CellBox], direction: usize) -> Vec<Span> {
     let span = |cells: &CellBox| [cells.first[direction], cells.end[direction]];
     let mut spans: Vec<[i64; 2]> = boxes.iter().map(|cells| span(cells)).collect();

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 
 use super::columns::{BYTE_ORDER_MARK, LONGEST_ROW, entries, is_comment};
 
-/// Result of reading one part of a file, without the rows.
+/// Number of lines and first error of one part of a file.
 #[derive(Default)]
 pub struct Part {
     /// Number of lines in the part, including comments and empty lines.
@@ -18,11 +18,13 @@ pub struct Part {
     error: Option<(u64, String)>,
 }
 
-/// Call `row` with the entries of each row that starts within part `part` of `parts` equal parts of a file's
-/// bytes. Empty rows, comments and the heading, which starts at offset `heading`, are skipped.
+/// Split the bytes of a file into `parts` equal parts, and call `row` with the entries of each row that
+/// starts in part `part`. Empty rows, comments and the heading, which starts at offset `heading`, are
+/// skipped.
 ///
 /// # Errors
-/// If the file cannot be read. The returned part contains the error of its first invalid row.
+/// If the file cannot be read. Invalid rows do not count as an error of the call; the returned part contains
+/// the message of the first invalid row.
 pub fn for_each_row(
     path: &Path,
     heading: Option<u64>,

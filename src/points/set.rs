@@ -7,8 +7,8 @@ use super::shape;
 /// Tolerance of membership in a shape, as a fraction of the horizon.
 const TOLERANCE: f64 = 1e-9;
 
-/// Test whether a point belongs to a set. The arguments are the horizon (m) for `TOLERANCE`, and the id, the
-/// reference position (m) and the index of the body of the point.
+/// Test whether a point belongs to a set. The point has the given id, reference position (m) and body index.
+/// `TOLERANCE` is multiplied by `horizon` (m).
 pub fn contains(set: &Set, horizon: f64, id: u64, position: [f64; 3], body: usize) -> bool {
     match &set.selector {
         Selector::All => true,

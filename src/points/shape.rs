@@ -1,4 +1,4 @@
-//! Bounding boxes of shapes, and containment of positions.
+//! Bounding boxes of shapes, and the test whether a shape contains a position.
 
 use nalgebra::Vector3;
 

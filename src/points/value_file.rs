@@ -21,11 +21,11 @@ const ID: &str = "id";
 /// Columns of a file of initial values.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ValueColumns {
-    /// Number of columns, and so of entries per row.
+    /// Number of columns; each row has this number of entries.
     pub width: usize,
     /// Offset of the heading in the file, bytes.
     pub heading: u64,
-    /// Column with the id of the point. Without it, the rows have the ids 0, 1, 2, …
+    /// Column with the id of the point. Without this column, the rows have the ids 0, 1, 2, …
     pub id: Option<usize>,
     /// Column of each component of the displacement; a missing component is 0.
     pub displacement: Vec<Option<usize>>,
@@ -50,8 +50,8 @@ impl ValueColumns {
 /// Find the columns of a file by its heading; upper and lower case are equivalent.
 ///
 /// # Errors
-/// If the file cannot be read or has no heading, or if the heading has no column of values or has a known
-/// name twice.
+/// If the file cannot be read or has no heading. If the heading has no column of displacements or velocities,
+/// or has a known name twice.
 pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumns, String> {
     let name = path.display();
     let found = heading(path).map_err(|error| format!("cannot read {name}: {error}"))?;

@@ -1,8 +1,8 @@
 //! The blocks of a problem. Without refinement, each body is a block. With refinement, a block contains the
 //! points of a body that have the same level and the same [`Kind`].
 //!
-//! All points of a block have the same law and horizon. Their volumes differ only in bodies from files and
-//! meshes, and in some blocks of refined bodies.
+//! All points of a block have the same law and horizon. They also have the same volume, except in bodies from
+//! files and meshes, and in some blocks of refined bodies.
 
 use super::{Body, HorizonRule, PointSource, Problem};
 
@@ -13,8 +13,8 @@ const KINDS: usize = 3;
 /// their horizon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Points with the cell volume of their level, on a lattice. All points of a body without refinement have
-    /// this kind, too.
+    /// Lattice points with the full cell volume of their level. Without refinement, all points of a body have
+    /// this kind.
     Whole,
     /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,

@@ -65,8 +65,8 @@ impl Body {
         }
     }
 
-    /// Return the rule for the positions of the points in a cell. Points from a file or a mesh count as
-    /// centres.
+    /// Return the rule for the positions of the points in a cell. For points from a file or a mesh,
+    /// return [`Quadrature::Midpoint`].
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
             PointSource::Lattice { quadrature, .. } => quadrature,
@@ -169,17 +169,17 @@ pub struct InterfacePair {
 /// Breaking of the bonds between two bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
-    /// By the damage laws of both bodies. If the horizons are equal, a bond breaks at the smaller of the two
-    /// thresholds. Otherwise, both thresholds determine the threshold of the bond.
+    /// Bonds break by the damage laws of both bodies. If the horizons are equal, a bond breaks at the smaller
+    /// of the two thresholds. Otherwise, both thresholds determine the threshold of the bond.
     OfBodies,
     /// Bonds never break.
     Unbreakable,
-    /// By a separate damage law, which replaces the damage laws of the bodies.
+    /// Bonds break by a separate damage law, which replaces the damage laws of the bodies.
     Own(Damage),
 }
 
 impl InterfaceDamage {
-    /// Return the separate damage law; `None` for other variants.
+    /// Return the damage law of [`Self::Own`]; `None` for the other variants.
     pub fn own(&self) -> Option<&Damage> {
         match self {
             Self::Own(damage) => Some(damage),
@@ -198,7 +198,7 @@ impl Interface {
     }
 
     /// Return the rule of the bonds between two bodies. The rule does not depend on the order of the bodies.
-    /// Within a body, each end uses its own constants.
+    /// If both are the same body, the rule is [`InterfaceRule::Own`].
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
@@ -208,7 +208,7 @@ impl Interface {
     }
 
     /// Return how the bonds between two bodies break. The result does not depend on the order of the bodies.
-    /// Within a body, the damage law of the body decides.
+    /// If both are the same body, bonds break by its damage law.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
@@ -232,11 +232,11 @@ impl InterfacePair {
 pub enum InterfaceRule {
     /// No bonds join the blocks.
     None,
-    /// Mean of the moduli, and mean of the horizons, of the two blocks.
+    /// The mean of the two moduli, and the mean of the two horizons.
     Average,
     /// The smaller of the two moduli, and the smaller of the two horizons.
     Minimum,
-    /// Each end uses the constants of its body, for its half of the bond force.
+    /// Each end computes its half of the bond force with the constants of its own body.
     Own,
 }
 
@@ -322,7 +322,7 @@ pub enum PointSource {
         path: PathBuf,
         /// Group of the elements; `None` for all elements that belong to no other body.
         block: Option<GroupKey>,
-        /// Length of a unit of the mesh, m.
+        /// Unit of length of the mesh, m.
         scale: f64,
         /// Span of the file's name in the deck.
         span: Range<usize>,
@@ -384,7 +384,7 @@ pub struct Set {
 }
 
 impl Set {
-    /// Return the bodies, among all bodies, that may have points in the set.
+    /// Return the bodies that may have points in the set. `bodies` are all bodies of the problem.
     pub fn possible_bodies<'b>(&self, bodies: &'b [Body]) -> &'b [Body] {
         match self.selector {
             Selector::Body(index) => &bodies[index..=index],
@@ -447,7 +447,7 @@ impl MeshSet {
         }
     }
 
-    /// At the first call, store the ids of the points. Return whether `ids` are equal to the stored ids.
+    /// At the first call, store `ids`. Return whether `ids` are equal to the stored ids.
     pub fn resolve(&self, ids: Runs) -> bool {
         let ids = &ids;
         self.ids.get_or_init(|| ids.clone()) == ids
@@ -473,7 +473,7 @@ pub struct PreCrack {
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
-    /// Surface that the bonds cross.
+    /// Surface of the pre-crack.
     pub surface: Crack,
 }
 
@@ -486,7 +486,7 @@ pub enum Crack {
         from: [f64; 3],
         /// Position of the other end.
         to: [f64; 3],
-        /// Width of the slot, half on each side; 0 for a cut without width.
+        /// Width of the slot, half on each side of the segment; 0 for a cut without width.
         width: f64,
     },
     /// A parallelogram.

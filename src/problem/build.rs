@@ -133,7 +133,7 @@ impl Problem {
         });
     }
 
-    /// Add a load or a support on a set, given by the index of the set.
+    /// Add a load, a support or a prescribed temperature to the set with index `set`.
     pub fn add_condition(&mut self, name: &str, set: usize, action: Action) {
         self.conditions.push(Condition {
             name: name.to_owned(),
@@ -146,8 +146,8 @@ impl Problem {
         });
     }
 
-    /// Add an initial velocity (m/s) of a set, given by the index of the set. `velocity` has an expression
-    /// for each component.
+    /// Add an initial velocity (m/s) to the set with index `set`. `velocity` has an expression for each
+    /// component.
     pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
         self.initials.push(Initial {
             name: name.to_owned(),
@@ -161,8 +161,8 @@ impl Problem {
 }
 
 impl Action {
-    /// Return the deck's key for this condition: `body_force` also for tractions and pressures, which are
-    /// stored as body forces.
+    /// Return the deck's key for this condition. Tractions and pressures are stored as body forces, so their
+    /// key is `body_force`.
     fn quantity(&self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",
@@ -196,7 +196,8 @@ impl Material {
 }
 
 impl Damage {
-    /// Create a damage law with α = 0, without scatter, dependence on direction and no-failure sets.
+    /// Create a damage law with α = 0. It has no scatter, does not depend on the direction of the crack, and
+    /// has an empty list of no-failure sets.
     pub fn new(rule: DamageRule, toughness: Toughness) -> Self {
         Self {
             rule,

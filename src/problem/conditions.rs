@@ -83,7 +83,7 @@ impl Condition {
         }
     }
 
-    /// Return the distinct values of [`Self::divisor`] for some bodies; bodies with `None` are skipped.
+    /// Return the distinct values of [`Self::divisor`] for `bodies`. Values that are `None` are skipped.
     pub fn divisors<'b>(
         &self,
         bodies: impl IntoIterator<Item = &'b Body>,
@@ -97,7 +97,8 @@ impl Condition {
         divisors
     }
 
-    /// Return the error about a body without a single spacing, which cannot be the thickness of a layer.
+    /// Return the error for a condition whose layer is one spacing thick, although the body has no single
+    /// spacing.
     pub fn no_depth(&self, body: &Body) -> Error {
         let message = format!(
             "[condition.{}]: acts on a layer, and the points of [body.{}] have no single spacing; give the thickness of \
@@ -115,8 +116,8 @@ pub enum Action {
     Displacement(Vec<Option<Expression>>),
     /// Prescribed velocity (m/s); `None` for free components.
     Velocity(Vec<Option<Expression>>),
-    /// Additional force density (N/m³) by component: the expression of the component times the factor of the
-    /// component, divided by [`Condition::depth`] if there is a depth.
+    /// Additional force density (N/m³): the expressions and the factors by component. The expression of a
+    /// component is multiplied by its factor, and divided by [`Condition::depth`] if there is a depth.
     BodyForce(Vec<Expression>, Vec<f64>),
     /// Additional total force (N), distributed over the points by volume.
     Force(Vec<Expression>),

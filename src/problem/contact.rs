@@ -43,7 +43,7 @@ pub struct ContactRule {
 /// Model of the repulsive force as a function of the overlap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactModel {
-    /// Stiffness of a layer of material between the points, with a thickness of one horizon.
+    /// The force has the stiffness of a layer of material between the points. The layer is one horizon thick.
     Penalty,
     /// Short-range forces (Silling & Askari 2005, §5; Macek & Silling 2007).
     ShortRange,

@@ -79,8 +79,8 @@ impl Law {
         fault(&self.values, dimension)
     }
 
-    /// Return the fault of a problem in 1-D: the law, or the word given for one of its keys, has no 1-D form.
-    /// `None` if the law and all words have one.
+    /// Return the fault if the law, or a word that is the value of one of its keys, has no 1-D form. `None`
+    /// if the law and all these words have a 1-D form.
     fn fault_of_a_line(&self) -> Option<LawFault> {
         let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
             (Kind::Word(words), Some(Value::Word(given))) => {
@@ -97,7 +97,7 @@ impl Law {
         })
     }
 
-    /// Return the reason why bodies of this law cannot have this damage; `None` if they can.
+    /// Return the reason why a body with this law cannot have the damage law `damage`; `None` if it can.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
@@ -208,12 +208,14 @@ fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     format!("unknown name `{name}`{}", suggestion(name, known))
 }
 
-/// Format names of laws in backticks, such as `a`, `b` and `c`. `and` is the word before the last name.
+/// Format names of laws in backticks, such as `a`, `b` and `c`. The argument `and` is the word before the
+/// last name, such as "or".
 pub fn names(laws: impl IntoIterator<Item = &'static Declaration>, and: &str) -> String {
     listed(laws.into_iter().map(|law| format!("`{}`", law.name)), and)
 }
 
-/// Join the items to a list such as `a, b and c`. `and` is the word before the last item.
+/// Join the items to a list such as `a, b and c`. The argument `and` is the word before the last item, such
+/// as "or".
 fn listed(items: impl IntoIterator<Item = String>, and: &str) -> String {
     let items: Vec<String> = items.into_iter().collect();
     match items.split_last() {

@@ -82,7 +82,7 @@ impl Output {
 /// Settings of the history.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// Interval of rows; if `None`, [`Problem::row_interval`](super::Problem::row_interval) decides.
+    /// Interval of rows; `None` for the default of [`Problem::row_interval`](super::Problem::row_interval).
     pub every: Option<Interval>,
     /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
@@ -178,7 +178,7 @@ pub struct Front {
     pub line: Line,
     /// Length of the line, m.
     pub length: f64,
-    /// Largest distance from the line at which points are evaluated, m.
+    /// Largest distance of the evaluated points from the line, m.
     pub radius: f64,
     /// Field whose values are compared with the threshold.
     pub field: Field,
@@ -218,7 +218,8 @@ pub struct JIntegral {
     pub direction: [f64; 3],
     /// Direction of the crack front, a unit vector; in 3-D only.
     pub front: Option<[f64; 3]>,
-    /// Width of the layer inside the faces of the box, over which the weight of the points falls to 0, m.
+    /// Width (m) of the layer along the inner side of the box faces. In this layer, the weight of the points
+    /// falls from 1 to 0 at the faces.
     pub layer: f64,
 }
 
@@ -254,8 +255,8 @@ pub enum Field {
     CauchyStress,
     /// Equivalent stress of von Mises from the Cauchy stress, Pa.
     VonMisesStress,
-    /// Deformation gradient F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row. F is I at points with too
-    /// few intact bonds.
+    /// Deformation gradient F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, stored row by row. F is I at points
+    /// with too few intact bonds.
     DeformationGradient,
     /// Green–Lagrange strain ½(FᵀF − I) of the three-dimensional body: xx, yy, zz, xy, yz, xz. In plane
     /// stress, the law computes the out-of-plane stretch. Under uniaxial stress, the lateral stretch follows
@@ -277,8 +278,8 @@ pub enum Field {
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.
     Temperature,
-    /// Fragment id: the smallest id of the points in the fragment. A fragment contains all points that chains
-    /// of intact bonds connect to one another.
+    /// Fragment id: the smallest id of the points in the fragment. A fragment is a group of points that are
+    /// connected by chains of intact bonds.
     Fragment,
     /// The rank that owns the point.
     Rank,
@@ -365,7 +366,7 @@ impl Field {
     }
 
     /// Return the number of values per point: 1 for scalars, 3 for vectors, 6 for symmetric tensors, 9 for
-    /// other tensors. Vectors and tensors are padded in 1-D and 2-D.
+    /// other tensors. These numbers also hold in 1-D and 2-D.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement
@@ -393,7 +394,8 @@ pub(crate) const OUTPUTS: f64 = 50.0;
 
 /// Default number of history rows.
 const ROWS: f64 = 500.0;
-/// Smallest default number of steps between rows. Writing a row takes as long as 2 to 9 steps.
+/// By default, rows of an explicit run are at least this number of steps apart. Writing a row takes as long
+/// as 2 to 9 steps.
 const STEPS_A_ROW: u64 = 20;
 
 /// Default wall-clock time between checkpoints, s.

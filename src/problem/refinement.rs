@@ -15,10 +15,10 @@ pub struct Refinement {
     pub levels: u32,
     /// Rule for the horizons of the levels.
     pub rule: HorizonRule,
-    /// Factor on the horizon of points that have points of a coarser level inside their horizon.
+    /// Factor on the horizon of each point that has points of a coarser level inside its horizon.
     pub interface_factor: f64,
-    /// Horizon of bonds between points of one body with different horizons: each end uses its own horizon, or
-    /// both ends use the mean of the two horizons.
+    /// Horizon of a bond between two points of one body whose horizons differ: each end uses its own horizon,
+    /// or both ends use the mean of the two horizons.
     pub bonds: InterfaceRule,
     /// Regions that are refined from the start.
     pub regions: Vec<RefinedRegion>,
@@ -26,9 +26,9 @@ pub struct Refinement {
     pub trigger: Option<Trigger>,
 }
 
-/// Criteria of refinement during the run. A point that fulfils [`Self::energy`], [`Self::damage`] or
-/// [`Self::condition`], and also [`Self::only`], triggers refinement: all points within the horizon of this
-/// point are refined, one level at a time. Criteria that are `None` are not used.
+/// Criteria of refinement during the run. A point triggers refinement if it fulfils [`Self::only`] and at
+/// least one of [`Self::energy`], [`Self::damage`] and [`Self::condition`]. All points within the horizon of
+/// this point are then refined, one level at a time. Criteria that are `None` are not used.
 #[derive(Debug, Clone)]
 pub struct Trigger {
     /// Span in the deck.
@@ -44,8 +44,8 @@ pub struct Trigger {
     pub condition: Option<Expression>,
     /// A condition on reference position and time that every triggering point must fulfil.
     pub only: Option<Expression>,
-    /// Time (s) that a refined point must lie outside the horizons of triggering points and of points with
-    /// broken bonds before the grid is coarsened at the point. `None` for no coarsening.
+    /// Time (s) after which the grid is coarsened at a refined point. During this time, the point must lie
+    /// outside the horizons of triggering points and of points with broken bonds. `None` for no coarsening.
     pub coarsen_after: Option<f64>,
 }
 

@@ -12,17 +12,17 @@ pub struct Rigid {
     pub name: String,
     /// Span in the deck.
     pub span: Range<usize>,
-    /// Shape about the centre.
+    /// Shape relative to the centre.
     pub shape: RigidShape,
     /// Initial position of the centre, m; for a half space, a point on its surface.
     pub centre: [f64; 3],
     /// Prescribed or free motion.
     pub motion: RigidMotion,
-    /// Contact rule with points. The model of this rule is [`Penalty`](super::ContactModel::Penalty).
+    /// Rule for contact with points. The model of this rule is [`Penalty`](super::ContactModel::Penalty).
     pub rule: ContactRule,
 }
 
-/// The shape of a rigid body about its centre; lengths are in m.
+/// The shape of a rigid body relative to its centre; lengths are in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RigidShape {
     /// A ball, or a disc in 2-D.

@@ -1,10 +1,10 @@
-//! Problems with a single body without conditions, for computations on a box of lattice cells of this body.
+//! Problems with a single body and no conditions, for computations on a box of lattice cells of this body.
 
 use super::{PointSource, Problem, Shape, StepRule};
 
-/// Create a problem with the body of index `body` only, without no-failure sets, scatter and damping. Return
-/// the problem and the edges of the cells of the body (m). `None` if the points of the body are not on a
-/// lattice.
+/// Create a problem that contains only the body with index `body`. Omit the body's no-failure sets, scatter
+/// and damping. Return the problem and the edges of the cells of the body (m). `None` if the points of the
+/// body are not on a lattice.
 pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
     let mut body = problem.bodies[body].clone();
     let PointSource::Lattice { spacing, .. } = body.points else {

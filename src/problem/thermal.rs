@@ -57,8 +57,8 @@ impl Problem {
 mod tests {
     use super::*;
 
-    /// The free stretch must give zero stress in Hooke's law σ = λ tr ε I + 2G ε − 3K α ΔT I, in the plane or
-    /// along the bar. The strain perpendicular to the plane or bar is 0.
+    /// With the free stretch, Hooke's law σ = λ tr ε I + 2G ε − 3K α ΔT I must give zero stress in the plane
+    /// or along the bar. The strain perpendicular to the plane or bar is 0.
     #[test]
     fn the_stress_in_the_setting_is_zero() {
         let (lambda, shear) = (3.0, 2.0);

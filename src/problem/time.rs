@@ -63,8 +63,8 @@ pub struct Stage {
 pub enum Method {
     /// Integration of the equation of motion with velocity Verlet.
     Explicit,
-    /// At least one equilibrium per load step, by relaxation; more if bonds break. The time t is the load
-    /// parameter, and [`Time::step`] is not used.
+    /// Each load step computes an equilibrium by relaxation, and further equilibria if bonds break. The time
+    /// t is the load parameter, and [`Time::step`] is not used.
     Relaxation(Relaxation),
     /// Same as [`Method::Relaxation`], but by Newton's method.
     Static(Static),
@@ -78,7 +78,7 @@ pub struct Static {
     /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
     /// reactions.
     pub tolerance: f64,
-    /// Largest number of iterations of a load step, counted from the last break of bonds.
+    /// Largest number of iterations of a load step. The count restarts when bonds break.
     pub max_iterations: u64,
     /// Largest number of times that a load step is halved.
     pub max_halvings: u64,
@@ -94,7 +94,7 @@ impl Method {
         }
     }
 
-    /// Return advice for error messages if the method finds no equilibrium: what to change in the deck.
+    /// Return what to change in the deck if the method finds no equilibrium, as advice in the error message.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {
@@ -122,7 +122,7 @@ pub struct Relaxation {
     /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
     /// reactions.
     pub tolerance: f64,
-    /// Largest number of iterations of a load step, counted from the last break of bonds.
+    /// Largest number of iterations of a load step. The count restarts when bonds break.
     pub iterations: u64,
 }
 

@@ -7,9 +7,9 @@ use super::grid_index::GridIndex;
 
 /// Calculator of the fraction of a point that belongs to a set.
 ///
-/// The fraction of a level-0 point is 0 or 1. The fraction of a finer point is the mean over its parents. A
-/// point takes its volume in equal parts from its parents, so refinement does not change the volume of the
-/// set.
+/// The fraction of a level-0 point is 0 or 1. The fraction of a finer point is the mean of the fractions of
+/// its parents. A point takes its volume in equal parts from its parents, so refinement does not change the
+/// volume of the set.
 pub struct SetFractions<'a, 'b> {
     grids: &'b Grids<'a>,
     cache: FxHashMap<(usize, GridIndex), f64>,
@@ -38,8 +38,8 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// For the point at a grid index in spacings of the finest level, return the fraction that belongs to the
-    /// set.
+    /// Return the fraction of the point at `index` that belongs to the set. `index` is in spacings of the
+    /// finest level.
     fn at(
         &mut self,
         body: usize,

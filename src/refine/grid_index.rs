@@ -1,6 +1,6 @@
 //! Grid indices of a level, their parents and their neighbours.
 
-/// A grid index: a position as a multiple of a level's spacing, from the centre of cell 0.
+/// A grid index: a position relative to the centre of cell 0, in spacings of a level.
 pub type GridIndex = [i64; 3];
 
 /// The indices with components from `low` to `high`, both included.
@@ -32,7 +32,7 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
 }
 
 /// The grid index with a given number in a level-0 cell. The indices of a level in the cell are numbered from
-/// 0, with x fastest, starting at `origin`, the index of the centre of the level-0 cell. All indices are in
+/// 0, with x fastest. Number 0 is `origin`, the index of the centre of the level-0 cell. All indices are in
 /// spacings of the level.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;

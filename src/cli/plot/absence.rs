@@ -48,8 +48,8 @@ impl Painter<'_> {
     }
 
     /// Return the error for an output of which no point is drawn. The options `--clip`, `--slice` and
-    /// `--threshold` are applied in this order. The message names the option that leaves no points, and gives
-    /// the range of positions or values of the points before this option.
+    /// `--threshold` are applied in this order. The message names the option that leaves no points. It also
+    /// gives the range of positions or values of the points to which this option was applied.
     fn nothing_drawn(&self, index: usize) -> Result<Error> {
         let none = [f64::INFINITY, f64::NEG_INFINITY];
         let include = |ends: &mut [f64; 2], value: f64| {

@@ -7,8 +7,8 @@ use fissure::message::suggestion;
 use fissure::output::StoredField;
 use fissure::picture::{Axis, Camera, ColourMap, View};
 
-/// Largest distance of a requested time before the first output or after the last output, as a fraction of
-/// the first or last interval between outputs.
+/// A requested time may be before the first output or after the last output, by at most this fraction of the
+/// first or last interval between outputs.
 const TIME_REACH: f64 = 0.5;
 
 /// Fields that are drawn by default, in order of preference.
@@ -34,8 +34,8 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
     value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
 }
 
-/// Return the indices of the outputs to draw; `text` is `all`, or a list of times (s) and `last`, separated
-/// by commas.
+/// Return the indices of the outputs to draw. `text` is `all`, or a comma-separated list; each entry of the
+/// list is a time (s) or `last`.
 ///
 /// # Errors
 /// If there is no output, if the text is wrong, or if a time is more than half an output interval before the
@@ -75,9 +75,13 @@ pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     chosen.collect()
 }
 
-/// Return the field to draw. With a name, this is the named field. Without a name, it is the first existing
-/// field of [`PREFERRED`], else the first field other than `id` that is stored for each output, else the
-/// first field. `path` is the path of the result, for the error message.
+/// Return the field to draw. If `name` is given, this is the field with this name. Otherwise, it is the first
+/// of these fields that exists:
+/// - the first existing field of [`PREFERRED`],
+/// - the first field that is stored for each output and is not `id`,
+/// - the first field of the result.
+///
+/// `path` is the path of the result, for the error message.
 ///
 /// # Errors
 /// If the result has no field with this name, or no fields.

@@ -12,8 +12,8 @@ const CHUNK: usize = 1 << 18;
 /// Coordinates of points in one row of a lattice differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
-/// A body of n points counts as scattered if the product of the numbers of different x, y and z exceeds this
-/// constant times n^1.5; see [`scattered_bodies`].
+/// A body of n points counts as scattered if its number of combinations exceeds this constant times n^1.5.
+/// [`scattered_bodies`] defines the number of combinations.
 const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Divide `points` points into ranges of at most [`CHUNK`] points.
@@ -39,10 +39,10 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
 /// For each body, return whether its points are scattered (not on a lattice) at output `index`. The list is
 /// empty in 1-D and without outputs.
 ///
-/// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z. A
-/// body of n points is scattered if this number is above [`MOST_COMBINATIONS`] n^1.5. The number of
-/// combinations is about n for a lattice; for scattered points, it is n² in 2-D and n³ in 3-D. In 2-D, 16
-/// points or fewer never count as scattered.
+/// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z
+/// coordinates of its points. A body of n points is scattered if this number is above
+/// [`MOST_COMBINATIONS`] n^1.5. The number of combinations is about n for a lattice; for scattered points, it
+/// is n² in 2-D and n³ in 3-D. In 2-D, 16 points or fewer never count as scattered.
 ///
 /// # Errors
 /// If the result is damaged.

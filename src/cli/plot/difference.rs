@@ -25,7 +25,8 @@ impl Subtrahend {
     /// Open the result that is subtracted from `minuend`.
     ///
     /// # Errors
-    /// If the file is not a result, or does not have the field of the quantity with the same components.
+    /// If the file is not a result, if it lacks the field of the quantity, or if this field has another
+    /// number of components.
     pub fn open(path: &Path, minuend: &ResultReader, quantity: &Quantity) -> Result<Self> {
         let path = result_file(path);
         let result = ResultReader::open(&path)?;

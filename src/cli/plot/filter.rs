@@ -66,8 +66,8 @@ impl Threshold {
     /// Read the arguments of `--threshold`, such as `0.3:1`, `0.3:` or `:1`, and of `--threshold-field`.
     ///
     /// # Errors
-    /// If the text is not LOW:HIGH, both ends are open, LOW is above HIGH, or the field or component is
-    /// missing.
+    /// If the text is not LOW:HIGH, if both ends are open, if LOW is above HIGH, or if the field or component
+    /// is missing.
     pub fn new(
         text: &str,
         field: Option<&str>,

@@ -9,8 +9,8 @@ use crate::cli::format::si;
 /// Percentiles at the ends of the automatic range of colours if there are outliers.
 const PERCENTILES: [f64; 2] = [0.5, 99.5];
 
-/// Values have outliers if the range of all values is more than this many times as long as the range between
-/// the [`PERCENTILES`].
+/// Values have outliers if the range of all values exceeds this constant times the range between the
+/// [`PERCENTILES`].
 const OUTLIERS: f64 = 4.0;
 
 /// Largest number of decades that the automatic range of a logarithmic scale covers. Without this limit, the

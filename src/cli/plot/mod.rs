@@ -53,9 +53,9 @@ pub struct PlotArguments {
     #[command(flatten)]
     picture: PictureArguments,
 
-    /// Draw the output that is nearest to the time T (s), the `last` output, or `all` outputs, each as a
-    /// separate picture. The outputs at several times, separated by commas, are drawn side by side in one
-    /// picture.
+    /// Draw the output that is nearest to the time T (s), or the `last` output. `all` draws each output as a
+    /// separate picture. If several times are given, separated by commas, their outputs are drawn side by
+    /// side in one picture.
     #[arg(
         short,
         long,
@@ -101,7 +101,8 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     }
 }
 
-/// Check the ending of the name of an output file. `hint` is appended to the error message.
+/// Check that the name of an output file ends in one of the endings `known`. `hint` is appended to the error
+/// message.
 ///
 /// # Errors
 /// If the ending is not in `known`.

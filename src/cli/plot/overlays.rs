@@ -1,4 +1,4 @@
-//! Lines of equal value and arrows over a picture.
+//! Overlays of a picture: arrows, and lines of equal value.
 
 use std::path::Path;
 
@@ -47,7 +47,7 @@ impl Contours {
     }
 }
 
-/// Return the vector field with a name, for `--vectors`.
+/// Return the vector field `name`, for `--vectors`.
 ///
 /// # Errors
 /// If the result has no field with this name, or the field is not a vector field.

@@ -65,7 +65,7 @@ pub(super) struct Points {
 }
 
 impl<'a> Painter<'a> {
-    /// Create a painter of the result with the file `path`. The default field, the automatic displacement
+    /// Create a painter of `result`, whose file is `path`. The default field, the automatic displacement
     /// factor, and the distinction between lattices and scattered points follow from the output `reference`.
     ///
     /// # Errors
@@ -378,8 +378,8 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// For each of these points, return whether its body has scattered points; empty if no body has scattered
-    /// points.
+    /// Return, for each of the points `points` of output `index`, whether its body has scattered points. The
+    /// returned vector is empty if no body has scattered points.
     fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
         if !self.scattered.contains(&true) {
             return Ok(Vec::new());

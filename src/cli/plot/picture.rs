@@ -1,4 +1,4 @@
-//! `fissure plot` of a field: options, and the names of the files.
+//! `fissure plot` of a field: options, and the names of the picture files.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub const LEAST_WIDTH: u32 = 200;
 /// Options of pictures.
 #[derive(Args, Clone)]
 pub struct PictureArguments {
-    /// Field to draw [default: damage, or another field if the result has none].
+    /// Field to draw [default: damage, or another field if the result has no damage].
     #[arg(short, long, value_name = "NAME")]
     pub(super) field: Option<String>,
 
@@ -58,18 +58,19 @@ pub struct PictureArguments {
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     pub(super) threshold: Option<String>,
 
-    /// Field whose values `--threshold` compares with its range. A component or invariant may follow after a
+    /// Field whose values must be in the range of `--threshold`. A component or invariant may follow after a
     /// colon, such as stress:xx [default: the drawn field and component].
     #[arg(long, value_name = "NAME[:COMPONENT]", requires = "threshold")]
     pub(super) threshold_field: Option<String>,
 
-    /// Draw the lines of a CSV file, such as crack_NAME.csv, over the picture of a plane body. The columns of
-    /// the file are x and y (m); a column branch separates several lines. May be repeated.
+    /// Draw the lines of a CSV file, such as crack_NAME.csv, over the picture of a plane body. The file
+    /// must have the columns x and y (m). With a column branch, consecutive rows with the same entry in this
+    /// column form one line. May be repeated.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) path: Vec<PathBuf>,
 
-    /// Range of the colours: values such as 0,1, percentiles such as 5%,95%, or `all` [default: all, or
-    /// 0.5%,99.5% if there are outliers].
+    /// Range of the colours: two values such as `0,1`, two percentiles such as `5%,95%`, or `all` [default:
+    /// all, or 0.5%,99.5% if there are outliers].
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(super) range: Option<String>,
 

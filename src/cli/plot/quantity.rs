@@ -60,8 +60,8 @@ impl Quantity {
         })
     }
 
-    /// Compute the quantity of each point from the stored values: an array of points × components, point by
-    /// point.
+    /// Compute the quantity of each point. `stored` contains the values of the field, point by point, with
+    /// the components of a point together.
     pub fn of(&self, stored: Vec<f64>) -> Vec<f64> {
         if self.components == 1 {
             return stored;

@@ -3,7 +3,7 @@
 /// Largest absolute rate of convergence that the search can find.
 const LARGEST_RATE: f64 = 30.0;
 
-/// Number of bisections. The interval of the search is then smaller than the round-off of [`LARGEST_RATE`].
+/// Number of bisections. They reduce the search interval below the round-off of [`LARGEST_RATE`].
 const BISECTIONS: usize = 60;
 
 /// Compute the rate of convergence p of each row of a series; `None` for a row without a rate. Each row is a

@@ -61,7 +61,7 @@ fn split(text: &str) -> Vec<String> {
     parts.iter().map(|part| part.trim().to_owned()).collect()
 }
 
-/// Parse a list of rows such as `1-4,7`. Rows count from 1 in the list, and from 0 in the returned indices.
+/// Parse a list of rows such as `1-4,7`. Row numbers in the list start at 1; the returned indices start at 0.
 /// `count` is the number of all rows.
 ///
 /// # Errors
@@ -148,7 +148,7 @@ impl Design {
         &self.axes[axis].values[row[axis]]
     }
 
-    /// Return the names and values of a row.
+    /// Return the name of each axis and its value in a row.
     pub fn assignments(&self, row: &[usize]) -> Vec<(String, String)> {
         let assignment = |axis: usize| {
             (
@@ -202,8 +202,9 @@ impl Design {
         number(self.value(row, axis))
     }
 
-    /// Return the index of the axis for rates and pictures: the named axis or, without a name, the first axis
-    /// with several values that are all numbers; `None` if there is no such axis.
+    /// Return the index of the abscissa, the axis for rates and pictures. This is the axis `name`. If
+    /// `name` is `None`, it is the first axis with several values that are all numbers. Return `None` if
+    /// there is no such axis.
     ///
     /// # Errors
     /// If the named axis is missing, has one value, or has values that are not numbers.

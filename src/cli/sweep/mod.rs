@@ -1,4 +1,4 @@
-//! `fissure sweep`: a deck for several values of its parameters and keys.
+//! `fissure sweep`: run a deck for several values of its parameters and keys.
 
 mod convergence;
 mod design;
@@ -144,8 +144,8 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
     design.rows.iter().zip(design.folders()).map(run).collect()
 }
 
-/// Run the chosen combinations that are not complete; with `--overwrite`, run all chosen combinations. Write
-/// the table and pictures of all combinations.
+/// Run the combinations that `--rows` chooses, by default all. Without `--overwrite`, skip complete runs.
+/// Write the table and pictures of all combinations.
 ///
 /// # Errors
 /// If the deck or an argument is wrong, a run fails, a file cannot be written, or a signal or a time limit

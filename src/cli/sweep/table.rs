@@ -26,7 +26,7 @@ pub struct Table<'a> {
     units: Vec<String>,
 }
 
-/// A column of the table, with one text for the printed table and one text for sweep.csv in each row.
+/// A column of the table. Each row has one text for the printed table and one text for sweep.csv.
 struct Cells {
     /// Headings in the printed table, and in sweep.csv.
     heading: [String; 2],
@@ -72,7 +72,7 @@ impl<'a> Table<'a> {
         self.values.iter().flatten().count()
     }
 
-    /// Write sweep.csv and the pictures. Print the table and the paths of the files if `prints`.
+    /// Write sweep.csv and the pictures. If `prints` is true, print the table and the paths of the files.
     ///
     /// # Errors
     /// If a file cannot be written.
@@ -187,8 +187,8 @@ impl<'a> Table<'a> {
         rows.iter().map(pair).collect()
     }
 
-    /// Draw a picked value over the abscissa, one curve for each combination of the other axes. Draw nothing
-    /// and return false if there is no abscissa, or if fewer than two runs have the value.
+    /// Draw a picked value over the abscissa, one curve for each combination of the values of the other axes.
+    /// Draw nothing and return false if there is no abscissa, or if fewer than two runs have the value.
     fn draw(&self, column: usize, path: &Path) -> Result<bool> {
         let Some(abscissa) = self.abscissa else {
             return Ok(false);

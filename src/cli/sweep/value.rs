@@ -69,7 +69,7 @@ pub fn reference(text: &str) -> std::result::Result<Reference, String> {
 ///
 /// # Errors
 /// If a reference names an unknown value, if a value has two references, or if a reference names no value
-/// although there are several values or none.
+/// and the number of values is not 1.
 pub fn references(values: &[Column], references: &[Reference]) -> Result<Vec<Option<f64>>> {
     let mut found = vec![None; values.len()];
     for Reference { name, number } in references {

@@ -54,9 +54,9 @@ pub struct Condition {
     /// Prescribed temperature, in the unit of the materials' `reference_temperature`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Number>,
-    /// Thickness in m of the layer that carries a traction or pressure. If not given, the spacing of the body
-    /// to which a point belongs. Required for points from a file or mesh, and for cells with edges of
-    /// different lengths.
+    /// Thickness in m of the layer that carries a traction or pressure. If not given, the thickness is the
+    /// spacing of the body to which a point belongs. Required for points from a file or mesh, and for cells
+    /// with edges of different lengths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth: Option<Number>,
     /// Outward normal for a pressure, of any length.

@@ -28,8 +28,8 @@ struct Velocity {
     /// Node id of the command.
     node: usize,
     group: String,
-    /// Velocity components, also those from earlier commands for the same group or for all atoms; `None` for
-    /// a component that none of these commands sets.
+    /// Velocity components. A component that this command does not set comes from earlier commands for the
+    /// same group or for all atoms. `None` if none of these commands sets the component.
     components: [Option<f64>; 3],
 }
 
@@ -44,7 +44,7 @@ struct Model {
     atoms: Vec<Atoms>,
     style: Option<(String, Node)>,
     coefficients: Vec<Coefficients>,
-    /// Type (`None` for all) and density.
+    /// Atom type (`None` for all types) and density.
     densities: Vec<(Option<u32>, f64)>,
     /// Groups: name, selection and node.
     groups: Vec<(String, Group, Node)>,
@@ -113,8 +113,8 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
     run.write(translation, &model)
 }
 
-/// Return the node ids of commands before the first run that have no effect in this run, with the
-/// reason.
+/// Return the node ids of the commands that have no effect in the first run, with the reason. `commands` are
+/// the commands before this run.
 fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
     let mut acting: HashMap<&str, usize> = HashMap::new();
     let mut without = HashMap::new();

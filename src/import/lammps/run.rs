@@ -1,4 +1,4 @@
-//! Runs of LAMMPS with time steps and outputs, and initial velocities.
+//! Runs of LAMMPS: their time steps, outputs and initial velocities.
 
 use super::fixes::fix;
 use super::setup::{Group, ignored};
@@ -39,7 +39,7 @@ pub(super) const WORKINGS: [&str; 27] = [
     "undump",
 ];
 
-/// Fields of atoms in dumps and computes, and their counterparts.
+/// Atom fields in dumps and computes of LAMMPS, and the corresponding fields of Fissure.
 const FIELDS: [(&str, &str); 21] = [
     ("x", "displacement"),
     ("y", "displacement"),
@@ -75,8 +75,8 @@ pub(super) struct Run {
     history: Option<u64>,
 }
 
-/// Return the set of the new deck for a group, and write the set if it is new. Return `None` if the group
-/// has no counterpart.
+/// Return the name of the set that replaces a group in the new deck. Write the set if the new deck does not
+/// have it yet. Return `None` if the group has no counterpart.
 pub(super) fn set(
     translation: &mut Translation,
     model: &Model,

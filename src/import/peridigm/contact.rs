@@ -93,7 +93,8 @@ pub(super) fn contact(
     Ok(())
 }
 
-/// Test whether the deck omits all bonds between blocks; Peridigm allows `All` and `None`.
+/// Test whether the deck omits all bonds between blocks. Peridigm allows the values `All` and `None` for the
+/// key.
 fn omits_all(translation: &Translation, discretization: &Node, blocks: usize) -> bool {
     let Some(node) = discretization.get(OMITTED_BONDS) else {
         return false;

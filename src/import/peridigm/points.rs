@@ -124,7 +124,7 @@ pub(super) struct Influence {
     pub(super) node: Node,
     /// Name of Fissure's influence function; `None` if there is no counterpart.
     pub(super) known: Option<&'static str>,
-    /// Value of the new key `influence`; `None` for the default or without a counterpart.
+    /// Value of the key `influence` in the new deck; `None` if it is the default or there is no counterpart.
     pub(super) written: Option<&'static str>,
     /// How the new function differs from Peridigm's; empty if both are equal.
     pub(super) difference: &'static str,
@@ -156,7 +156,7 @@ pub(super) fn influence(translation: &Translation, node: &Node) -> Result<Option
     }))
 }
 
-/// Read the number of a block of a text file from `block_NUMBER`.
+/// Read the block number from the name of a block, which has the form `block_NUMBER` for a text file.
 pub(super) fn block_number(block: &str) -> Option<u32> {
     block.rsplit('_').next()?.parse().ok()
 }

@@ -8,7 +8,7 @@ use crate::import::draft::Value;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Return the value of the key `points.block` of the body that a block becomes; `None` if the body has all
+/// Return the value of the key `points.block` for the body of a block. Return `None` if this body has all
 /// elements of the mesh. `id` is the number of the block. `is_only` says whether the deck has no other block.
 fn block_of_points(
     translation: &Translation,

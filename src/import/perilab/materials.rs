@@ -7,8 +7,8 @@ use crate::import::elastic::Constants;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: a part of the name, the law, and how the law differs from the model. The first match is
-/// used. A model with an empty law has no counterpart.
+/// Material models: text that the name of the model contains, the law, and how the law differs from the
+/// model. The first match is used. A model with an empty law has no counterpart.
 const MATERIALS: [(&str, &str, &str); 9] = [
     (
         "unified bond-based",
@@ -48,7 +48,7 @@ pub(super) struct Expansion {
     pub(super) reference: Option<Value>,
 }
 
-/// A material of the source deck; its density belongs to the blocks.
+/// A material of the source deck, without its density. PeriLab reads the density from the blocks.
 pub(super) struct Model<'n> {
     pub(super) name: &'n str,
     pub(super) node: &'n Node,

@@ -113,7 +113,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     Ok(())
 }
 
-/// Log the outcome of the influence function, which PeriLab gives as an expression.
+/// Log the outcome of the key `Influence Function`. Its value in PeriLab is an expression.
 fn note_influence(
     translation: &Translation,
     discretization: &Node,
@@ -143,7 +143,7 @@ fn note_influence(
 /// `Step ID`, as in PeriLab.
 ///
 /// # Errors
-/// If a step has no `Step ID`, or one that is not a whole number.
+/// If the `Step ID` of a step is missing or is not a whole number.
 fn solvers<'n>(translation: &Translation, root: &'n Node) -> Result<Vec<&'n Node>> {
     let Some(steps) = root.get("Multistep Solver") else {
         return Ok(root.get("Solver").into_iter().collect());

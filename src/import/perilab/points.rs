@@ -16,19 +16,20 @@ pub(super) enum Points {
 
 /// Meaning of the block numbers of a deck with a mesh.
 pub(super) enum MeshBlocks {
-    /// The numbers of blocks of an Exodus mesh.
+    /// A block number of the deck is the number of a block of an Exodus mesh.
     Numbers,
-    /// The numbers of groups of the mesh. The import does not read the mesh, which may have no groups. If the
-    /// deck has a single block, and its number is 1, this block therefore has all elements.
+    /// A block number of the deck is the number of a group of the mesh. The import does not read the mesh,
+    /// which may have no groups. Therefore, if block 1 is the only block of the deck, it has all elements.
     NumbersOrAll,
-    /// Positions, from 1, in this list of the names of element sets; `None` if the mesh cannot be read. If
-    /// the deck has a single block, and its number is 1, this block has all elements.
+    /// A block number of the deck is a position, from 1, in this list of names of element sets. The list is
+    /// `None` if the mesh cannot be read. If block 1 is the only block of the deck, it has all elements.
     Sets(Option<Vec<String>>),
 }
 
 impl MeshBlocks {
-    /// Return the prefix that the new deck needs before the name of a node set of the mesh: `element set `
-    /// for Abaqus meshes, whose element sets PeriLab uses as node sets; otherwise an empty text.
+    /// Return the prefix that the new deck needs before the name of a node set of the mesh. For Abaqus
+    /// meshes, the prefix is `element set `, because PeriLab uses their element sets as node sets. For other
+    /// meshes, the prefix is empty.
     pub(super) fn prefix_of_sets(&self) -> &'static str {
         match self {
             Self::Sets(_) => "element set ",
@@ -37,8 +38,8 @@ impl MeshBlocks {
     }
 }
 
-/// Return the element sets of an Abaqus file that are blocks in PeriLab, in the order of their numbers;
-/// `None` if the file cannot be read.
+/// Return the names of the element sets of an Abaqus file that are blocks in PeriLab, in the order of the
+/// block numbers. Return `None` if the file cannot be read.
 ///
 /// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
 /// last. PeriLab has no fixed order for the other sets, so here their order is that of the file.
@@ -82,8 +83,8 @@ fn blocks_of_abaqus(
     Some(names)
 }
 
-/// Columns of a point file with constants of each point, which PeriLab uses instead of the constants of the
-/// deck.
+/// Columns of a point file that hold constants per point. PeriLab uses these constants instead of those of
+/// the deck.
 const POINTWISE_CONSTANTS: [&str; 5] = [
     "Bulk_Modulus",
     "Young's_Modulus",

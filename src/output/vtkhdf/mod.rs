@@ -9,14 +9,14 @@
 //! /history               table, one row per time; attributes: columns, units, comma-separated
 //! ```
 //!
-//! A step is an output here, as in VTKHDF.
+//! As in VTKHDF, the word "step" means an output, not a time step.
 //!
 //! With adaptive refinement, each step is a separate VTK part. The points and static fields of all steps are
 //! then concatenated.
 //!
-//! On any number of ranks, a step is one VTK part. Its points are in the order of
-//! [`IdOrder`](crate::comm::IdOrder). The data of a step are flushed before the step's row in the tables, so
-//! the file of a killed run contains all complete steps.
+//! Even on several ranks, a step has only one VTK part. The points of a part are in the order of
+//! [`IdOrder`](crate::comm::IdOrder). The data of a step are flushed before the row of the step is added to
+//! the tables. The file of a killed run therefore contains all complete steps.
 
 mod resume;
 
@@ -57,7 +57,8 @@ enum Counted {
     Points,
 }
 
-/// This rank's range of the rows of point data. The ranges of successive ranks adjoin.
+/// Range of this rank's rows in the point data. The range of a rank starts where the range of the previous
+/// rank ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece {
     /// Number of points of all lower ranks.
@@ -69,14 +70,14 @@ pub struct Piece {
 /// A result file open for writing. Every method that returns a `Result` is collective. A method that fails on
 /// one rank fails on all ranks, and the file is abandoned.
 ///
-/// Unless each step has its own points, space for all expected steps is allocated in advance. A new step then
+/// If all steps have the same points, space for all expected steps is allocated in advance. A new step then
 /// changes little metadata.
 pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
     points: usize,
     steps: u64,
-    /// Time (s) and number of points of the steps of a resumed file.
+    /// In a resumed file: time (s) and number of points of each retained step.
     past: Vec<(f64, usize)>,
     /// Number of points, summed over all written steps: the number of written rows of each moving field.
     rows: u64,
@@ -303,13 +304,13 @@ impl<'a> ResultFile<'a> {
         self.file.flush()
     }
 
-    /// Return time (s) and number of points of the steps of a resumed file.
+    /// Return the time (s) and number of points of each step that a resumed file has retained.
     pub fn past(&self) -> &[(f64, usize)] {
         &self.past
     }
 
-    /// Return the number of points of all ranks: those of the last [`set_points`](Self::set_points) if each
-    /// step has its own points, else those of all steps.
+    /// Return the number of points of all ranks in one step. If each step has its own points, this is the
+    /// number at the last call of [`set_points`](Self::set_points).
     pub fn points(&self) -> u64 {
         self.piece.total
     }
@@ -398,8 +399,8 @@ impl<'a> ResultFile<'a> {
         }
     }
 
-    /// Return the causes of non-collective writes, as HDF5's bits over all ranks and writes; 0 if all writes
-    /// were collective.
+    /// Return the causes of non-collective writes, as HDF5's `H5D_MPIO_…` bits, combined over all ranks and
+    /// writes. Return 0 if all writes were collective.
     pub fn no_collective_cause(&self) -> u32 {
         self.file.no_collective_cause()
     }

@@ -32,9 +32,10 @@ impl<'a> ResultFile<'a> {
     /// retained history rows.
     ///
     /// A file is continued in place if the points never change, the deck and the version are the same, and
-    /// the file has space for all expected steps. Dropping the later rows must also free no chunk. No
-    /// retained row then moves, so a kill loses no row. Otherwise, or if the file is not writable, the
-    /// retained part is copied to a new file, which then replaces the old file.
+    /// the file has space for all expected steps. In addition, dropping the later rows must not free a chunk.
+    /// The retained rows then do not move, so no row is lost if the process is killed. If a condition is not
+    /// met, or the file is not writable, the retained part is copied to a new file. The new file then
+    /// replaces the old file.
     ///
     /// # Errors
     /// If the old file cannot be read, or has fewer steps, or other points or fields. If a write fails, for
@@ -111,8 +112,8 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// Copy the retained part to a new file, which replaces the old file by a rename. A kill leaves either
-    /// the old or the new file.
+    /// Copy the retained part to a new file, which replaces the old file by a rename. If the process is
+    /// killed, either the old or the new file remains.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -304,8 +305,8 @@ fn has_room(
     Ok(true)
 }
 
-/// Return the paths of the datasets whose lengths count steps or history rows, with the lengths after
-/// truncation.
+/// Return the paths of the datasets whose length is the number of written steps or history rows, and their
+/// lengths after truncation.
 fn counted_rows(retained: Retained) -> Vec<(String, u64)> {
     let mut counted = vec![
         (format!("{STEPS}/Values"), retained.steps),
