@@ -159,8 +159,8 @@ fn arrow(image: &mut Image, middle: [f64; 2], vector: [f64; 2], text: f64, thick
     }
 }
 
-/// Draw the legend at the bottom of the picture: name of the field, an arrow, length of the vector that this arrow
-/// represents, and a note if arrows are cut.
+/// Draw the legend at the bottom of the picture: name of the field, an arrow, length of the vector that this
+/// arrow represents, and a note if arrows are cut.
 fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout: &Layout) {
     let (length, mut label) = legend_entry(longest, vectors.unit);
     if any_cut {
