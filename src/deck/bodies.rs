@@ -24,7 +24,7 @@ const MOST_BODIES: usize = 256;
 /// # Errors
 /// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
 /// the material does not support, an invalid number or shape, or a body without exactly one source of points.
-/// On a missing spacing, a mesh file whose name has an unknown ending, and a key that does not belong to the
+/// If a spacing is missing, the name of a mesh file has an unknown ending, or a key does not belong to the
 /// source of points. If two bodies request the same rows or elements of a file, or name different columns of
 /// the same file.
 pub fn bodies(

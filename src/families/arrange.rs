@@ -7,8 +7,9 @@ use crate::partition::Domain;
 
 use super::grid::GridFrame;
 
-/// Width of a tile in y and in z, in lines. A tile contains `TILE` × `TILE` lines. The points are sorted tile
-/// by tile, because the points of a tile and their neighbours fit in the cache.
+/// Width of a tile in y and in z, as a number of lines of grid points along x. A tile contains `TILE` ×
+/// `TILE` lines. The points are sorted tile by tile, because the points of a tile and their neighbours fit in
+/// the cache.
 const TILE: i64 = 8;
 
 /// Local index and sort keys of a grid point.

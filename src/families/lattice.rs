@@ -392,7 +392,7 @@ impl BondLattice {
         }
     }
 
-    /// Compute the bits of all bonds; broken bonds are included. There is a byte for each lane group and
+    /// Compute the bits that mark the lanes with a bond, intact or broken: one byte for each lane group and
     /// offset.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();

@@ -186,7 +186,7 @@ fn overlap(centre: [f64; 3], radius: f64, dimension: usize) -> f64 {
     }
 }
 
-/// The area of a rectangle within a disc centred at the origin.
+/// Return the area of the part of a rectangle that lies within a disc centred at the origin.
 fn rectangle_in_disc(x: [f64; 2], y: [f64; 2], radius: f64) -> f64 {
     let corner =
         |x: f64, y: f64| x.signum() * y.signum() * quadrant_in_disc(x.abs(), y.abs(), radius);

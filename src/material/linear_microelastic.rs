@@ -4,7 +4,7 @@
 //! Emmrich & Weckner 2006, eq. 5–8. The default λ = c/|ξ|³ is the linearisation of the prototype microelastic
 //! material with the micromodulus c.
 //! The law with any other λ(|ξ|) equals the default law with c = 1 and the influence function λ |ξ|³. Forces
-//! act along ξ, also after large motions. Therefore a rigid rotation causes forces.
+//! act along ξ, also after large motions. A rigid rotation causes forces, because f is linear in η.
 
 use std::sync::Arc;
 

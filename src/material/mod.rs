@@ -398,8 +398,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Lanes::splat(0.0)
     }
 
-    /// Return the fraction of the stiffness that an intact bond has lost at one end, from 0 to 1. The
-    /// damage of this end counts this fraction of the bond as broken.
+    /// Return the fraction of the stiffness that an intact bond has lost at one end, from 0 to 1. In
+    /// the damage of the point at this end, this fraction of the bond counts as broken.
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)

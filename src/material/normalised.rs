@@ -9,7 +9,7 @@
 //! as in an untruncated family.
 //!
 //! With the influence function δ/|ξ|, the bond energy is w = c̄_i s²/2 with c̄_i = c_i δ = 4 W₁/Σ Ṽ. This is
-//! eq. 15 of Diehl & Schweitzer, except that their equation contains 9K/4 instead of the classical W₁.
+//! eq. 15 of Diehl & Schweitzer, except that they use W₁ = 9K/4 instead of the classical W₁.
 
 use std::f64::consts::PI;
 

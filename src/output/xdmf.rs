@@ -36,7 +36,7 @@ pub fn render(
 pub struct SideCar {
     path: PathBuf,
     file_name: String,
-    /// Each step has its own points.
+    /// Whether each step has its own points.
     changing: bool,
     fields: Vec<StoredField>,
     /// Times of the steps, s.

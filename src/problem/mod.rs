@@ -96,7 +96,7 @@ pub struct Problem {
     pub balance: Option<Balance>,
 }
 
-/// Spans of values for errors that are found after the deck has been read.
+/// Byte ranges of values in the deck, for the messages of errors that are found after the deck has been read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Spans {
     /// Span of the horizon of the grid.

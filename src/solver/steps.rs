@@ -163,11 +163,11 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
         return Ok(());
     }
     let message = format!(
-        "[time] {key}: {} s is too long for the largest `damping`, {} 1/s: it must be at most {SIGN_CHANGES}/damping = \
-         {:.3e} s, because velocities change their sign in each longer step",
+        "[time] {key}: must be at most {SIGN_CHANGES}/damping = {:.3e} s, is {} s; with the largest `damping`, {} 1/s, \
+         velocities would change their sign in each longer step",
+        SIGN_CHANGES / rate,
         format_number(step),
         format_number(rate),
-        SIGN_CHANGES / rate,
     );
     Err(Error::input(message).at(place))
 }

@@ -217,8 +217,8 @@ pub(super) fn setup(
     Ok(())
 }
 
-/// Return the reason for leaving out a command that is left out at every position in the script. Return
-/// `None` for other commands.
+/// Return the reason why a command is left out, if it is left out both before and after the first `run`.
+/// Return `None` for other commands.
 pub(super) fn ignored(name: &str) -> Option<&'static str> {
     match name {
         "if" | "jump" | "next" | "include" => Some("control flow is not followed"),

@@ -184,7 +184,8 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
     /// k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
-    /// Sums of |ξ|² Ṽ times the monomials of degree 4 of n, then of N, m⁵.
+    /// Sums of |ξ|² Ṽ times each monomial of degree 4 of n, followed by sums of |ξ|² Ṽ times each monomial of
+    /// degree 4 of the squares N_a = n_a², m⁵.
     type ReferenceSum = [Lanes; 2 * MONOMIALS];
     /// θ, Σ σ|ξ| e Ṽ (Pa) and Σ σ|ξ|² Ṽ (Pa), all over the intact bonds.
     type Sum = [Lanes; 3];

@@ -12,8 +12,8 @@
 //! σ_y²/(3G). Because Σ ω|ξ| ε_d Ṽ = 0, plastic flow does not change θ.
 //!
 //! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a
-//! number c of the point. The energy then has its minimum at 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, and flow beyond
-//! this minimum would add energy. Therefore 1 − r is limited to this value.
+//! number c of the point. As a function of 1 − r, the energy then has its minimum at Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ,
+//! with the values before the flow. A larger 1 − r would add energy, so 1 − r is limited to this value.
 
 use super::directional::Directional;
 use super::nearest::Nearest;

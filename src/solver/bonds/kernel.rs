@@ -57,7 +57,8 @@ where
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     /// Weights of the force states in the work of a bond: the influence function, without volume correction.
     /// `no_volume_correction` says whether [`Self::weights`] contain no volume correction. With a volume
-    /// correction, criteria that read the work require the influence function 1.
+    /// correction, the weights are 1 or 0: criteria that use the work then require a constant influence
+    /// function.
     #[inline(always)]
     pub fn weights_of_work<S: Simd>(&self, simd: S, no_volume_correction: bool) -> Weights {
         if no_volume_correction {

@@ -83,9 +83,9 @@ pub struct Energies {
     /// Energy dissipated by viscous damping, plastic flow, softening, viscoelasticity, friction and contact
     /// damping.
     pub dissipated: f64,
-    /// Error of the energy balance: the change of E since the first row, minus the energy that refinements
-    /// and changes of the density scale have added. E is kinetic + rigid + strain + contact + fracture +
-    /// dissipated − work. An exact integrator has the error 0.
+    /// Error of the energy balance. Let S be kinetic + rigid + strain + contact + fracture + dissipated −
+    /// work. The error is the change of S since the first row, minus the energy that refinements and changes
+    /// of the density scale have added. An exact integrator has the error 0.
     pub error: f64,
 }
 

@@ -88,7 +88,7 @@ impl Tip {
         std::mem::swap(&mut self.growth, &mut earlier.growth);
     }
 
-    /// Record the length (m) of the crack in an earlier row, and the time (s) of this row.
+    /// Record the length (m) that the crack had in an earlier row. `time` is the time of that row, s.
     pub fn record_past(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);
     }
