@@ -50,8 +50,12 @@ fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String 
         };
         format!("only a comment may follow a value on its line{advice}")
     } else if let Some((found, expected)) = message.split_once(", expected ") {
-        let expected = expected.replace(", ", " or ").replace("value", "a value");
-        format!("{found}; expected {expected}")
+        let items = expected.split(", ").map(|item| match item {
+            "value" => "a value",
+            item => item,
+        });
+        let items: Vec<&str> = items.collect();
+        format!("{found}; expected {}", items.join(" or "))
     } else {
         message.to_owned()
     }

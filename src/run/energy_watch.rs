@@ -68,8 +68,8 @@ pub struct EnergyWatch {
     /// Maximum energy input so far, J. The energy input is |initial energy| + |work of loads and supports| +
     /// [`HistoryRow::step_energy`].
     input: f64,
-    /// Error of the energy balance after the last load step, J.
-    error_of_load_steps: f64,
+    /// Energy gain up to the last load step, J.
+    gain_of_load_steps: f64,
     /// Whether a warning about an energy gain has been printed.
     warned: bool,
     /// Largest fracture energy of a row so far, J.
@@ -93,7 +93,7 @@ impl EnergyWatch {
         Self {
             floor: ROUNDOFF_STRAIN * ROUNDOFF_STRAIN * reduce(comm, &mut stiffness)[0],
             input: 0.0,
-            error_of_load_steps: 0.0,
+            gain_of_load_steps: 0.0,
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
@@ -126,7 +126,7 @@ impl EnergyWatch {
     /// count as an energy gain of later time steps.
     fn note_load_step(&mut self, row: &HistoryRow) {
         self.add_input(row);
-        self.error_of_load_steps = row.energies.error;
+        self.gain_of_load_steps = gain_since_start(row);
         self.max_freed = row.energies.fracture;
     }
 
@@ -149,10 +149,7 @@ impl EnergyWatch {
         stable: f64,
         is_last: bool,
     ) -> Result<Option<String>> {
-        // Negative fracture energy means that breaking bonds have added energy, which would hide part of the
-        // gain.
-        let error = row.energies.error - self.error_of_load_steps;
-        let gain = error - row.energies.fracture.min(0.0);
+        let gain = gain_since_start(row) - self.gain_of_load_steps;
         self.add_input(row);
         let relative_gain = gain / self.input.max(self.floor);
         let text = || {
@@ -238,6 +235,12 @@ impl EnergyWatch {
     }
 }
 
+/// Return the energy gain since the start of the run, J. Negative fracture energy means that breaking bonds
+/// have added energy, which would hide part of the gain, so it is left out.
+fn gain_since_start(row: &HistoryRow) -> f64 {
+    row.energies.error - row.energies.fracture.min(0.0)
+}
+
 /// Check that the energies in a row of the history are finite. They can overflow while all motions and forces
 /// are finite.
 ///
@@ -271,17 +274,43 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_balance_that_does_not_close_is_reported() {
-        let mut watch = EnergyWatch {
+    fn watch() -> EnergyWatch {
+        EnergyWatch {
             floor: 1e-3,
             input: 0.0,
-            error_of_load_steps: 0.0,
+            gain_of_load_steps: 0.0,
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
             suspected: false,
+        }
+    }
+
+    #[test]
+    fn errors_of_load_steps_are_no_gain_of_time_steps() {
+        let after = |error: f64, fracture: f64| {
+            row(Energies {
+                work: 2.0,
+                error,
+                fracture,
+                ..Energies::default()
+            })
         };
+        let clock = Clock::new(1.0, 1.0);
+        let mut watch = watch();
+        // In the load steps, the balance has lost or gained energy, and breaking bonds have added some.
+        for (error, fracture) in [(-7.0, 0.0), (7.0, 0.0), (3.0, -5.0)] {
+            watch.note_load_step(&after(error, fracture));
+            let found = watch.check(&after(error, fracture), &clock, 1.0, true);
+            assert_eq!(found.unwrap(), None, "{error} {fracture}");
+        }
+        let found = watch.check(&after(5.1, -5.0), &clock, 1.0, true).unwrap();
+        assert!(found.unwrap().contains("grown by 2.100e0 J"));
+    }
+
+    #[test]
+    fn a_balance_that_does_not_close_is_reported() {
+        let mut watch = watch();
         let energies = |work: f64, error: f64| Energies {
             work,
             strain: work + error,

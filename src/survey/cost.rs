@@ -63,8 +63,9 @@ pub struct Measured {
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Total memory of all ranks at the peak of the time loop (during an output, a checkpoint, a restart
-    /// or a contact search), without ghosts, bytes. The entries are for runs on one rank and for runs on several ranks.
+    /// Total memory of all ranks at the peak of the time loop (during an output, a checkpoint, a restart or a
+    /// contact search), without ghosts, bytes. The entries are for runs on one rank and for runs on several
+    /// ranks.
     pub time_loop: [f64; 2],
     /// Disk space of the main result, including the history, and then of each further result.
     pub results: Vec<ResultCost>,
@@ -275,7 +276,8 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     } else {
         0.0
     };
-    let search = if problem.has_contact() {
+    // Rigid bodies alone need no search for pairs of points.
+    let search = if problem.contact.is_some() {
         CONTACT_SEARCH * counts.points
     } else {
         0.0

@@ -1663,7 +1663,7 @@ fn commands_of_lammps_after_a_run_without_steps_act() {
     let folder = Folder::new("run-0");
     let commands = "velocity all set 3 0 10\nfix 1 top addforce 1 0 0\nrun 10\n";
     let plain = block(&folder, commands);
-    let imported = block(&folder, &format!("run 0\n{commands}run 0\n"));
+    let imported = block(&folder, &format!("run 0\n{commands}run 0 post no\n"));
     assert_eq!(lines(&imported), lines(&plain));
     assert_eq!(fate(&imported, "run"), (Fate::LeftOut, "it makes no step"));
 }

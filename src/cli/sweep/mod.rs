@@ -42,8 +42,8 @@ Without a reference, the rate is the exponent p in f - f0 ~ h^p, computed from t
 because the limit f0 is also unknown. This rate is printed only if h changes a spacing, a horizon or a time
 step, or if --x names h.
 
-Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 a signal stopped the
-sweep; the same command continues it.")]
+Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 a signal or a time
+limit stopped the sweep; the same command continues it.")]
 pub struct SweepArguments {
     /// Deck to run.
     deck: PathBuf,

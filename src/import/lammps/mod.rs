@@ -145,10 +145,10 @@ fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
 /// Reason why `run 0` is left out.
 const NO_STEP: &str = "it makes no step";
 
-/// Test whether a command is `run 0`. Scripts of `peri/lps` and similar styles need this command before the
-/// first step.
+/// Test whether a command is `run 0`, with or without keywords. Scripts of `peri/lps` and similar styles need
+/// this command before the first step.
 fn makes_no_step(command: &Command) -> bool {
-    command.name() == "run" && command.arguments() == ["0"]
+    command.name() == "run" && command.arguments().first() == Some(&"0")
 }
 
 /// Create an error for a command.

@@ -64,9 +64,9 @@ impl Course {
     /// value of a point, given its local index. The result is `None` if no value exceeds the threshold. The
     /// result is bitwise the same for any number of ranks. Collective.
     ///
-    /// The search starts at the farthest point above the threshold; if several are equally far, at the one
-    /// with the smallest id. Of the points ahead of this point and within one horizon of this point, the
-    /// next points are those that are nearest along the line. The values are interpolated linearly between
+    /// The search starts at the farthest point above the threshold; if several are equally far, at the
+    /// one with the smallest id. The next points lie ahead of this point and within one horizon of it, and are the
+    /// nearest such points along the line. The values are interpolated linearly between
     /// the farthest and the next points to find the threshold. If several points are equally far along the
     /// line, the largest of their values is used. When values grow, the result therefore moves along the line
     /// without jumps, even when the next point exceeds the threshold.
