@@ -16,6 +16,7 @@ pub mod mesh;
 pub mod message;
 pub mod output;
 pub mod partition;
+#[cfg(feature = "pictures")]
 pub mod picture;
 pub mod points;
 pub mod problem;
