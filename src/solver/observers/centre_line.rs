@@ -67,7 +67,8 @@ pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch>
     let paths = ShortestPaths::new(from, &places, &bins, reach);
     let mut parts = parts(points, &bins, &paths, reach);
     drop_stubs(&mut parts);
-    lines(from, points, &parts, reach)
+    let roots = roots(&parts, &connected_sets(&places, &bins, &paths));
+    lines(from, points, (&parts, roots), reach)
 }
 
 /// The shortest paths along the band from the start of the crack.
@@ -230,8 +231,57 @@ fn drop_stubs(parts: &mut [Part]) {
     }
 }
 
-/// Construct the branches: lines that join the centroids of successive parts.
-fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
+/// Number the sets of connected points: for each reached point, return the number of its set, from 0 on.
+/// Points that are not reached have the number `usize::MAX`.
+fn connected_sets(places: &[[f64; 3]], bins: &Bins, paths: &ShortestPaths) -> Vec<usize> {
+    let mut set_of = vec![usize::MAX; places.len()];
+    let mut sets = 0;
+    for first in &paths.order {
+        if set_of[*first] != usize::MAX {
+            continue;
+        }
+        set_of[*first] = sets;
+        let mut open = vec![*first];
+        while let Some(point) = open.pop() {
+            bins.within(places[point], |other, _| {
+                let other = other as usize;
+                if set_of[other] == usize::MAX {
+                    set_of[other] = sets;
+                    open.push(other);
+                }
+            });
+        }
+        sets += 1;
+    }
+    set_of
+}
+
+/// Find the parts at which branches begin. In each set of connected points, this is the part without a parent
+/// that has the largest `farthest`; a crack that surrounds a hole or a wide notch thus counts once. If any of
+/// these parts has children, those without children are left out.
+fn roots(parts: &[Part], set_of: &[usize]) -> Vec<usize> {
+    let mut roots: Vec<usize> = Vec::new();
+    let set = |number: usize| set_of[parts[number].members[0]];
+    for number in (0..parts.len()).filter(|number| parts[*number].parent.is_none()) {
+        match roots.iter_mut().find(|root| set(**root) == set(number)) {
+            Some(root) if parts[number].farthest > parts[*root].farthest => *root = number,
+            Some(_) => {}
+            None => roots.push(number),
+        }
+    }
+    if roots.iter().any(|root| !parts[*root].children.is_empty()) {
+        roots.retain(|root| !parts[*root].children.is_empty());
+    }
+    roots
+}
+
+/// Construct the branches: lines that join the centroids of successive parts, from the parts `roots` on.
+fn lines(
+    from: [f64; 3],
+    points: &[Damaged],
+    (parts, roots): (&[Part], Vec<usize>),
+    reach: Reach,
+) -> Vec<Branch> {
     // The vertex of a part is its centroid. For a part without children, the vertex is moved along the line
     // from the previous vertex through the centroid, up to the farthest point of the part along this line.
     let place = |part: &Part, before: Vector| {
@@ -254,18 +304,8 @@ fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Ve
         place: from,
         along: 0.0,
     };
-    // Of the parts without a parent, the branches begin at the part with the largest `farthest`. The other
-    // parts without a parent are not used.
-    let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
-    let farther = |a: &usize, b: &usize| {
-        let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);
-        order.then(b.cmp(a))
-    };
-    let Some(root) = roots.max_by(farther) else {
-        return Vec::new();
-    };
     let mut branches: Vec<Branch> = Vec::new();
-    let mut forks = vec![(start, root)];
+    let mut forks: Vec<(Vertex, usize)> = roots.into_iter().map(|root| (start, root)).collect();
     while let Some((start, first)) = forks.pop() {
         let mut branch = vec![start];
         let mut next = Some(first);
@@ -376,6 +416,21 @@ mod tests {
         let found = branches([20.2, 0.0, 0.0], &points, REACH);
         assert_eq!(found.len(), 2);
         assert!((length(&found) - 40.0).abs() < 0.5, "{}", length(&found));
+    }
+
+    #[test]
+    fn arms_on_both_sides_of_a_hole_count() {
+        let mut points = band([-2.2, 0.0], [-22.2, 0.0]);
+        points.extend(band([2.2, 0.0], [12.2, 0.0]));
+        // A single damaged point at the hole is no arm.
+        points.push(Damaged {
+            place: [0.0, 2.5, 0.0],
+            weight: 0.4,
+        });
+        let found = branches([0.0; 3], &points, REACH);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((length(&found) - 34.4).abs() < 0.1, "{}", length(&found));
+        assert!(found[0][found[0].len() - 1].place[0] < -22.0);
     }
 
     #[test]
