@@ -110,8 +110,8 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
         }
         bottom = unit(part);
         stretch = 1.0 / share;
-        let note = "the part of the bottom unit vector along the normal is removed, and both lengths grow by 1 over \
-                    what remains of it";
+        let note = "the part of the bottom unit vector along the normal is removed, and both lengths are divided by \
+                    the length of the rest";
         translation.log.approximated(kind, note);
     }
     let edge = scaled(bottom, stretch * bottom_length);

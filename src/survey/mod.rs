@@ -93,6 +93,7 @@ impl Survey {
             let message = format!("[crack.{}]: cuts no bond", crack.name);
             warnings.push(Warning::new(message).at(&crack.span));
         }
+        refined_cracks(problem, &mut warnings);
         points_on_cracks(simulation, &mut warnings);
         let sets = sets(simulation, &mut warnings);
         let probes = probes(simulation, &mut warnings);
@@ -251,6 +252,34 @@ fn safeties(problem: &Problem) -> Vec<f64> {
 /// stable step assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
+}
+
+/// Warn of a refinement level whose horizon is shorter than the spacing of level 0. The points at opposite
+/// faces of a crack remain this spacing apart, so they have no bonds with each other, not even broken ones.
+fn refined_cracks(problem: &Problem, warnings: &mut Vec<Warning>) {
+    let Some(refinement) = &problem.refinement else {
+        return;
+    };
+    let can_crack = refinement.trigger.is_some() && problem.has_damage();
+    if problem.cracks.is_empty() && !can_crack {
+        return;
+    }
+    let count = problem.dimension.count();
+    let is_short = |block: &Block<'_>| {
+        let coarse = Block::unrefined(block.body).spacing();
+        let spacing = coarse.map_or(0.0, |spacing| {
+            spacing[..count].iter().copied().fold(0.0, f64::max)
+        });
+        block.horizon < spacing * (1.0 - 1e-6)
+    };
+    if let Some(block) = problem.blocks().find(is_short) {
+        let message = format!(
+            "[refinement] levels: the horizon of level {} is shorter than one spacing of the grid; a crack that exists \
+             before this refinement then has no damage and no length, because no bond can cross it",
+            block.level,
+        );
+        warnings.push(Warning::new(message).at(&refinement.span));
+    }
 }
 
 /// Warn of pre-cracks without width that pass through more points than there are dimensions. All of these
