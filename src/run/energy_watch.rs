@@ -76,6 +76,8 @@ pub struct EnergyWatch {
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
+    /// Largest energy of a row so far, J.
+    largest: f64,
     /// Whether the ratio of energy gain to energy input in the previous row was above [`FATAL_GAIN`].
     suspected: bool,
 }
@@ -97,6 +99,7 @@ impl EnergyWatch {
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
+            largest: 0.0,
             suspected: false,
         }
     }
@@ -112,6 +115,7 @@ impl EnergyWatch {
         simulation: &Simulation<'_, D>,
         is_last: bool,
     ) -> Result<Vec<String>> {
+        self.largest = self.largest.max(row.largest_energy());
         if simulation.is_quasi_static() {
             self.note_load_step(row);
             return Ok(Vec::new());
@@ -199,7 +203,7 @@ impl EnergyWatch {
     /// is a gain and [`Self::check`] has already reported a gain.
     pub fn check_end(&self, row: &HistoryRow, steps: StepKinds) -> Option<String> {
         let error = row.energies.error;
-        let largest = row.largest_energy().max(self.floor);
+        let largest = self.largest.max(row.largest_energy()).max(self.floor);
         let is_reported = self.warned && error > 0.0;
         if is_reported || error.abs() <= MAX_FINAL_ERROR * largest {
             return None;
@@ -282,6 +286,7 @@ mod tests {
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
+            largest: 0.0,
             suspected: false,
         }
     }
@@ -354,6 +359,13 @@ mod tests {
             }) = 10.0;
             assert_eq!(watch.check_end(&row(large), StepKinds::Time), None);
         }
+        // The largest energy of the whole run counts, also if the bodies are unloaded at the end.
+        watch.largest = 10.0;
+        assert_eq!(
+            watch.check_end(&row(energies(2.0, 0.8)), StepKinds::Load),
+            None
+        );
+        watch.largest = 0.0;
         watch.warned = true;
         assert_eq!(
             watch.check_end(&row(energies(2.0, 0.8)), StepKinds::Time),

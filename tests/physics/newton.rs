@@ -347,6 +347,35 @@ fn a_body_that_is_carried_without_loads_comes_to_rest() {
     }
 }
 
+/// Its only forces are those of the start of the load step, so the tolerance is relative to these.
+#[test]
+fn a_free_body_that_is_heated_expands_without_stress() {
+    for law in ["correspondence", "ordinary"] {
+        let deck = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.sheet.{law} = {{ density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, thermal_expansion = 1e-5 }}
+            body.plate = {{ material = 'sheet', shape.box = {{ lower = [0, 0], upper = [20, 10] }} }}
+            condition.heat = {{ set = 'all', temperature = '100*t' }}
+            time = {{ end = 1, method = 'static', static = {{ load_steps = 2 }} }}
+            "
+        );
+        simulate::<2, _>(&deck, |mut simulation| {
+            to_the_end(&mut simulation);
+            let [x, y] = [0, 1].map(|d| &simulation.model.reference[d]);
+            let [u, v] = [0, 1].map(|d| &simulation.fields.displacement[d]);
+            let last = x.len() - 1;
+            let stretch = [
+                (u[last] - u[0]) / (x[last] - x[0]),
+                (v[last] - v[0]) / (y[last] - y[0]),
+            ];
+            for stretch in stretch {
+                assert!((stretch - 1e-3).abs() < 1e-8, "{law}: {stretch}");
+            }
+        });
+    }
+}
+
 #[test]
 fn a_torn_plate_breaks_as_in_a_relaxation() {
     let run = |deck: &str| {

@@ -49,8 +49,9 @@ pub struct LoadStep {
     pub residual: f64,
     /// Damping c of a relaxation, see [`super::relaxation`]; NaN if all points are at rest.
     pub(super) damping: f64,
-    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, N. The tolerance is relative to at least this
-    /// norm, so the allowed ‖f‖ does not shrink when a body is unloaded or breaks.
+    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, and largest ‖f‖ at the start of a load step
+    /// without loads and reactions, N. The tolerance is relative to at least this norm, so the allowed ‖f‖
+    /// does not shrink when a body is unloaded or breaks.
     pub(super) scale: f64,
     /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,
@@ -86,6 +87,10 @@ impl LoadStep {
     /// Compute the residual from the squared norms: the values of [`balance`], summed over all points.
     pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
+        // A free body without loads, for example under a temperature, has only this force to compare with.
+        if loads + reactions == 0.0 && self.iterations <= 1 {
+            self.scale = self.scale.max(free);
+        }
         let scale = (loads + reactions).max(self.scale);
         let is_round_off = free <= ROUND_OFF * stiffness;
         self.residual = if is_round_off { 0.0 } else { free / scale };
@@ -333,12 +338,8 @@ impl<const D: usize> Simulation<'_, D> {
                  the loads, {remedy} or a larger `tolerance`",
                 self.worst_point()
             )
-        } else if residual.is_nan() {
-            "forces are not finite; reduce the loads".to_owned()
         } else {
-            format!(
-                "the unbalanced forces are more than round-off, but there are no loads and reactions; {remedy}"
-            )
+            "forces are not finite; reduce the loads".to_owned()
         };
         Err(Error::run(format!("{failure}: {cause}")))
     }
