@@ -445,38 +445,6 @@ fn new_bonds_do_not_join_what_a_crack_has_parted() {
     });
 }
 
-#[test]
-fn a_refinement_does_not_separate_what_still_holds() {
-    let text = TORN.replace(
-        "energy = 0.6, damage = 0.5, every_steps = 6",
-        "where = 'x > 12*dx && x < 20*dx', every_steps = 1",
-    );
-    simulate::<2, _>(&text, |mut simulation| {
-        // Break only the bonds between vertical neighbours, as in front of a crack tip.
-        let [x, y] = [0, 1].map(|d| simulation.model.reference[d].clone());
-        let holds = |x: f64| x > 13e-3 && x < 18e-3;
-        simulation.forces.cut(
-            |_| true,
-            |a, b| y[a] * y[b] < 0.0 && (y[a] - y[b]).abs() < 1.1e-3 && x[a] == x[b] && holds(x[a]),
-        );
-        simulation.advance();
-        assert!(simulation.refine().unwrap().unwrap().created > 100);
-        let model = &simulation.model;
-        let [x, y] = [0, 1].map(|d| model.reference[d].as_slice());
-        let between = |k: &usize| y[*k].abs() < 1e-9 && holds(x[*k]);
-        let between = (0..model.owned()).filter(between).count();
-        assert!(between >= 9, "{between}");
-        let crosses = |a: usize, b: usize| {
-            y[a] < -1e-9 && y[b] > 1e-9 && crosses_at(0.0, [x, y], a, b).is_some_and(holds)
-        };
-        let [mut intact, mut broken] = [0, 0];
-        (simulation.forces).for_each_intact(|a, b| intact += u32::from(crosses(a, b)));
-        (simulation.forces).for_each_broken(|a, b| broken += u32::from(crosses(a, b)));
-        // The five bonds that were broken, and no other ones.
-        assert!(broken == 5 && intact > 50, "{broken} {intact}");
-    });
-}
-
 /// Return the sum of the loads by component, N.
 fn loads<const D: usize>(text: &str) -> [f64; D] {
     simulate::<D, _>(text, |simulation| {

@@ -1,7 +1,5 @@
 //! Facets: faces between lattice points that a crack separates.
 
-use std::cell::OnceCell;
-
 use crate::comm::all_gather_many;
 use crate::points::bins::Bins;
 use crate::solver::Simulation;
@@ -11,10 +9,8 @@ use crate::solver::assign::cutoffs;
 /// between facets.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
-/// The facets of all ranks. A facet lies between two adjacent points whose bond is broken, if at least half of
-/// the bonds that cross their common face are broken. In front of a crack tip, few of these bonds are broken,
-/// and a refinement must not separate what still holds. Facets also lie where a crack separated two adjacent
-/// points when the grid between them was refined.
+/// The facets of all ranks. A facet lies between two adjacent points whose bond is broken, or was broken when
+/// the grid between them was refined.
 pub struct Facets {
     all: Vec<Facet>,
     bins: Bins,
@@ -23,25 +19,46 @@ pub struct Facets {
 impl Facets {
     /// Find the facets of the broken bonds and of the suppressed nodes. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        let broken = all_gather_many(simulation.comm, &faces_of_broken(simulation));
-        let mut facets = Self::of(simulation, broken);
-        facets.retain_separating(simulation);
+        let (problem, comm) = (simulation.problem, simulation.comm);
+        let model = &simulation.model;
+        let mut blocks: Vec<f64> = model.block.iter().map(|block| f64::from(*block)).collect();
+        blocks.resize(model.volume.len(), 0.0);
+        simulation.forces.update_ghosts_of(comm, &mut blocks);
+        let mut own: Vec<Facet> = Vec::new();
+        simulation.forces.for_each_broken(|here, there| {
+            if model.ids[here] > model.ids[there] {
+                return;
+            }
+            let [a, b] = [here, there].map(|point| model.position(point));
+            let edges = [here, there].map(|point| problem.block(blocks[point] as usize).spacing());
+            let [Some(first), Some(second)] = edges else {
+                return;
+            };
+            let edges: [f64; 3] = std::array::from_fn(|k| first[k].min(second[k]));
+            let apart = |k: usize| (b[k] - a[k]).abs() > 1e-3 * edges[k];
+            let next = |k: usize| (b[k] - a[k]).abs() < (1.0 + 1e-3) * edges[k];
+            let mut along = (0..D).filter(|k| apart(*k));
+            if let (Some(axis), None) = (along.next(), along.next())
+                && next(axis)
+            {
+                own.push(Facet {
+                    centre: std::array::from_fn(|k| 0.5 * (a[k] + b[k])),
+                    edges,
+                    axis: axis as u64,
+                });
+            }
+        });
+        let mut all = all_gather_many(comm, &own);
         // The search above finds a facet only between points one spacing apart. Bonds on a refined grid can
         // be too short to join such points of a coarser grid. Facets of the coarser grid are therefore taken
         // from the suppressed nodes, which the grids store.
-        let suppressed = simulation.grids.suppressed_faces().into_iter();
-        facets
-            .all
-            .extend(suppressed.map(|(centre, edges, axis)| Facet {
-                centre,
-                edges,
-                axis: axis as u64,
-            }));
-        Self::of(simulation, facets.all)
-    }
-
-    fn of<const D: usize>(simulation: &Simulation<'_, D>, all: Vec<Facet>) -> Self {
-        let longest = cutoffs(simulation.problem).into_iter().fold(0.0, f64::max);
+        let faces = simulation.grids.suppressed_faces().into_iter();
+        all.extend(faces.map(|(centre, edges, axis)| Facet {
+            centre,
+            edges,
+            axis: axis as u64,
+        }));
+        let longest = cutoffs(problem).into_iter().fold(0.0, f64::max);
         let centres: Vec<[f64; 3]> = all.iter().map(|facet| facet.centre).collect();
         let widest = all.iter().flat_map(|facet| facet.edges[..D].iter());
         let widest = widest.copied().fold(0.0, f64::max);
@@ -49,43 +66,6 @@ impl Facets {
             bins: Bins::new(&centres, longest + widest),
             all,
         }
-    }
-
-    /// Remove the facets of which fewer than half of the crossing bonds are broken. Collective.
-    fn retain_separating<const D: usize>(&mut self, simulation: &Simulation<'_, D>) {
-        if self.are_none() {
-            return;
-        }
-        let model = &simulation.model;
-        let near: Vec<OnceCell<Vec<u32>>> = vec![OnceCell::new(); model.owned()];
-        // For each facet: numbers of intact and of broken bonds that cross it.
-        let mut crossing = vec![0_u64; 2 * self.all.len()];
-        let mut count = |here: usize, there: usize, is_broken: bool| {
-            if model.ids[here] > model.ids[there] {
-                return;
-            }
-            let from = model.position(here);
-            let near = near[here].get_or_init(|| self.near(from));
-            if near.is_empty() {
-                return;
-            }
-            let to = model.position(there);
-            for facet in near {
-                let facet = *facet as usize;
-                if self.all[facet].is_crossed(from, to) {
-                    crossing[2 * facet + usize::from(is_broken)] += 1;
-                }
-            }
-        };
-        let forces = &simulation.forces;
-        forces.for_each_intact(|here, there| count(here, there, false));
-        forces.for_each_broken(|here, there| count(here, there, true));
-        simulation.comm.sum(&mut crossing);
-        let mut counts = crossing.chunks_exact(2);
-        self.all.retain(|_| {
-            let counts = counts.next().expect("two counts per facet");
-            counts[1] >= counts[0]
-        });
     }
 
     /// Whether no facet exists; the same on all ranks.
@@ -113,41 +93,6 @@ impl Facets {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);
         facets.any(|facet| facet.is_crossed(from, to))
     }
-}
-
-/// Return the faces between adjacent points of which this rank owns the one with the lower id, and whose bond
-/// is broken. Collective.
-fn faces_of_broken<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<Facet> {
-    let (problem, comm) = (simulation.problem, simulation.comm);
-    let model = &simulation.model;
-    let mut blocks: Vec<f64> = model.block.iter().map(|block| f64::from(*block)).collect();
-    blocks.resize(model.volume.len(), 0.0);
-    simulation.forces.update_ghosts_of(comm, &mut blocks);
-    let mut own: Vec<Facet> = Vec::new();
-    simulation.forces.for_each_broken(|here, there| {
-        if model.ids[here] > model.ids[there] {
-            return;
-        }
-        let [a, b] = [here, there].map(|point| model.position(point));
-        let edges = [here, there].map(|point| problem.block(blocks[point] as usize).spacing());
-        let [Some(first), Some(second)] = edges else {
-            return;
-        };
-        let edges: [f64; 3] = std::array::from_fn(|k| first[k].min(second[k]));
-        let apart = |k: usize| (b[k] - a[k]).abs() > 1e-3 * edges[k];
-        let next = |k: usize| (b[k] - a[k]).abs() < (1.0 + 1e-3) * edges[k];
-        let mut along = (0..D).filter(|k| apart(*k));
-        if let (Some(axis), None) = (along.next(), along.next())
-            && next(axis)
-        {
-            own.push(Facet {
-                centre: std::array::from_fn(|k| 0.5 * (a[k] + b[k])),
-                edges,
-                axis: axis as u64,
-            });
-        }
-    });
-    own
 }
 
 /// A face between two adjacent points, perpendicular to an axis.
