@@ -10,6 +10,7 @@ use crate::comm::{Communicator, agree, without_fsync};
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::VarLenUnicode;
+use std::io::ErrorKind;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
@@ -70,9 +71,22 @@ impl<'a> CollectiveFile<'a> {
         if raw.is_none() && comm.size() > 1 {
             return Err(Error::run("ranks that are threads cannot write one file"));
         }
-        let exists = creation == Creation::Exclusive && comm.rank() == 0 && path.exists();
-        let text = || Error::input(format!("{}: the file exists already", path.display()));
-        agree(comm, if exists { Err(text()) } else { Ok(()) })?;
+        let prepared = match (comm.rank(), creation) {
+            (0, Creation::Exclusive) if path.exists() => {
+                let message = format!("{}: the file exists already", path.display());
+                Err(Error::input(message))
+            }
+            // The new file has another inode, so programs that have opened the old file can still read it.
+            (0, Creation::Truncate) => match std::fs::remove_file(path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    let message = format!("cannot replace {}: {error}", path.display());
+                    Err(Error::run(message))
+                }
+                _ => Ok(()),
+            },
+            _ => Ok(()),
+        };
+        agree(comm, prepared)?;
         Self::begin(path, comm, true, || access::create(path, raw, creation))
             .map_err(|error| Error::run(format!("cannot create {error}")))
     }

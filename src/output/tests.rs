@@ -126,6 +126,22 @@ fn what_is_no_result_is_named_so() {
     std::fs::remove_file(&path).unwrap();
 }
 
+#[test]
+fn a_replaced_file_stays_readable_where_it_is_open() -> Result<()> {
+    use std::io::Read as _;
+
+    let path = std::env::temp_dir().join(format!("fissure-replaced-{}", std::process::id()));
+    std::fs::write(&path, "an old result").unwrap();
+    let mut open = std::fs::File::open(&path).unwrap();
+    CollectiveFile::create(&path, &threads::alone(), Creation::Truncate)?.close()?;
+    let mut text = String::new();
+    open.read_to_string(&mut text).unwrap();
+    assert_eq!(text, "an old result");
+    assert!(hdf5_metno::File::open(&path).is_ok());
+    std::fs::remove_file(&path).unwrap();
+    Ok(())
+}
+
 /// Write a result of a deck `one` with allocated space for two steps, and write these steps. Resume the
 /// result after its first step with the deck `deck`, and write three more steps. Return true if the file was
 /// continued in place.
