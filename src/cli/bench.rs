@@ -191,8 +191,7 @@ fn warm_up(arguments: &BenchArguments) -> u32 {
 /// Start MPI, run the benchmark on all ranks, print the figures on rank 0, and finalise MPI.
 pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
     launch::on_all_ranks(|world| {
-        let threads = launch::threads(arguments.threads);
-        agree(world, launch::start_threads(threads))?;
+        let threads = agree(world, launch::start_threads(arguments.threads))?;
         if world.rank() == 0 && verbosity > Verbosity::Quiet {
             launch::warn(threads);
         }

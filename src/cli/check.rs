@@ -30,7 +30,7 @@ const MAX_BONDS: f64 = 1.5e8;
 /// # Errors
 /// If a deck is invalid, if the output cannot be written, or if the threads cannot be started.
 pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
-    launch::start_threads(launch::threads(None))?;
+    launch::start_threads(None)?;
     each(&arguments.decks, |deck| {
         check_one(deck, arguments, verbosity)
     })

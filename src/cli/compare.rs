@@ -11,7 +11,7 @@ use fissure::output::compare::{Comparison, Difference, Place, compare};
 
 use super::format::{count, si};
 use super::progress::Progress;
-use super::{Verbosity, outln, print, result_file};
+use super::{Verbosity, outln, print, result_file, without_output};
 
 /// Compare two results, for example of two versions or machines.
 ///
@@ -125,8 +125,7 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     ];
     for (reader, path) in [&first, &second].into_iter().zip(&paths) {
         if reader.times()?.is_empty() {
-            let message = format!("{}: the result holds no output yet", path.display());
-            return Err(Error::input(message));
+            return Err(without_output(path));
         }
     }
     let tolerances = Tolerances::new(&arguments.tolerance);

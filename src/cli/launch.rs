@@ -115,17 +115,20 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
+/// Environment variable with Slurm's number of cores per task.
+const SLURM_CORES: &str = "SLURM_CPUS_PER_TASK";
+
 /// Return the number of threads: the requested number, else Slurm's number of cores per task, else the number
 /// of cores of this process. In the last case, if the launcher has not bound the process to cores, the ranks
 /// on one host share the cores evenly.
-pub fn threads(asked: Option<u16>) -> usize {
+fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
         (cores() / shared_by).max(1)
     };
     asked
         .map(usize::from)
-        .or_else(|| number(&["SLURM_CPUS_PER_TASK"]))
+        .or_else(|| number(&[SLURM_CORES]))
         .unwrap_or_else(share)
 }
 
@@ -177,16 +180,22 @@ fn warning(threads: usize) -> Option<String> {
     None
 }
 
-/// Start the threads of this rank.
+/// Start the threads of this rank, and return their number: the requested number, or a default from Slurm or
+/// from the cores of this process.
 ///
 /// # Errors
 /// If there are more than `ALWAYS_ALLOWED_THREADS` threads and more than four threads per core of the host,
 /// or if the system cannot start the threads.
-pub fn start_threads(threads: usize) -> Result<()> {
+pub fn start_threads(asked: Option<u16>) -> Result<usize> {
+    let threads = threads(asked);
     let most = ALWAYS_ALLOWED_THREADS.max(4 * cores_of_host());
     if threads > most {
+        let source = match asked {
+            Some(_) => format!("--threads {threads}"),
+            None => format!("{SLURM_CORES}={threads} in the environment"),
+        };
         return Err(Error::input(format!(
-            "--threads {threads}: this host has {} cores; {most} threads at most",
+            "{source}: this host has {} cores; {most} threads at most",
             cores_of_host()
         )));
     }
@@ -195,7 +204,8 @@ pub fn start_threads(threads: usize) -> Result<()> {
         .num_threads(threads)
         .use_current_thread()
         .build_global()
-        .map_err(|error| Error::run(format!("cannot start {threads} threads: {error}")))
+        .map_err(|error| Error::run(format!("cannot start {threads} threads: {error}")))?;
+    Ok(threads)
 }
 
 #[cfg(test)]

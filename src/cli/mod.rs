@@ -405,6 +405,14 @@ fn result_file(path: &Path) -> PathBuf {
     }
 }
 
+/// Return the error for a result without outputs.
+fn without_output(path: &Path) -> Error {
+    Error::input(format!(
+        "{}: the result holds no output yet",
+        path.display()
+    ))
+}
+
 /// Return the error of a failed file operation. `doing` is the operation, such as `read`.
 fn file_error(path: &std::path::Path, doing: &str, error: &std::io::Error) -> Error {
     Error::run(format!("cannot {doing} {}: {error}", path.display()))

@@ -13,7 +13,7 @@ use super::plot::limits::Frame;
 use super::plot::painter::Painter;
 use super::plot::picture::{PictureArguments, beside, nothing_to_draw};
 use super::progress::Progress;
-use super::{Verbosity, file_error, outln, result_file};
+use super::{Verbosity, file_error, outln, result_file, without_output};
 
 /// Draw a field over time as an animated PNG, for browsers and presentations.
 ///
@@ -61,7 +61,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     let result = ResultReader::open(&file)?;
     let times = result.times()?;
     let Some(last) = times.len().checked_sub(1) else {
-        return Err(Error::input("the result holds no output yet"));
+        return Err(without_output(&file));
     };
     let chosen: Vec<usize> = (0..=last).step_by(arguments.every as usize).collect();
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;

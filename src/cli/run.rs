@@ -47,8 +47,7 @@ fn run_deck(
         deck::read_with(&arguments.deck, &arguments.with, &arguments.set),
     )?;
     let problem = deck.problem_on(world)?;
-    let threads = launch::threads(arguments.threads);
-    agree(world, launch::start_threads(threads))?;
+    let threads = agree(world, launch::start_threads(arguments.threads))?;
     let prints = world.rank() == 0 && verbosity > Verbosity::Quiet;
     if prints {
         launch::warn(threads);
@@ -147,7 +146,7 @@ impl Observer for Log {
                 let renamed = if renamed.is_empty() {
                     String::new()
                 } else {
-                    format!("; it is kept as {}", renamed.join(" and "))
+                    format!("; earlier files are kept as {}", renamed.join(" and "))
                 };
                 errln!("warning: {reason}: starting a new result{renamed}");
             }

@@ -9,7 +9,8 @@ use super::resolve::Scope;
 use super::source::Source;
 use crate::deck::spanned::Spanned;
 use crate::error::{Error, Result};
-use crate::expression::{Expression, POSITION_AND_TIME};
+use crate::expression::{Expression, POSITION_AND_TIME, Variable};
+use crate::message::format_number;
 
 /// Keys that a restart may change although their section is fixed.
 const FREE_KEYS: [&str; 1] = ["time.end"];
@@ -154,16 +155,22 @@ impl Comparison<'_> {
                     _ => old == new,
                 };
                 if !same {
-                    let old = formatted(old, values[0].as_ref());
-                    let new = formatted(new, values[1].as_ref());
-                    self.lines.push(format!("{key}: was {old}, is {new}"));
+                    let old_text = formatted(old, values[0].as_ref());
+                    let new_text = formatted(new, values[1].as_ref());
+                    self.lines.push(match old.and_then(Value::as_str) {
+                        Some(text) if old_text == new_text => {
+                            format!("{key}: in {old_text}, {}", self.changes_of_names(text))
+                        }
+                        _ => format!("{key}: was {old_text}, is {new_text}"),
+                    });
                 }
             }
         }
     }
 
-    /// Return a value as an expression of position and time, with the parameters of its deck inserted; `None`
-    /// if the value is not an expression. `deck` is 0 for the old deck and 1 for the new deck.
+    /// Return a value as an expression of position and time, or of the length of a bond, with the parameters
+    /// of its deck inserted; `None` if the value is not an expression. `deck` is 0 for the old deck and 1 for
+    /// the new deck.
     fn expression(&self, deck: usize, value: Option<&Value>) -> Option<Expression> {
         let written = match value? {
             Value::Integer(value) => Written::Value(*value as f64),
@@ -172,9 +179,34 @@ impl Comparison<'_> {
             _ => return None,
         };
         let number = Spanned::new(0..0, written);
-        self.scopes[deck]
-            .expression(&number, "", &POSITION_AND_TIME)
-            .ok()
+        let parsed = |variables| self.scopes[deck].expression(&number, "", variables).ok();
+        parsed(&POSITION_AND_TIME).or_else(|| parsed(&[Variable::R]))
+    }
+
+    /// Describe the changes of the parameters and tables that an expression uses. `text` is the expression,
+    /// which is the same in both decks.
+    fn changes_of_names(&self, text: &str) -> String {
+        let [old, new] = self.scopes;
+        let change = |name: String| {
+            let parameters = [old, new].map(|scope| scope.parameters.get(&name));
+            let tables = [old, new].map(|scope| scope.tables.get(&name));
+            match (parameters, tables) {
+                ([Some(old), Some(new)], _) => (old != new).then(|| {
+                    let [old, new] = [old, new].map(|value| format_number(*value));
+                    format!("the parameter `{name}` was {old}, is {new}")
+                }),
+                (_, [Some(old), Some(new)]) => {
+                    (!new.extends(old)).then(|| format!("rows of the table `{name}` have changed"))
+                }
+                ([None, None], [None, None]) => None,
+                _ => Some(format!(
+                    "`{name}` is a parameter in one deck and a table in the other"
+                )),
+            }
+        };
+        let names = Expression::names(text).unwrap_or_default();
+        let changes: Vec<String> = names.into_iter().filter_map(change).collect();
+        changes.join(", ")
     }
 }
 
@@ -287,7 +319,37 @@ mod tests {
         let lines = against("load = 3", "load = 4");
         assert_eq!(
             lines,
-            ["condition.pull.body_force[0]: was \"load*x*t\", is \"load*x*t\""]
+            ["condition.pull.body_force[0]: in \"load*x*t\", the parameter `load` was 3, is 4"]
+        );
+        let with_table = |values: &str| {
+            let table = format!("table.load = {{ times = [0, 9], values = {values} }}\n body.bar");
+            source(&DECK.replace("load = 3, ", "").replace("body.bar", &table))
+        };
+        let lines = differences(&with_table("[1, 2]"), &with_table("[1, 3]")).unwrap();
+        assert_eq!(
+            lines,
+            [
+                "condition.pull.body_force[0]: in \"load*x*t\", rows of the table `load` have changed"
+            ]
+        );
+        let lines = differences(&with_table("[1, 2]"), &source(DECK)).unwrap();
+        assert_eq!(
+            lines,
+            [
+                "condition.pull.body_force[0]: in \"load*x*t\", `load` is a parameter in one deck and a table in the other"
+            ]
+        );
+        let of_length = |width: &str| {
+            let deck = DECK.replace("late = 8", &format!("late = 8, width = {width}"));
+            let law = "linear_microelastic = { lambda = 'exp(-r/width)', density = 2";
+            source(&deck.replace("pmb = { density = 2", law))
+        };
+        let lines = differences(&of_length("0.5"), &of_length("0.7")).unwrap();
+        assert_eq!(
+            lines,
+            [
+                "material.rubber.linear_microelastic.lambda: in \"exp(-r/width)\", the parameter `width` was 0.5, is 0.7"
+            ]
         );
         let lines = against("dx = 0.5", "dx = 0.25");
         assert_eq!(lines.len(), 2);

@@ -42,7 +42,7 @@ impl Table {
     }
 
     /// Test whether the table starts with all rows of another table.
-    pub(super) fn extends(&self, other: &Self) -> bool {
+    pub fn extends(&self, other: &Self) -> bool {
         self.times.starts_with(&other.times) && self.values.starts_with(&other.values)
     }
 

@@ -26,7 +26,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Version of the file layout.
-const VERSION: i64 = 9;
+const VERSION: i64 = 10;
 
 /// Test whether a path is in use. A link to a missing file also counts as in use, and so does a path
 /// that cannot be examined.
@@ -46,8 +46,8 @@ pub struct Header {
     pub grids: [Vec<NodeKey>; 2],
     /// Number of points over all ranks.
     pub points: u64,
-    /// Hash of the ids, positions, volumes and blocks of the points.
-    pub fingerprint: u64,
+    /// Hashes of the points and of the sets.
+    pub fingerprint: Fingerprint,
     /// Number of outputs in the main result.
     pub outputs: u64,
     /// The further results.
@@ -59,6 +59,15 @@ pub struct Header {
     pub start: (f64, u64),
     /// Description of the physics: the deck with all defaults or, without a deck, a listing of the problem.
     pub deck: String,
+}
+
+/// Hashes of the points and sets of a run. They do not depend on the number of ranks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fingerprint {
+    /// Hash of the ids, positions, volumes and blocks of the points.
+    pub points: u64,
+    /// Name of each set, and hash of the ids of its points.
+    pub sets: Vec<(String, u64)>,
 }
 
 /// State of a further result in a checkpoint.
@@ -87,6 +96,9 @@ struct Numbers {
     removed_nodes: u64,
     further_results: u64,
 }
+
+/// Two attributes: the names of the sets, one per line, and the hash of each set.
+const SETS: [&str; 2] = ["sets", "hashes_of_sets"];
 
 /// Two attributes: the names of the further results, one per line, and the number of outputs of each result.
 /// Both attributes are absent if there are no further results.
@@ -177,8 +189,8 @@ impl Checkpoints {
     /// intact one is found. Collective.
     ///
     /// # Errors
-    /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint.
-    /// A run that ignored this file could later replace it.
+    /// If there is no checkpoint, no checkpoint is intact, or a file is unreadable. An unreadable file may be
+    /// the newest checkpoint. A run that ignored this file could later replace it.
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,
@@ -192,6 +204,7 @@ impl Checkpoints {
         };
         let mut packed = agree(comm, slots)?;
         comm.broadcast(0, &mut packed);
+        let mut damaged = Vec::new();
         for slot in packed {
             let path = folder.join(NAMES[usize::from(slot)]);
             if seal::is_intact(comm, &path)? {
@@ -202,11 +215,21 @@ impl Checkpoints {
                 return Ok((checkpoints, path));
             }
             warn(format!("{} is damaged and not used", path.display()));
+            damaged.push(path.display().to_string());
         }
-        Err(Error::input(format!(
-            "there is no usable checkpoint in {}; start without --restart",
-            folder.display()
-        )))
+        Err(Error::input(match &damaged[..] {
+            [] => format!(
+                "there is no checkpoint in {}; start without --restart",
+                folder.display()
+            ),
+            [only] => format!(
+                "{only} is damaged, and there is no other checkpoint; --overwrite starts the run again"
+            ),
+            both => format!(
+                "both checkpoints are damaged, {}; --overwrite starts the run again",
+                both.join(" and ")
+            ),
+        }))
     }
 }
 
@@ -253,6 +276,10 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             outputs: outputs as u64,
         }));
     }
+    let names = file.text_attribute("/", SETS[0])?;
+    let hashes = file.integers_attribute("/", SETS[1])?;
+    let sets = names.lines().zip(hashes);
+    let sets = sets.map(|(name, hash)| (name.to_owned(), hash as u64));
     let mut grids = [const { Vec::new() }; 2];
     let counts = [numbers.refined_nodes, numbers.removed_nodes];
     for ((keys, name), count) in grids.iter_mut().zip(GRIDS).zip(counts) {
@@ -268,7 +295,10 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
         step: numbers.step,
         grids,
         points: numbers.points,
-        fingerprint: numbers.fingerprint,
+        fingerprint: Fingerprint {
+            points: numbers.fingerprint,
+            sets: sets.collect(),
+        },
         outputs: numbers.outputs,
         further,
         rows: numbers.rows,
@@ -326,7 +356,7 @@ fn write_file<const D: usize>(
         number: header.number,
         step: header.step,
         points: header.points,
-        fingerprint: header.fingerprint,
+        fingerprint: header.fingerprint.points,
         outputs: header.outputs,
         rows: header.rows,
         energy_at_start: header.start.0,
@@ -335,6 +365,11 @@ fn write_file<const D: usize>(
         removed_nodes: header.grids[1].len() as u64,
         further_results: header.further.len() as u64,
     };
+    let sets = &header.fingerprint.sets;
+    let names: Vec<&str> = sets.iter().map(|(name, _)| &name[..]).collect();
+    let hashes: Vec<i64> = sets.iter().map(|(_, hash)| *hash as i64).collect();
+    file.set_attribute("/", SETS[0], Attribute::Text(&names.join("\n")))?;
+    file.set_attribute("/", SETS[1], Attribute::Integers(&hashes))?;
     if !header.further.is_empty() {
         let names: Vec<&str> = (header.further.iter())
             .map(|result| &result.name[..])

@@ -9,7 +9,7 @@ use crate::comm::agree;
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write as _;
+use std::io::{Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Path of the table. Each row has the quantities at one time.
@@ -126,7 +126,7 @@ impl History {
     ///
     /// # Errors
     /// If the length of a row differs from the number of columns, or a write fails, for example because the
-    /// disk is full.
+    /// disk is full. The CSV file then still ends with a complete row.
     pub fn append(&mut self, file: &mut CollectiveFile<'_>, rows: &[Vec<f64>]) -> Result<()> {
         agree(file.communicator(), self.append_csv(rows))?;
         let first = self.table.rows();
@@ -149,9 +149,13 @@ impl History {
             let message = format!("a history row has {length} numbers for {columns} columns");
             return Err(Error::run(message));
         }
-        writer
-            .write_all(lines(rows).as_bytes())
-            .map_err(|error| csv_failure(&self.csv, &error))
+        let written = writer.stream_position().and_then(|length| {
+            writer.write_all(lines(rows).as_bytes()).inspect_err(|_| {
+                // Best effort: readers ignore an incomplete last row.
+                let _ = writer.set_len(length);
+            })
+        });
+        written.map_err(|error| csv_failure(&self.csv, &error))
     }
 }
 

@@ -4,9 +4,10 @@ use std::time::{Duration, Instant};
 
 use crate::comm::{self, agree};
 use crate::error::Result;
-use crate::output::checkpoint::{Checkpoints, Header};
+use crate::output::checkpoint::{Checkpoints, Fingerprint, Header};
 use crate::output::mix;
 use crate::solver::Simulation;
+use crate::solver::conditions::members;
 
 use super::files::Files;
 use super::recorder::Recorder;
@@ -17,7 +18,7 @@ pub struct CheckpointWriter {
     /// Description of the physics, which each checkpoint contains. A restart compares the description in the
     /// checkpoint with the description of the restarted run.
     physics: String,
-    fingerprint: u64,
+    fingerprint: Fingerprint,
     /// Number of checkpoints written.
     pub written: u64,
     /// Time spent on writing checkpoints.
@@ -44,7 +45,7 @@ impl CheckpointWriter {
     }
 
     /// Create the writer for a restarted run, which continues with the existing checkpoints of the folder.
-    pub fn after(checkpoints: Checkpoints, physics: String, fingerprint: u64) -> Self {
+    pub fn after(checkpoints: Checkpoints, physics: String, fingerprint: Fingerprint) -> Self {
         Self {
             checkpoints,
             physics,
@@ -74,7 +75,7 @@ impl CheckpointWriter {
             fingerprint: if simulation.may_refine() {
                 fingerprint(simulation)
             } else {
-                self.fingerprint
+                self.fingerprint.clone()
             },
             outputs: recorder.main().steps(),
             further: recorder.further(simulation),
@@ -91,14 +92,26 @@ impl CheckpointWriter {
     }
 }
 
-/// Return a hash of the ids, positions, volumes and blocks of all points. Collective.
-pub fn fingerprint<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
-    let model = &simulation.model;
+/// Compute the hashes of all points and of all sets. Collective.
+pub fn fingerprint<const D: usize>(simulation: &Simulation<'_, D>) -> Fingerprint {
+    let (problem, model) = (simulation.problem, &simulation.model);
     let own = (0..model.owned()).fold(0_u64, |sum, point| {
         let position = model.position(point).map(f64::to_bits);
         let others = [model.volume[point].to_bits(), u64::from(model.block[point])];
         let words = position.into_iter().chain(others);
         sum.wrapping_add(words.fold(mix(model.ids[point]), |hash, word| mix(hash ^ word)))
     });
-    comm::total(simulation.comm, own)
+    let hash_of_set = |set: usize| {
+        let ids = members(problem, model, set)
+            .into_iter()
+            .map(|point| model.ids[point as usize]);
+        comm::total(simulation.comm, ids.map(mix).fold(0, u64::wrapping_add))
+    };
+    let sets = problem.sets.iter().enumerate();
+    Fingerprint {
+        points: comm::total(simulation.comm, own),
+        sets: sets
+            .map(|(index, set)| (set.name.clone(), hash_of_set(index)))
+            .collect(),
+    }
 }

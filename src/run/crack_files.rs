@@ -9,6 +9,8 @@ use crate::error::{Error, Result};
 use crate::points::distance_squared;
 use crate::solver::observers::{Branch, Surface};
 
+use super::files::crack_table;
+
 /// Name of a crack, and its table as CSV text.
 type Table = (String, String);
 
@@ -19,9 +21,9 @@ type Table = (String, String);
 pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[Table]) -> Result<()> {
     let write_all = || {
         for (name, table) in cracks {
-            let path = folder.join(format!("crack_{name}.csv"));
+            let path = crack_table(folder, name);
             // The file is renamed when complete, so readers never see a partial file.
-            let part = folder.join(format!("crack_{name}.csv.part"));
+            let part = path.with_extension("csv.part");
             let written = fs::write(&part, table).and_then(|()| fs::rename(&part, &path));
             written.map_err(|error| {
                 let path = path.display();

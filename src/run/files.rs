@@ -1,6 +1,7 @@
 //! The output files of a run.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -22,18 +23,24 @@ pub struct Files {
     pub further: Vec<PathBuf>,
     /// The history, as CSV.
     pub history: PathBuf,
+    /// The tables of the cracks, as CSV.
+    pub cracks: Vec<PathBuf>,
 }
 
 impl Files {
     /// Return the files of a run in a folder.
     pub fn new(problem: &Problem, folder: PathBuf) -> Self {
         let further = problem.further_outputs.iter();
+        let cracks = problem.history.cracks.iter();
         Self {
             result: result_of(&folder, None),
             further: further
                 .map(|output| result_of(&folder, output.name.as_deref()))
                 .collect(),
             history: folder.join("history.csv"),
+            cracks: cracks
+                .map(|crack| crack_table(&folder, &crack.name))
+                .collect(),
             folder,
         }
     }
@@ -42,6 +49,44 @@ impl Files {
     pub fn results(&self) -> impl Iterator<Item = &Path> {
         let all = [&self.result].into_iter().chain(&self.further);
         all.map(PathBuf::as_path)
+    }
+
+    /// Return the paths of the side-cars of the results.
+    fn side_cars(&self) -> impl Iterator<Item = PathBuf> {
+        self.results().map(|path| path.with_extension("xdmf"))
+    }
+
+    /// Remove temporary files that a killed run has left. Called on rank 0.
+    ///
+    /// # Errors
+    /// If a file cannot be removed.
+    pub fn remove_temporary(&self) -> Result<()> {
+        let results = self.results();
+        let mut paths: Vec<PathBuf> = results
+            .map(|path| path.with_extension("vtkhdf.part"))
+            .collect();
+        paths.extend(
+            self.side_cars()
+                .map(|path| path.with_extension("xdmf.part")),
+        );
+        let tables = self.cracks.iter().chain([&self.history]);
+        paths.extend(tables.map(|path| path.with_extension("csv.part")));
+        paths.iter().try_for_each(|path| remove(path))
+    }
+
+    /// If the main result of an earlier run has been removed, remove the other files of this run: further
+    /// results, side-cars, the history, tables of cracks, and the files `stale`. Called on rank 0.
+    ///
+    /// # Errors
+    /// If a file cannot be removed.
+    pub fn remove_remains(&self, stale: &[PathBuf]) -> Result<()> {
+        if is_taken(&self.result) {
+            return Ok(());
+        }
+        let results = self.further.iter().chain(stale);
+        let tables = self.cracks.iter().chain([&self.history]);
+        let mut paths = results.chain(tables).cloned().chain(self.side_cars());
+        paths.try_for_each(|path| remove(&path))
     }
 
     /// Check that a new run may write to the folder. Called on rank 0.
@@ -140,6 +185,24 @@ fn result_of(folder: &Path, name: Option<&str>) -> PathBuf {
     match name {
         None => folder.join("result.vtkhdf"),
         Some(name) => folder.join(format!("result_{name}.vtkhdf")),
+    }
+}
+
+/// Return the path of the table of a crack.
+pub fn crack_table(folder: &Path, crack: &str) -> PathBuf {
+    folder.join(format!("crack_{crack}.csv"))
+}
+
+/// Remove a file, if it exists.
+///
+/// # Errors
+/// If the file cannot be removed.
+pub fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(file_error(path, "remove", &error))
+        }
+        _ => Ok(()),
     }
 }
 

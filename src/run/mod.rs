@@ -211,6 +211,11 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Decided(decisions));
         self.check_signals()?;
         let mut stepper = Stepper::new(simulation);
+        let removed = match self.comm.rank() {
+            0 => self.files.remove_temporary(),
+            _ => Ok(()),
+        };
+        agree(self.comm, removed)?;
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(stepper.at_full_step())?,
             Existing::Refuse | Existing::Replace => self.begin_run(&mut stepper)?,
@@ -424,7 +429,12 @@ impl<'a> Job<'a> {
             Creation::Exclusive => Vec::new(),
         };
         let starts = vec![Start::New(creation); self.files.results().count()];
-        let mut recorder = Recorder::new(simulation, &self.files, (&starts, 0), &metadata)?;
+        let opened = Recorder::new(simulation, &self.files, (&starts, 0), &metadata);
+        if opened.is_err() && creation == Creation::Truncate && self.comm.rank() == 0 {
+            // Best effort: the returned error is the cause.
+            let _ = self.files.remove_remains(&stale);
+        }
+        let mut recorder = opened?;
         self.remove_stale_files(stale)?;
         recorder.record(stepper, self.observer)?;
         Ok((checkpoints, recorder))
@@ -542,7 +552,7 @@ impl<'a> Job<'a> {
     /// Remove the files at `paths`, which an earlier run has written, and report the paths. Collective.
     fn remove_stale_files(&mut self, paths: Vec<PathBuf>) -> Result<()> {
         let removed = match self.comm.rank() {
-            0 => stale_files::remove(&paths),
+            0 => paths.iter().try_for_each(|path| files::remove(path)),
             _ => Ok(()),
         };
         agree(self.comm, removed)?;

@@ -77,7 +77,13 @@ impl<'a> OutputFile<'a> {
                     // An error is ignored, because a result without outputs only takes space.
                     let _ = std::fs::remove_file(path);
                 }
-                (created?, RetainedRows::new())
+                let file = created?;
+                if comm.rank() == 0 {
+                    // The side-car of an earlier result does not describe this result. An error is ignored,
+                    // because the first output replaces the side-car.
+                    let _ = std::fs::remove_file(path.with_extension("xdmf"));
+                }
+                (file, RetainedRows::new())
             }
             Start::After(outputs) => ResultFile::resume(path, comm, &contents, history, outputs)?,
         };

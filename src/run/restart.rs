@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
-use crate::output::checkpoint::{Checkpoints, Header, read_header, read_saved};
+use crate::message::format_number;
+use crate::output::checkpoint::{Checkpoints, Fingerprint, Header, read_header, read_saved};
 use crate::solver::Simulation;
 use crate::solver::simulation::Times;
 
@@ -24,8 +25,9 @@ pub struct Restart {
 /// Restore a simulation from the newest intact checkpoint. Collective.
 ///
 /// # Errors
-/// If there is no intact checkpoint, or if the checkpoint belongs to another deck or to other points. For
-/// another deck, the message lists the differences.
+/// If there is no intact checkpoint, or if the checkpoint belongs to another deck, to other points or to sets
+/// with other points. For another deck, the message lists the differences. If the run ends before the
+/// checkpoint.
 pub fn restart<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     files: &Files,
@@ -50,13 +52,33 @@ pub fn restart<const D: usize>(
     }
     simulation.refine_to(&header.grids)?;
     let fingerprint = fingerprint(simulation);
-    if header.points != simulation.model.total || header.fingerprint != fingerprint {
+    if header.points != simulation.model.total || header.fingerprint.points != fingerprint.points {
         let message = "was written for other points; has a point file changed?";
         return Err(Error::input(format!("{} {message}", path.display())));
+    }
+    let changed = changed_sets(&header.fingerprint, &fingerprint);
+    if !changed.is_empty() {
+        return Err(Error::input(format!(
+            "{} was written for other points of {}; has a file or mesh of a set changed?",
+            path.display(),
+            changed.join(", ")
+        )));
     }
     let order = simulation.id_order();
     let saved = read_saved(comm, &path, &order)?;
     simulation.restore(&order, &saved)?;
+    let (clock, end) = (&simulation.clock, &simulation.problem.time.end);
+    // The last step of a run may pass its end, so the time of the checkpoint may be after the end.
+    if *end <= clock.time_before() {
+        let message = format!(
+            "[time] end: must be after the checkpoint {}, which is at {} s, is {} s; give a later end, or start a \
+             new run in another folder with --output DIR",
+            path.display(),
+            format_number(clock.time()),
+            format_number(*end)
+        );
+        return Err(Error::input(message).at(&simulation.problem.spans.end));
+    }
     // Restoring belongs to the set-up; the times of the time loop start from 0.
     simulation.times = Times {
         set_up: simulation.times.set_up + start.elapsed(),
@@ -66,4 +88,14 @@ pub fn restart<const D: usize>(
         checkpoints: CheckpointWriter::after(checkpoints, physics, fingerprint),
         header,
     })
+}
+
+/// Return the sets of both fingerprints whose points differ, as sections of the deck.
+fn changed_sets(old: &Fingerprint, new: &Fingerprint) -> Vec<String> {
+    let has_changed = |(name, hash): &&(String, u64)| {
+        let mut known = old.sets.iter();
+        known.any(|(old, old_hash)| old == name && old_hash != hash)
+    };
+    let changed = new.sets.iter().filter(has_changed);
+    changed.map(|(name, _)| format!("[set.{name}]")).collect()
 }

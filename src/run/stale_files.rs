@@ -55,18 +55,6 @@ pub fn find(problem: &Problem, files: &Files) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Remove files. Called on rank 0.
-///
-/// # Errors
-/// If a file cannot be removed.
-pub fn remove(paths: &[PathBuf]) -> Result<()> {
-    for path in paths {
-        let failed = |error| Error::run(format!("cannot remove {}: {error}", path.display()));
-        fs::remove_file(path).map_err(failed)?;
-    }
-    Ok(())
-}
-
 /// Read the first line of a history file.
 fn heading(path: &Path) -> std::io::Result<String> {
     let mut line = String::new();

@@ -410,6 +410,18 @@ fn far_more_threads_than_cores() {
         "{}",
         text(&output)
     );
+    let mut command = fissure(1);
+    command.arg("run").arg(&deck).arg("--output");
+    command
+        .arg(folder.join("out"))
+        .env("SLURM_CPUS_PER_TASK", "65535");
+    let output = finish(&mut command);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(
+        text(&output).contains("SLURM_CPUS_PER_TASK=65535 in the environment: this host has"),
+        "{}",
+        text(&output)
+    );
     assert!(!folder.join("out/result.vtkhdf").exists());
 }
 

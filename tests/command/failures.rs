@@ -143,6 +143,59 @@ fn a_full_disc() {
 }
 
 #[test]
+fn overwriting_on_a_full_disc_leaves_no_part_of_the_earlier_run() {
+    let folder = Folder::new("disc-overwrite");
+    let Some(disc) = SmallDisc::mount(&folder, "2m") else {
+        return;
+    };
+    let deck = folder.write("deck.toml", &bar("end = 100"));
+    let further = bar("end = 3")
+        .replace("output = {", "output = { part.every_steps = 1,")
+        .replace(
+            "material = 'rubber',",
+            "material = 'rubber', damage = 'brittle',",
+        )
+        + "damage.brittle.critical_stretch.critical_stretch = 1
+        history.crack.main.from = [0, 6]
+        ";
+    let small = folder.write("small.toml", &further);
+    let entries = |out: &Path| {
+        let names = std::fs::read_dir(out).unwrap();
+        let mut names: Vec<String> = names
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    };
+    for ranks in [1, 2] {
+        let out = disc.join(format!("out{ranks}"));
+        let run = |deck: &Path| {
+            let mut command = fissure(ranks);
+            command.arg("run").arg(deck).arg("--overwrite");
+            command.arg("--output").arg(&out);
+            command
+        };
+        succeed(&mut run(&small));
+        std::fs::write(out.join("result.vtkhdf.part"), "killed").unwrap();
+        let there = entries(&out);
+        for name in [
+            "crack_main.csv",
+            "history.csv",
+            "result.xdmf",
+            "result_part.vtkhdf",
+        ] {
+            assert!(there.iter().any(|entry| entry == name), "{there:?}");
+        }
+        failing(&mut run(&deck), "No space left", 1);
+        assert_eq!(entries(&out), [".lock"]);
+        std::fs::write(out.join("result.vtkhdf.part"), "killed").unwrap();
+        succeed(&mut run(&small));
+        assert!(!out.join("result.vtkhdf.part").exists());
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+#[test]
 fn a_full_disc_while_points_are_born() {
     let folder = Folder::new("disc-growing");
     let Some(disc) = SmallDisc::mount(&folder, "2m") else {

@@ -102,6 +102,36 @@ fn job_scripts_are_valid_for_bash() {
 }
 
 #[test]
+fn job_scripts_name_wrong_programs_and_tables() {
+    let folder = Folder::new("slurm-mistakes");
+    let header = folder.write("header.txt", "pull  dx\n");
+    let none = folder.join("none.txt");
+    for (name, launch, table, message) in [
+        ("chain", "auto", &none, "error: false --version fails"),
+        ("array", "auto", &none, "error: false --version fails"),
+        ("array", "hydra", &none, "none.txt cannot be read"),
+        (
+            "array",
+            "hydra",
+            &header,
+            "header.txt must have a line of names and at least one row",
+        ),
+    ] {
+        let script = succeed(fissure(1).args(["slurm", name]));
+        let path = folder.write(name, &script);
+        let mut command = Command::new("bash");
+        command.arg(&path).arg("deck.toml").arg(table).arg("out");
+        command.envs([("FISSURE", "false"), ("LAUNCH", launch)]);
+        command.envs([("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_NTASKS", "1")]);
+        let output = command.output().unwrap();
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{name}: {printed}");
+        assert_eq!(printed.matches("error: ").count(), 1, "{name}: {printed}");
+        assert!(printed.contains(message), "{name}: {printed}");
+    }
+}
+
+#[test]
 fn check_prints_figures_as_json() {
     let folder = Folder::new("check-json");
     let deck = folder.join("plate.toml");

@@ -599,6 +599,16 @@ fn curves_of_histories() {
         &["kinetic_energy_strain_energy_momentum_x.png: 4 curves"],
     );
 
+    // A killed run or a full disk may leave an incomplete last row, which is ignored.
+    let pictures = ["", "2", "2,3.1"].map(|last| {
+        let cut = folder.write("cut.csv", &format!("time [s],a\n0,1\n1,2\n{last}"));
+        let picture = folder.join("cut.svg");
+        let options = ["--y", "a", "-o", picture.to_str().unwrap()];
+        expect(&command("plot", &[&cut], &options), 0, &["1 curve"]);
+        std::fs::read_to_string(&picture).unwrap()
+    });
+    assert!(pictures.iter().all(|picture| *picture == pictures[0]));
+    let header = folder.write("header.csv", "time [s],a");
     let empty = folder.write("empty.csv", "time [s],a\n0,NaN\n1,inf\n");
     let broken = folder.write("broken.csv", "time [s],a\n0,1\n1\n");
     for (result, options, words) in [
@@ -624,6 +634,11 @@ fn curves_of_histories() {
             "broken.csv:3: has 1 values for 2 columns",
         ),
         (&folder.join("none.csv"), &["--y", "a"], "cannot read"),
+        (
+            &header,
+            &["--y", "a"],
+            "header.csv: must have a line with the names of the columns",
+        ),
         (&empty, &["--y", "a"], "--y a: no finite values to draw"),
         (
             &history,

@@ -374,11 +374,17 @@ fn failed_runs_and_unknown_columns_are_reported() {
         ],
     );
     let table = sweep.table("p/sweep.csv");
-    assert_eq!(column(&table, "state"), ["complete", "missing"]);
+    assert_eq!(column(&table, "state"), ["complete", "failed"]);
 }
 
 #[test]
 fn a_signal_stops_the_runs_and_the_same_command_continues() {
+    for signal in [libc::SIGTERM, libc::SIGUSR1] {
+        stops_and_continues(signal);
+    }
+}
+
+fn stops_and_continues(signal: i32) {
     let sweep = Sweep::new("sweep-signal");
     let options = [
         "--set",
@@ -402,9 +408,15 @@ fn a_signal_stops_the_runs_and_the_same_command_continues() {
         std::thread::sleep(Duration::from_millis(20));
     }
     // SAFETY: the child has not been waited for, so its process id is still valid.
-    unsafe {
-        libc::kill(child.id() as i32, libc::SIGTERM);
+    let send = |signal: i32| unsafe {
+        libc::kill(child.id() as i32, signal);
+    };
+    // The run continues after a checkpoint on request.
+    send(libc::SIGUSR2);
+    while !sweep.folder.join("o/dx=1e-3/checkpoint_0.h5").exists() {
+        std::thread::sleep(Duration::from_millis(20));
     }
+    send(signal);
     let output = wait(child);
     expect(
         &output,
@@ -414,6 +426,8 @@ fn a_signal_stops_the_runs_and_the_same_command_continues() {
     assert!(sweep.folder.join("o/dx=1e-3/checkpoint_0.h5").exists());
     assert!(!sweep.folder.join("o/dx=1e-3/complete").exists());
     assert!(!sweep.folder.join("o/dx=0.5e-3").exists());
+    let table = sweep.table("o/sweep.csv");
+    assert_eq!(column(&table, "state"), ["incomplete", "missing"]);
     let printed = succeed(&mut sweep.command(&[&options[..], &["--rows", "1"]].concat()));
     assert!(printed.contains("dx=1e-3: complete after"), "{printed}");
     let log = std::fs::read_to_string(sweep.folder.join("o/dx=1e-3/log.txt")).unwrap();

@@ -349,10 +349,20 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
     assert!(printed.contains("complete already"), "{printed}");
     assert_eq!(difference(&before, &datasets(&result(&out))), None);
 
-    // If the new end is before the checkpoint, the run makes no further step.
+    // The end must be after the step before the checkpoint. The last step of a run may pass the end.
     let earlier = ["--restart", "--set", "end=5e-6"];
-    let printed = succeed(&mut run(1, &deck, &out, &earlier));
-    assert!(!printed.contains(" to go, after "), "{printed}");
+    let refused = finish(&mut run(2, &deck, &out, &earlier));
+    let printed = text(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{printed}");
+    let told = [
+        "[time] end: must be after the checkpoint ",
+        "which is at 1e-5 s, is 5e-6 s",
+    ];
+    assert!(told.iter().all(|told| printed.contains(told)), "{printed}");
+    assert_eq!(difference(&before, &datasets(&result(&out))), None);
+    let within = ["--restart", "--set", "end=9.995e-6"];
+    let printed = succeed(&mut run(1, &deck, &out, &within));
+    assert!(printed.contains("complete already"), "{printed}");
 
     succeed(&mut run(
         3,
@@ -398,6 +408,42 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
         std::fs::write(&deck, other).unwrap();
         succeed(&mut run(2, &deck, &out, &["--restart"]));
         assert!(!steps(&format!("{name}.vtkhdf")).is_empty());
+    }
+}
+
+#[test]
+fn a_set_whose_file_has_changed_is_rejected() {
+    let folder = Folder::new("changed-set");
+    let ids = |ids: &str| folder.write("ids.txt", ids);
+    let text = plate("1e-5", "set.some.file = 'ids.txt'");
+    for (name, text) in [
+        (
+            "load",
+            text.replace("set = 'top', traction", "set = 'some', traction"),
+        ),
+        (
+            "column",
+            text.replace("set = 'top', of", "set = 'some', of"),
+        ),
+    ] {
+        ids("3\n90\n4\n700\n");
+        let deck = folder.write("deck.toml", &text);
+        let out = folder.join(name);
+        succeed(&mut run(2, &deck, &out, &[]));
+        let before = entries(&out);
+        ids("3\n90\n4\n701\n");
+        let further = ["--restart", "--set", "end=1.2e-5"];
+        let refused = finish(&mut run(2, &deck, &out, &further));
+        let printed = self::text(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{printed}");
+        assert!(
+            printed.contains("other points of [set.some]; has a file"),
+            "{printed}"
+        );
+        assert_eq!(entries(&out), before);
+        // Another order of the ids is the same set.
+        ids("700\n4\n3\n90\n");
+        succeed(&mut run(3, &deck, &out, &further));
     }
 }
 
@@ -613,7 +659,19 @@ fn a_damaged_checkpoint_is_recognised_and_the_other_one_used() {
     let output = finish(&mut run(2, &deck, &out, &["--restart"]));
     let printed = text(&output);
     assert_eq!(output.status.code(), Some(2), "{printed}");
-    assert!(printed.contains("no usable checkpoint"), "{printed}");
+    let told = "error: both checkpoints are damaged, ";
+    assert!(printed.contains(told), "{printed}");
+    assert!(
+        printed.contains("; --overwrite starts the run again"),
+        "{printed}"
+    );
+    for name in ["checkpoint_0.h5", "checkpoint_1.h5"] {
+        std::fs::remove_file(out.join(name)).unwrap();
+    }
+    let output = finish(&mut run(2, &deck, &out, &["--restart"]));
+    let printed = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{printed}");
+    assert!(printed.contains("there is no checkpoint in "), "{printed}");
 }
 
 #[test]
@@ -646,6 +704,8 @@ fn a_full_disc_leaves_the_checkpoint_before() {
         assert!(printed.contains("No space left"), "{printed}");
     };
     is_full(wait(child));
+    let rows = std::fs::read_to_string(out.join("history.csv")).unwrap();
+    assert!(rows.ends_with('\n'), "{rows}");
     // There is no space for the copy that a later end needs, so the result must remain unchanged.
     let before = entries(&out);
     is_full(finish(&mut run(
@@ -756,7 +816,7 @@ fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
         assert!(output.status.success(), "{name}: {printed}");
         assert_eq!(printed.matches(told).count(), 1, "{name}: {printed}");
         // Every file named in the message exists.
-        let names = printed.split("it is kept as ").nth(1).unwrap();
+        let names = printed.split("earlier files are kept as ").nth(1).unwrap();
         for path in names.lines().next().unwrap().split(" and ") {
             assert!(Path::new(path).exists(), "{name}: {path}: {printed}");
         }

@@ -7,6 +7,8 @@ use fissure::message::suggestion;
 use fissure::output::StoredField;
 use fissure::picture::{Axis, Camera, ColourMap, View};
 
+use crate::cli::without_output;
+
 /// A requested time may be before the first output or after the last output, by at most this fraction of the
 /// first or last interval between outputs.
 const TIME_REACH: f64 = 0.5;
@@ -35,14 +37,14 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
 }
 
 /// Return the indices of the outputs to draw. `text` is `all`, or a comma-separated list; each entry of the
-/// list is a time (s) or `last`.
+/// list is a time (s) or `last`. `path` is the path of the result, for the error message.
 ///
 /// # Errors
 /// If there is no output, if the text is wrong, or if a time is more than half an output interval before the
 /// first output or after the last output.
-pub fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
+pub fn choose_times(text: &str, path: &Path, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
-        return Err(Error::input("the result holds no output yet"));
+        return Err(without_output(path));
     };
     if text == "all" {
         return Ok((0..=last).collect());
@@ -213,10 +215,11 @@ mod tests {
     #[test]
     fn times_outside_of_the_result_are_rejected() {
         let times = [0.0, 1e-5, 2e-5];
-        let chosen = |text| choose_times(text, &times).unwrap();
+        let choose = |text| choose_times(text, Path::new("a.vtkhdf"), &times);
+        let chosen = |text| choose(text).unwrap();
         assert_eq!(chosen("0, last"), [0, times.len() - 1]);
         for wrong in ["0,", "all,last", ","] {
-            assert!(choose_times(wrong, &times).is_err(), "{wrong}");
+            assert!(choose(wrong).is_err(), "{wrong}");
         }
         assert_eq!(chosen("last"), [2]);
         assert_eq!(chosen("all"), [0, 1, 2]);
@@ -224,10 +227,12 @@ mod tests {
         assert_eq!(chosen("2.4e-5"), [2]);
         assert_eq!(chosen("-4e-6"), [0]);
         for (text, nearest) in [("25", "--time 2e-5"), ("-1e-5", "--time 0e0")] {
-            let message = choose_times(text, &times).unwrap_err().message;
+            let message = choose(text).unwrap_err().message;
             assert!(message.ends_with(nearest), "{message}");
         }
-        assert!(choose_times("1", &[0.5]).is_err());
-        assert!(choose_times("last", &[]).is_err());
+        let path = Path::new("a.vtkhdf");
+        assert!(choose_times("1", path, &[0.5]).is_err());
+        let message = choose_times("last", path, &[]).unwrap_err().message;
+        assert_eq!(message, "a.vtkhdf: the result holds no output yet");
     }
 }

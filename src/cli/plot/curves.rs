@@ -179,15 +179,22 @@ pub fn is_csv(path: &Path) -> bool {
     ending.is_some_and(|ending| ending.eq_ignore_ascii_case("csv"))
 }
 
-/// Read a CSV file whose first row has names with units, such as `time [s]`.
+/// Read a CSV file whose first row has names with units, such as `time [s]`. A last line without a newline is
+/// ignored, because a killed run or a full disk may leave an incomplete row.
 ///
 /// # Errors
-/// If the file cannot be read, or a row does not have one number per column.
+/// If the file cannot be read or has no complete line, or a row does not have one number per column.
 pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| Error::input(format!("cannot read {}: {error}", path.display())))?;
-    let mut rows = text.lines().enumerate();
-    let header = rows.next().map_or("", |(_, row)| row);
+    let complete = text.rfind('\n').map_or("", |end| &text[..end]);
+    let mut rows = complete.lines().enumerate();
+    let (_, header) = rows.next().ok_or_else(|| {
+        let path = path.display();
+        Error::input(format!(
+            "{path}: must have a line with the names of the columns"
+        ))
+    })?;
     let mut columns: Vec<StoredColumn> = header
         .split(',')
         .map(|cell| {

@@ -34,8 +34,8 @@ pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity
         .iter()
         .map(ResultReader::times)
         .collect::<Result<_>>()?;
-    let chosen: Vec<Vec<usize>> = (times.iter())
-        .map(|times| choose_times(&arguments.time, times))
+    let chosen: Vec<Vec<usize>> = (times.iter().zip(&files))
+        .map(|(times, file)| choose_times(&arguments.time, file, times))
         .collect::<Result<_>>()?;
     let count = chosen.iter().map(Vec::len).sum::<usize>() as u32;
     let width = arguments.picture.width / count;

@@ -112,7 +112,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
     let file = result_file(result);
     let result = ResultReader::open(&file)?;
     let times = result.times()?;
-    let chosen = choose_times(&arguments.time, &times)?;
+    let chosen = choose_times(&arguments.time, &file, &times)?;
     let last = chosen.last().copied().unwrap_or(0);
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;
     let path = match &arguments.output {

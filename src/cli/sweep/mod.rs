@@ -207,11 +207,18 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
             }
             State::Failed(how) => {
                 errln!("{}: {how}: {}", run.label, run.last_words());
-                failed.push(run);
+                failed.push(number);
             }
         }
         Ok(())
     })?;
+    for (number, run) in runs.iter().enumerate() {
+        if failed.contains(&number) {
+            table.set_state(number, "failed");
+        } else if run.is_begun() {
+            table.set_state(number, "incomplete");
+        }
+    }
     table.write(&folder, prints)?;
     if stopped {
         let message =
@@ -224,7 +231,7 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
             "{} of {} runs failed; what they printed is in log.txt of their folders, such as {}",
             failed.len(),
             due.len(),
-            first.folder.join(runs::LOG).display()
+            runs[*first].folder.join(runs::LOG).display()
         ))),
     }
 }

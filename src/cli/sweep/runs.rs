@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use fissure::error::{Error, Result};
 use fissure::problem::{PointSource, Problem, StepRule};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::Signals;
 
 use super::SweepArguments;
@@ -96,11 +96,14 @@ impl Run {
         }
     }
 
+    /// Test whether the folder holds this run, complete or not.
+    pub fn is_begun(&self) -> bool {
+        std::fs::read_to_string(self.folder.join(DECK)).is_ok_and(|text| text == self.deck)
+    }
+
     /// Test whether the folder holds this run and the run is complete.
     pub fn is_complete(&self) -> bool {
-        let same =
-            std::fs::read_to_string(self.folder.join(DECK)).is_ok_and(|text| text == self.deck);
-        same && self.folder.join(COMPLETE).exists()
+        self.is_begun() && self.folder.join(COMPLETE).exists()
     }
 
     /// Return the first line of the last error message of the run, or the last printed line if there is no
@@ -154,7 +157,8 @@ impl<'a> Program<'a> {
     /// index, the state and the run time (s) of each run that is complete or failed. Return true if a signal
     /// or a time limit stopped a run.
     ///
-    /// A first SIGINT or SIGTERM makes all runs write checkpoints and stop; a second signal kills the runs.
+    /// A first SIGINT, SIGTERM or SIGUSR1 makes all runs write checkpoints and stop; a second one kills the
+    /// runs. SIGUSR2 makes all runs write checkpoints and continue.
     ///
     /// # Errors
     /// If signals cannot be received, a run cannot be started, a marker file cannot be created, or `ended`
@@ -165,7 +169,7 @@ impl<'a> Program<'a> {
         due: &[usize],
         mut ended: impl FnMut(usize, State, f64) -> Result<()>,
     ) -> Result<bool> {
-        let mut signals = Signals::new([SIGINT, SIGTERM])
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGUSR1, SIGUSR2])
             .map_err(|error| Error::run(format!("cannot listen to signals: {error}")))?;
         let mut waiting = due.iter().copied();
         let mut processes: Vec<Process> = Vec::new();
@@ -191,11 +195,12 @@ impl<'a> Program<'a> {
                 break;
             }
             std::thread::sleep(INTERVAL);
-            for _ in signals.pending() {
-                kill(
-                    &processes,
-                    if asked { libc::SIGKILL } else { libc::SIGUSR1 },
-                );
+            for signal in signals.pending() {
+                if signal == SIGUSR2 {
+                    kill(&processes, SIGUSR2);
+                    continue;
+                }
+                kill(&processes, if asked { libc::SIGKILL } else { SIGUSR1 });
                 (stopped, asked) = (true, true);
             }
             let mut going_on = Vec::new();
@@ -228,7 +233,7 @@ impl<'a> Program<'a> {
             }
             processes = going_on;
             if outcome.is_err() && !asked {
-                kill(&processes, libc::SIGUSR1);
+                kill(&processes, SIGUSR1);
                 asked = true;
             }
         }
@@ -241,9 +246,8 @@ impl<'a> Program<'a> {
         let folder = &run.folder;
         std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
         let known = folder.join(DECK);
-        let same = std::fs::read_to_string(&known).is_ok_and(|text| text == run.deck);
         let has_checkpoint = CHECKPOINTS.iter().any(|name| folder.join(name).exists());
-        let begin = if same && has_checkpoint && !self.arguments.overwrite {
+        let begin = if run.is_begun() && has_checkpoint && !self.arguments.overwrite {
             "--restart"
         } else {
             "--overwrite"

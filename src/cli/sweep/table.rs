@@ -23,6 +23,8 @@ pub struct Table<'a> {
     has_rates: bool,
     /// Values by run and column; `None` for incomplete runs and for values that are not finite.
     values: Vec<Option<Vec<Option<f64>>>>,
+    /// States of the incomplete runs.
+    states: Vec<&'static str>,
     units: Vec<String>,
 }
 
@@ -51,6 +53,7 @@ impl<'a> Table<'a> {
             abscissa,
             has_rates,
             values: vec![None; design.rows.len()],
+            states: vec!["missing"; design.rows.len()],
             units: vec![String::new(); columns.len()],
         }
     }
@@ -65,6 +68,11 @@ impl<'a> Table<'a> {
         self.values[number] = Some(values);
         self.units = units;
         Ok(())
+    }
+
+    /// Set the state of an incomplete run, such as `failed`. The default is `missing`.
+    pub fn set_state(&mut self, number: usize, state: &'static str) {
+        self.states[number] = state;
     }
 
     /// Return the number of complete runs.
@@ -119,7 +127,7 @@ impl<'a> Table<'a> {
         }
         let state = |row: usize| match self.values[row] {
             Some(_) => alike("complete".to_owned()),
-            None => alike("missing".to_owned()),
+            None => alike(self.states[row].to_owned()),
         };
         cells.push(Cells {
             heading: alike("state".to_owned()),
