@@ -82,8 +82,8 @@ pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
 }
 
 impl Component {
-    /// Compute this component or invariant from the values of a point. A [`Self::Principal`] is NaN if a
-    /// value is not finite.
+    /// Compute this component or invariant from the values of a point. A [`Self::Principal`] is NaN if any of
+    /// these values is not finite.
     pub fn of(self, values: &[f64]) -> f64 {
         match self {
             Self::Entry(entry) => values[entry],

@@ -7,7 +7,7 @@ pub enum Dimension {
     Line {
         /// Cross-section, m².
         cross_section: f64,
-        /// Condition perpendicular to the bar.
+        /// Condition perpendicular to the bar: no stress or no strain.
         constraint: Constraint,
     },
     /// A thin plate.
@@ -69,7 +69,7 @@ impl Dimension {
         }
     }
 
-    /// Test whether bond-based laws allow any Poisson's ratio. This is true only for a bar in uniaxial
+    /// Test whether bond-based laws allow all Poisson's ratios. This is true only for a bar in uniaxial
     /// stress: its stiffness E does not depend on Poisson's ratio.
     pub fn allows_any_poisson_ratio(self) -> bool {
         matches!(
@@ -93,7 +93,8 @@ impl Dimension {
         )
     }
 
-    /// Return the name of the dimension and of the condition perpendicular to the plane or bar, for messages.
+    /// Return the name of the dimension, for messages. In 1-D and 2-D, the name contains the condition
+    /// perpendicular to the bar or plane, as in `plane stress`.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};
         match self {

@@ -27,7 +27,8 @@ pub struct Error {
     pub kind: ErrorKind,
     /// The message, without a leading `error:`; may span several lines.
     pub message: String,
-    /// Span of the wrong text in the deck; `None` if the message contains its location.
+    /// Span of the wrong text in the deck. `None` if the message itself says where the error is, or if no
+    /// text of the deck is wrong.
     pub span: Option<Range<usize>>,
 }
 
@@ -36,7 +37,8 @@ pub struct Error {
 pub struct Warning {
     /// The message, without a leading `warning:`; one line.
     pub message: String,
-    /// Span of the text in the deck that the warning refers to; `None` if the message contains its location.
+    /// Span of the text in the deck that the warning refers to; `None` if the message itself states the
+    /// location.
     pub span: Option<Range<usize>>,
 }
 

@@ -53,9 +53,9 @@ fn address_space() -> Option<u64> {
     Some(limit.rlim_cur.saturating_sub(taken))
 }
 
-/// Return the memory and swap that the control groups of this process leave, bytes. This is the smallest
-/// amount that is left in the group of the process or in a group above it. `None` if none of these groups has
-/// a limit, or on systems without control groups of version 2.
+/// Return the memory and swap that this process can still use within the limits of its control groups,
+/// bytes. This is the smallest amount that is left in the group of the process or in a group above it. `None`
+/// if none of these groups has a limit, or on systems without control groups of version 2.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
@@ -109,7 +109,8 @@ fn entry(text: &str, name: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Slurm sets the limit on the group of a job or step. This group is above the group of the process.
+    /// Slurm sets the limit on the control group of a job or step. The control group of the process lies
+    /// below this group.
     #[test]
     fn limits_of_parent_groups_count() {
         let root = std::env::temp_dir().join(format!("control_groups_{}", std::process::id()));

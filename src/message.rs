@@ -12,8 +12,8 @@ pub fn format_number(value: f64) -> String {
     }
 }
 
-/// Return the entry of `known` that resembles `name` most; `None` if no entry is similar, or if the names are
-/// too long.
+/// Return the entry of `known` that resembles `name` most; `None` if no entry is similar. Names longer than
+/// `LONGEST_NAME` are not compared.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()

@@ -8,8 +8,8 @@ pub enum Scattered {
     Position(usize),
     /// The strength of a point.
     Strength,
-    /// The sign of a point in the direction with this index. Newton's method estimates the trace of a matrix
-    /// from these signs.
+    /// The random sign of a point for the displacement component with this index. Newton's method estimates
+    /// the trace of a matrix from these signs.
     Probe(usize),
 }
 

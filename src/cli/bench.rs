@@ -26,7 +26,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// Return the material table of the deck.
+    /// Return the material table of this law in the deck of the benchmark.
     fn in_deck(self) -> &'static str {
         match self {
             Self::Pmb => "pmb = { density = 2440, youngs_modulus = 72e9 }",
@@ -71,7 +71,7 @@ impl Law {
 /// Storage of the bonds.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Family {
-    /// Automatic choice: one bit per bond, because the block is a lattice.
+    /// Automatic choice: one bit per bond, because the points of the benchmark form a lattice.
     Auto,
     /// One bit per bond.
     Lattice,
@@ -80,7 +80,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// Return the name of this storage in a deck.
+    /// Return the value of the key `[grid] family` for this storage.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -113,8 +113,8 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 }
 
 /// Minimum memory traffic of the phase `motion` in 3-D, bytes per point and step. Displacement, velocity and
-/// force density are read and written. The number of the block is read. Displacement is written once more for
-/// the bond loops.
+/// force density are read and written. The index of the point's block is read. Displacement is written once
+/// more for the bond loops.
 const MOTION_BYTES: u64 = 170;
 /// Estimate of the minimum memory traffic of a pass over the bonds in 3-D, bytes per point. The stored bonds
 /// are not included. Reference position, displacement and volume are read, and the sums of the pass are read

@@ -63,8 +63,8 @@ pub struct Figures {
     pub set_up: f64,
     /// Phases of the time loop; the last entry is the total.
     pub phases: Vec<Phase>,
-    /// Names and sizes (bytes, sum over the ranks) of the memory of the processes at several times, and of
-    /// the stored bonds. The last entry is the peak.
+    /// Memory: name and size (bytes, sum over the ranks) of each entry. One entry is the memory of the stored
+    /// bonds. The other entries are the memory of the processes at several times. The last entry is the peak.
     pub memory: Vec<(&'static str, f64)>,
     /// Bytes that all ranks send per step in halo exchanges.
     pub halo_bytes: f64,
@@ -90,8 +90,8 @@ impl Figures {
         self.phases.last().map_or(f64::NAN, |phase| phase.slowest)
     }
 
-    /// Return the bond updates per second. One update is the work of a step on one directed bond, in all
-    /// passes.
+    /// Return the bond updates per second. One update is the work of all passes of a step on
+    /// one directed bond.
     fn updates(&self) -> f64 {
         self.bonds * self.steps / self.seconds()
     }

@@ -1,4 +1,4 @@
-//! `fissure check`: validation and figures of a deck.
+//! `fissure check`: validation of decks, and a report on each deck.
 
 use std::path::Path;
 
@@ -67,8 +67,8 @@ pub struct Request<'a> {
     pub path: &'a Path,
     pub deck: &'a Deck,
     pub ranks: u32,
-    /// Measure the times of a force evaluation, a history row and the outputs. In a report as text, also
-    /// compute the separation energy ratios.
+    /// Measure the times of a force evaluation, a history row and the outputs. If the report is text, not
+    /// JSON, also compute the separation energy ratios.
     measure: bool,
     /// Print the report as one line of JSON.
     json: bool,

@@ -462,8 +462,9 @@ fn note_on_steps(problem: &Problem, time: &Time) -> &'static str {
     }
 }
 
-/// Append the estimated run times on `ranks` ranks. For explicit stages, append the times of all steps,
-/// history rows and outputs. For stages with load steps, append the time of one force evaluation.
+/// Append the estimated run times on `ranks` ranks. For explicit stages, append three totals: for the steps,
+/// for the history rows and for the outputs. For stages with load steps, append the time of one force
+/// evaluation.
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

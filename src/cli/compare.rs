@@ -170,8 +170,11 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// Format the comparison: the paths of the results, the numbers of compared outputs, points and rows, lists
-/// of the items that only one result has, a table of the fields and a table of the columns.
+/// Format the comparison:
+/// - the paths of the results,
+/// - the numbers of compared outputs, points and rows,
+/// - lists of the items that only one result has,
+/// - a table of the fields and a table of the columns.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,

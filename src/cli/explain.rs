@@ -1,4 +1,4 @@
-//! `fissure explain`: a deck with all defaults.
+//! `fissure explain`: a deck with every default written out.
 
 use fissure::deck;
 use fissure::error::Result;

@@ -55,7 +55,7 @@ enum From {
 /// # Errors
 /// - If the deck cannot be translated.
 /// - If the new deck exists and may not be replaced.
-/// - If the path of the new deck is that of the source deck, or of a file that the new deck reads.
+/// - If the new deck would replace the source deck or a file that the new deck reads.
 /// - If the new deck cannot be written.
 pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let target = arguments.output.clone();

@@ -42,7 +42,7 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
         .unwrap_or_else(|error| finish(Err(error), speaks))
 }
 
-/// Delay before the processes other than rank 0 exit, so that rank 0 can print an error.
+/// Time by which all processes except rank 0 delay their exit, so that rank 0 can print an error.
 const EXIT_DELAY: Duration = Duration::from_secs(1);
 
 /// Environment variables with the number of launched processes. If launchers are nested, the variable of the
@@ -62,7 +62,8 @@ fn started() -> Option<(&'static str, usize)> {
         .find_map(|name| Some((*name, number(&[name])?)))
 }
 
-/// Check that launcher and MPI library match. Without a match, each process would run alone, as rank 0.
+/// Check that the launcher works with the MPI library of this program. Otherwise, each process would run
+/// alone, as rank 0.
 ///
 /// # Errors
 /// If MPI has one rank but the launcher started several processes.
@@ -137,7 +138,7 @@ fn is_bound() -> bool {
     cores() < cores_of_host()
 }
 
-/// Return the number of cores of this host, available to this process or not.
+/// Return the number of cores of this host, including the cores that this process may not use.
 fn cores_of_host() -> usize {
     let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
     cores_in(&list).max(cores())

@@ -1,4 +1,5 @@
-//! Limits of this machine: memory bandwidth and floating-point rate of all threads of all ranks at once.
+//! Limits of this machine: memory bandwidth and floating-point rate, measured on all threads of all ranks at
+//! once.
 //!
 //! Each figure is the best of several repetitions, because other processes can only slow a repetition down.
 
@@ -9,7 +10,8 @@ use fissure::comm::Communicator;
 
 use super::launch;
 
-/// Rates of the threads of this rank, measured on all ranks at once.
+/// Memory bandwidth and floating-point rate of all threads of this rank together. All ranks measure at the
+/// same time.
 #[derive(Clone, Copy)]
 pub struct Limits {
     /// Memory bandwidth of the triad a = b + s c with arrays a, b and c and a number s, bytes/s. As in STREAM
@@ -72,8 +74,9 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
     24.0 * length as f64 * rayon::current_num_threads() as f64 / seconds
 }
 
-/// Return the size of the last-level cache, divided by the number of threads that share the cache, bytes.
-/// `threads` is the number of threads of this rank. If the size of the cache is unknown, assume 64 MiB.
+/// Return the size of the last-level cache per running thread, bytes: the size of the cache, divided by the
+/// number of running threads that share the cache. `threads` is the number of threads of this rank. If the
+/// size of the cache is unknown, assume 64 MiB.
 fn share_of_cache(threads: usize) -> usize {
     let read = |name: &str| {
         let path = format!("/sys/devices/system/cpu/cpu0/cache/index3/{name}");
@@ -142,7 +145,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        /// Return the function for one instruction set.
+        /// Return a function with [`LENGTH`] × [`SUMS`] multiply-adds for one instruction set.
         macro_rules! version {
             ($feature:literal, $splat:ident, $multiply_add:ident) => {{
                 #[target_feature(enable = $feature)]

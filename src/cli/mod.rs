@@ -279,8 +279,8 @@ struct BenchArguments {
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Do not measure the memory bandwidth and the arithmetic rate. This measurement needs some 100 MiB and
-    /// several seconds.
+    /// Do not measure the memory bandwidth and the arithmetic rate. This measurement needs several seconds,
+    /// and several hundred MiB of memory (12 times the size of the last-level cache).
     #[arg(long)]
     no_limits: bool,
 

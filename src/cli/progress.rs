@@ -41,8 +41,8 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// Create a display for the work after step `first` up to step `last`. If `shown` is false, there is no
-    /// display. `noun` is the word for a step in the display.
+    /// Create a display for the steps `first` + 1 to `last`. If `shown` is false, there is no display.
+    /// `noun` is the word for a step in the display.
     pub fn new(shown: bool, noun: &'static str, first: u64, last: u64) -> Self {
         if !shown {
             return Self::Silent;
@@ -121,8 +121,8 @@ impl Progress {
     }
 }
 
-/// Return the time of the next line after a line at the time `elapsed`. Both times are measured from the
-/// start, s.
+/// Return the time at which the next progress line is printed, after a line at the time `elapsed`. Both times
+/// are measured from the start, s.
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE

@@ -74,7 +74,7 @@ fn phases(seconds: &Phases) -> [(&'static str, f64); 10] {
     ]
 }
 
-/// Return the directed bond updates per second of the time loop.
+/// Return the rate at which the time loop updates directed bonds, 1/s.
 fn bond_updates(summary: &Summary) -> f64 {
     let seconds = &summary.seconds;
     let time_loop = seconds.bonds + seconds.halo + seconds.contact + seconds.motion;

@@ -1,5 +1,5 @@
-//! Redistribution of point values from the owners of the points to an order by global id, and back. In this
-//! order, each rank has one range of consecutive ids.
+//! Redistribution of point values over the ranks: from the distribution by owner to the distribution by
+//! global id, and back. In the distribution by id, each rank has one range of consecutive ids.
 //!
 //! Files store points by id, so files do not depend on the number of ranks. A point of a refined level has
 //! the id m + k n. Here m is the id of a level-0 point, n is the number of level-0 points, and k ≥ 1. In
@@ -151,8 +151,8 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
 /// Rows that stay on this rank are copied. Collective.
 ///
 /// For each rank q, `from_rows` lists the rows of `values` to send to q. `to_rows` lists the rows of the
-/// result to receive from q, in the order in which q sends them. `from` and `to` map a row to its range of
-/// values.
+/// result to receive from q, in the order in which q sends them. `from` returns the range of a row in
+/// `values`, and `to` the range of a row in the result.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),

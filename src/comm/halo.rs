@@ -1,7 +1,7 @@
 //! The halo plan: the owned points sent to each rank, and the ghosts received from each rank.
 //!
-//! Ghosts follow the owned points. The ghosts are grouped by owner and, in each group, sorted by id.
-//! Therefore the ghosts of one owner are one contiguous range.
+//! In the order of the local indices, the ghosts come after the owned points. The ghosts are grouped by owner
+//! and, in each group, sorted by id. Therefore the ghosts of one owner are one contiguous range.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};

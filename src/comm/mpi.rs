@@ -129,8 +129,8 @@ impl World {
     }
 }
 
-/// Non-blocking messages in flight. Drop waits for all messages, also during unwinding, so MPI never accesses
-/// a freed buffer.
+/// Non-blocking messages in flight. Dropping the value waits for all messages, also during unwinding, so MPI
+/// never accesses a freed buffer.
 struct InFlight<'a>(RefMut<'a, Vec<MPI_Request>>);
 
 impl InFlight<'_> {
@@ -161,7 +161,8 @@ impl InFlight<'_> {
     /// Start a receive.
     ///
     /// # Safety
-    /// The bytes must stay valid and unaccessed until `self` is dropped, and `self` must be dropped.
+    /// The bytes must stay valid, and must not be accessed, until `self` is dropped. `self` must be dropped,
+    /// because the drop waits for the message.
     unsafe fn receive(&mut self, bytes: &mut [u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks_mut(LARGEST_MESSAGE) {
             // SAFETY: the caller keeps the chunk valid and unaccessed, and its length fits a C integer. MPI

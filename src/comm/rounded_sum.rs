@@ -1,4 +1,4 @@
-//! Sums of terms that are rounded to multiples of one unit.
+//! Sums of terms, each rounded to a multiple of one unit.
 //!
 //! A sum of integers does not depend on the order of the terms. It is therefore bitwise the same for any
 //! number of ranks and threads. A rounded sum needs 8 bytes, and an [`ExactSum`](super::ExactSum) needs 552

@@ -3,7 +3,9 @@
 //!
 //! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. For force states that are linear
 //! in η, the work is w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the
-//! plane, with the thickness h, G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
+//! plane, with the thickness h, G0 = 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c. In this
+//! integral, z is the distance of point i from the crack, ξ is the length of the bond, and φ is the angle
+//! between the bond and the normal of the crack.
 
 use std::f64::consts::PI;
 
@@ -15,7 +17,7 @@ use crate::dimension::Dimension;
 pub enum Calibration {
     /// Breaking all bonds across a unit area dissipates the fracture energy.
     Energy,
-    /// Opening a crack dissipates the fracture energy: w_c is the w_c of [`Self::Energy`], divided by the
+    /// Opening a crack dissipates the fracture energy. w_c is that of [`Self::Energy`], divided by the
     /// separation energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run;
     /// `None` until then.
     Opening(Option<f64>),

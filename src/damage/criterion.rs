@@ -2,7 +2,7 @@
 //! the results at both ends agree.
 //!
 //! - Stretch criteria compare the relative square extension x of the bond with its critical value, see
-//!   [`crate::material::bond`]. No root is needed for x.
+//!   [`crate::material::bond`]. x is computed without a square root.
 //! - Energy criteria compare the work of the force states with the critical work. Only the ends that act on
 //!   the bond contribute.
 //! - Stress criteria compare the mean stress measure with the strength. Only the ends that act on the bond
@@ -86,8 +86,8 @@ impl StretchConversion {
         ((critical_i * critical_i * k_i + critical_j * critical_j * k_j) / (k_i + k_j)).sqrt()
     }
 
-    /// Return a lower bound on the critical stretches of all bonds, from the critical stretches of points i
-    /// and j.
+    /// Return a lower bound on the critical stretch of a bond, from the critical stretches of points i and j.
+    /// The bound holds whichever ends act on the bond.
     #[inline(always)]
     fn smallest(self, [i, j]: [f64; 2]) -> f64 {
         let of_end = |[from_i, from_j]: [f64; 2]| (i * from_i).min(j * from_j);
@@ -107,8 +107,8 @@ pub struct WorkRule {
     pub measure: WorkMeasure,
 }
 
-/// Relative displacement on which the force state of a point does work. Forces along the bond always do work
-/// on the extension of the bond.
+/// Relative displacement on which the force state of a point does work. For force states along the bond, both
+/// variants use the extension of the bond instead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkMeasure {
     /// Y − R ξ with the rotation R of the point's family; rigid rotation does no work.
@@ -136,7 +136,7 @@ impl BreakableBonds {
         }
     }
 
-    /// Return `bits`, with the bits of all bonds that this setting does not allow to break cleared.
+    /// Return `bits` after clearing the bits of all bonds that cannot break with this setting.
     #[inline(always)]
     fn select<const D: usize>(self, bits: u8, bond: &Bond<D>) -> u8 {
         match self {
@@ -201,7 +201,7 @@ impl Criterion {
         }
     }
 
-    /// Whether the criterion reads the rotations of both families.
+    /// Whether the criterion reads the rotations of the families of points i and j.
     #[inline(always)]
     pub fn reads_rotations(&self) -> bool {
         match *self {
@@ -380,8 +380,8 @@ impl Criterion {
     /// Return, for each broken bond, the part of its energy above the threshold, as a fraction of its energy:
     /// 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)², at least 0. s, w and σ are the stretch, work and stress of
     /// the bond, and s_c, w_c and σ_c are their thresholds. Bonds exceed the threshold because the criterion
-    /// is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`, the factor
-    /// [`Law::toughness_scale`] of laws that scale critical stretches.
+    /// is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`. `scale`
+    /// is the factor [`Law::toughness_scale`] on critical stretches; `None` for laws that do not scale them.
     #[inline(always)]
     pub fn overshoot<S: Simd, const D: usize>(
         &self,
@@ -414,7 +414,7 @@ impl Criterion {
 impl WorkRule {
     /// Combine the rules of two blocks for the bonds between them. Compressed bonds break only if both rules
     /// allow it. The smaller family correction is used. The work is objective if at least one rule requires
-    /// it.
+    /// objective work.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             breakable: self.breakable.of_both(other.breakable),

@@ -3,9 +3,10 @@
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s0 is the critical stretch. s_min is the smallest
 //! stretch of the intact bonds of a point. f is the strength factor of the point, 1 without scatter. If the
 //! horizons of both points are equal, the smaller threshold of points i and j holds for a bond, so that both
-//! ends agree. Otherwise [`StretchConversion`](crate::damage::StretchConversion) converts the thresholds.
-//! With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6. The comparison
-//! is in [`Criterion::breaking`](crate::damage::Criterion::breaking).
+//! ends agree. If the thresholds belong to different horizons,
+//! [`StretchConversion`](crate::damage::StretchConversion) computes the threshold of the bond from the two
+//! thresholds. With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6. The
+//! comparison is in [`Criterion::breaking`](crate::damage::Criterion::breaking).
 
 use std::f64::consts::PI;
 
@@ -50,7 +51,7 @@ impl CriticalStretch {
     }
 
     /// Return s0 of an ordinary state-based law from the fracture energy G0 (J/m²) and the horizon δ (m).
-    /// Pulling apart a body whose bonds break at this stretch dissipates G0 per area.
+    /// If the bonds of a body break at this stretch, pulling the body apart dissipates G0 per area.
     pub fn from_energy_ordinary(
         law: &Ordinary,
         influence: Influence,
@@ -80,8 +81,8 @@ impl CriticalStretch {
     /// Return the critical stretch of bonds between two bodies whose interface opens at a normal stress σ
     /// (Pa).
     ///
-    /// The result is the mean of the strains σ/E′ of both bodies in tension along the normal. A bond along
-    /// the normal has this stretch if half of the bond lies in each body.
+    /// The result is the mean of the strains σ/E′ of both bodies in tension along the normal. At the stress
+    /// σ, a bond along the normal has this stretch if half of the bond lies in each body.
     ///
     /// E′ is E in 3-D, plane stress and uniaxial stress, E/(1−ν²) in plane strain, and E(1−ν)/((1+ν)(1−2ν))
     /// under uniaxial strain.

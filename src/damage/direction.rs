@@ -9,8 +9,9 @@
 //! of an isotropic body whose fracture energy equals the fracture energy of cracks along a. If cracks across
 //! a have the larger fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
 //!
-//! A crack with the normal N breaks all bonds that cross its plane. Its fracture energy is proportional to
-//! the mean of w_c(n) over all directions n with the weight |n·N|. The mean of c^k is the product of the
+//! A crack with the normal N breaks all bonds that cross its plane. The fracture energy of this crack is
+//! proportional to a weighted mean of w_c(n): the mean is over all directions n, and the weight of a
+//! direction is |n·N|. With the same weight, the mean of c^k is the product of the
 //! following factors over j = 1 … k, for N parallel (∥) or perpendicular (⊥) to a:
 //!
 //! | c | N | plane | space |
@@ -20,9 +21,10 @@
 //! | 1 − (n·a)² | ∥ a | (2j − 1)/(2j + 1) | j/(j + 1) |
 //! | 1 − (n·a)² | ⊥ a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
 //!
-//! p and q follow from k and the fracture energies of cracks along and across a. k is 1 if p is at least 0.1
-//! with k = 1, otherwise 2. If p < 0.1 with k = 2 too, the fracture energies are rejected: bonds in the weak
-//! direction would break at small strains, far from any crack. A critical stretch is multiplied by √(w_c/w).
+//! p and q follow from k and the fracture energies of cracks along and across a. k = 1 is used if it gives
+//! p ≥ 0.1; otherwise k is 2. If p < 0.1 with k = 2 too, the fracture energies are rejected: bonds in the
+//! weak direction would break at small strains, far from any crack. A critical stretch is multiplied by
+//! √(w_c/w).
 
 use std::f64::consts::PI;
 
@@ -40,8 +42,8 @@ const LEAST_CONSTANT_PART: f64 = 0.1;
 /// Tolerance of [`LEAST_CONSTANT_PART`] for the round-off of p.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of directions per quarter of a circle, in sums over all directions. In 3-D, also the number of
-/// steps of the z component from 0 to 1.
+/// Number of directions per quarter of a circle, in sums over all directions. In 3-D, the
+/// sums also divide the range of the z component from 0 to 1 into this number of steps.
 const DIRECTIONS: u32 = 256;
 
 /// Factor w_c/w of the critical work of a bond, as a function of the bond's direction.
@@ -96,7 +98,8 @@ impl ToughnessByDirection {
         })
     }
 
-    /// Compute w_c/w of eight bonds from ξ and `inverse`, 1/|ξ|. The results at both ends are bit-identical.
+    /// Compute w_c/w of eight bonds from ξ and `inverse`, which is 1/|ξ|. The results at both ends are
+    /// bit-identical.
     #[inline(always)]
     fn factor<S: Simd, const D: usize>(&self, simd: S, xi: [Lanes; D], inverse: Lanes) -> Lanes {
         let mut along = xi[0] * self.axis[0];
@@ -116,7 +119,7 @@ impl ToughnessByDirection {
         power * self.power_factor + Lanes::splat(self.constant_part)
     }
 
-    /// Fracture energy of cracks across a, divided by the fracture energy of cracks along a.
+    /// Fracture energy of cracks across the axis a, divided by the fracture energy of cracks along this axis.
     pub fn ratio(&self, dimension: usize) -> f64 {
         let [across, _] = means(dimension, self.is_tough_across, self.squarings);
         self.constant_part + self.power_factor * across

@@ -66,8 +66,8 @@ pub struct StressRule {
 }
 
 impl StressRule {
-    /// Combine the rules of two blocks with the same measure, for the bonds between them. Compressed bonds
-    /// break only if both rules allow it.
+    /// Return the rule for the bonds between two blocks, from the rules of both blocks. Both rules have the
+    /// same measure. Compressed bonds break only if both rules allow it.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             breakable: self.breakable.of_both(other.breakable),
@@ -81,7 +81,7 @@ impl StressRule {
 pub struct StressLimit {
     /// Strength: stress at which bonds break, Pa.
     pub strength: f64,
-    /// Measure of the stress, and bonds that can break.
+    /// Stress measure that is compared with the strength, and kinds of bonds that can break.
     pub rule: StressRule,
 }
 

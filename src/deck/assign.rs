@@ -31,8 +31,8 @@ pub fn is_key(source: &Source, name: &str) -> bool {
 /// an expression, becomes a string. If the deck is not valid TOML, its text is returned unchanged.
 ///
 /// # Errors
-/// If a key is the name of a section, or has an empty part between dots. If a part before the last part is
-/// the name of a list or a value.
+/// If a key is the name of a section, or has an empty part between dots. If a part of a key, except the
+/// last part, names a list or a value instead of a section.
 pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
     let mut document: DocumentMut = match source.text.parse() {
         Ok(document) => document,

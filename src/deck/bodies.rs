@@ -142,8 +142,9 @@ fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
 
 /// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin, so that
 /// their points stay aligned. In each direction, one of these bodies determines the origin: the first body
-/// that has two flat faces a whole number of cells apart. The origin is 0 if a grid with the origin 0 fills
-/// this body exactly, otherwise the lower face of the body. Without such a body, the origin is 0.
+/// that has two flat faces a whole number of cells apart. If a grid with the origin 0 fills this body
+/// exactly, the origin is 0. Otherwise, the origin is the coordinate of the lower face of this body. If there
+/// is no such body, the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -177,12 +178,12 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
     })
 }
 
-/// Tolerance for a whole number of cells, as a fraction of a cell's edge.
+/// Tolerance for the deviation of a length from a whole number of cells, as a fraction of a cell's edge.
 const WHOLE: f64 = 1e-6;
 
 /// Return the grid origin along an axis, m, from which cells with the edge `edge` (m) fill a shape exactly.
 /// The origin is 0 if a grid with this origin fills the shape exactly, otherwise the lower face of the shape.
-/// `None` for a shape that is not a whole number of cells long between two flat faces.
+/// `None` if the shape does not have two flat faces a whole number of cells apart.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {

@@ -26,8 +26,8 @@ pub(super) struct Keys<'a> {
 ///
 /// # Errors
 /// On numbers out of range, and on invalid or repeated pairs. On friction in a relaxation, and on methods or
-/// grids that do not support contact or rigid bodies. On a pair that inherits the stiffness of `[contact]`
-/// but has another model than `[contact]`, unless this other model is `"none"`.
+/// grids that do not support contact or rigid bodies. On a pair that has another model than `[contact]`
+/// but inherits the stiffness of `[contact]`. Such a pair is allowed if its model is `"none"`.
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
@@ -197,8 +197,8 @@ pub(super) fn rule(
     }))
 }
 
-/// Return the names of the two bodies of a pair. An unknown body is an error, and so is a number of names
-/// other than two.
+/// Return the names of the two bodies of a pair. Return an error if a body is unknown, or if the pair does
+/// not have exactly two names.
 fn pair(
     scope: &Scope,
     key: &str,

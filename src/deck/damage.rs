@@ -146,9 +146,9 @@ impl<'a> Directed<'a> {
         )
     }
 
-    /// Return the toughness by direction; `None` if the table has none of the keys. Return an error if the
-    /// table has only some of the keys, if the problem is 1-D, or if the ratio of the two fracture energies
-    /// is out of range.
+    /// Return the toughness by direction; `None` if the table has none of the three keys of `Directed`.
+    /// Return an error if the table has only some of these keys, if the problem is 1-D, or if the ratio of
+    /// the two fracture energies is out of range.
     fn toughness(&self, scope: &Scope, key: &str) -> Result<Option<ToughnessByDirection>> {
         let across = self.across.as_ref();
         let given = [

@@ -18,9 +18,9 @@ const FREE_KEYS: [&str; 1] = ["time.end"];
 /// Keys of `[history]` that set the interval of rows.
 const INTERVAL_KEYS: [&str; 2] = ["every", "every_steps"];
 
-/// Return the differences in the physics of two decks: one line per key with its old and new value, and one
-/// line per section whose tables have another order. A key that only one deck has is compared with the
-/// default of the key.
+/// Return the differences in the physics of two decks. The result has one line per key that differs, with the
+/// old and the new value. It also has one line per section whose tables are in another order in the new deck.
+/// A key that only one deck has is compared with the default of the key.
 ///
 /// # Errors
 /// If a deck does not follow the grammar, or its parameters or tables are invalid.
@@ -30,8 +30,8 @@ pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
     })
 }
 
-/// Return the differences in the definitions of the history columns, as in [`differences`]. The interval of
-/// rows is ignored.
+/// Return the differences in the definitions of the history columns, in the same form as [`differences`]. The
+/// interval of rows is ignored.
 ///
 /// # Errors
 /// If a deck does not follow the grammar, or its parameters or tables are invalid.

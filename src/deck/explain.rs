@@ -210,8 +210,9 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
 }
 
 /// Return the depth of a traction or pressure, m; `None` for a condition without a depth. The depth may be
-/// the spacing of each body. If all bodies that may have points in the set have the same single spacing, this
-/// spacing is returned, otherwise `None`.
+/// the spacing of each body. In this case, return the common [single spacing](Body::single_spacing) of all
+/// bodies that may have points in the set of the condition. Return `None` if one of these bodies has no
+/// single spacing, or if their spacings differ.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

@@ -344,7 +344,8 @@ fn tip(
     })
 }
 
-/// Width of a layer along the inner side of each face of the box of a J integral, in horizons.
+/// Width of the layers of a J integral, in horizons. A layer lies along the inner side of each face of the
+/// box.
 const LAYER: f64 = 1.0;
 
 fn j_integral(

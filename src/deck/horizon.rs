@@ -14,13 +14,15 @@ use crate::points::mean_spacing::mean_spacings;
 /// Name of the mean spacing in the expression of a horizon.
 const SPACING: &str = "spacing";
 
-/// Evaluate the horizons that contain the mean spacing. The `horizon` of a body is evaluated with the mean
-/// spacing of the body's points. The `horizon` of the grid is evaluated for each body without its own
-/// horizon. The result becomes the horizon of this body, and the largest of these results becomes the horizon
-/// of the grid. Meshes and point files are read if horizons depend on their points.
+/// Evaluate the horizons whose expressions contain the mean spacing. The `horizon` of a body is evaluated
+/// with the mean spacing of the body's points.
+/// The `horizon` of the grid is evaluated for each body without its own
+/// horizon. Each result becomes the horizon of its body. The largest result becomes the horizon of the grid.
+/// Meshes and point files are read if horizons depend on their points.
 ///
-/// Return a copy of the deck with these horizons; `None` if no horizon contains the mean spacing. If the deck
-/// has a parameter or table with the name `spacing`, this name does not mean the mean spacing. Collective.
+/// Return a copy of the deck with these horizons; `None` if no expression of a horizon contains the mean
+/// spacing. If the deck has a parameter or table with the name `spacing`, this name does not mean the mean
+/// spacing. Collective.
 ///
 /// # Errors
 /// If the horizon of the grid contains the mean spacing, although all bodies have their own horizon. On an

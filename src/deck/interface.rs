@@ -15,15 +15,17 @@ use crate::problem::{self, DamageRule, InterfaceDamage, InterfacePair, Interface
 /// Value of `damage` for a pair whose bonds never break.
 const UNBREAKABLE: &str = "none";
 
-/// The largest ratio of the tensile moduli of two bodies whose interface has a strength.
+/// Largest allowed ratio of the tensile moduli of two bodies whose interface has a strength.
 const MAX_STIFFNESS_RATIO: f64 = 10.0;
 
 /// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
 /// # Errors
-/// On bonded bodies whose laws exert forces in different directions, and on an invalid or repeated pair. Also
-/// on a rule or strength that the material laws of a pair do not allow. The solver checks whether the
-/// material laws allow the damage law of a pair.
+/// - If the laws of bonded bodies exert forces in different directions.
+/// - If a pair is invalid or repeated.
+/// - If the material laws of a pair do not allow its rule or strength.
+///
+/// The solver checks whether the material laws allow the damage law of a pair.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -150,7 +152,7 @@ impl PairContext<'_> {
     }
 
     /// Return the damage law whose critical stretch follows from a strength. Return an error if the material
-    /// law of a body does not allow this criterion, or if the stiffnesses of the bodies differ too much.
+    /// law of a body does not allow a strength, or if the stiffnesses of the bodies differ too much.
     fn of_strength(&self, strength: &Number) -> Result<problem::Damage> {
         let key = format!("{} strength", self.key);
         let stress = self.scope.positive(strength, &key)?;

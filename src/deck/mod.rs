@@ -74,7 +74,7 @@ pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
 /// material, are replaced. Paths in an overlay are relative to the folder of the deck.
 ///
 /// # Errors
-/// As [`read`]; the location is in the deck or in an overlay.
+/// Same as [`read`]. The location in the message is in the deck or in an overlay.
 pub fn read_with(path: &Path, overlays: &[PathBuf], set: &[(String, String)]) -> Result<Deck> {
     let mut files = vec![Source::read(path)?];
     for overlay in overlays {
@@ -128,7 +128,7 @@ impl Deck {
         self.source.locate_warning(warning)
     }
 
-    /// Validate the deck in a single process, and return its problem with the warnings about the deck.
+    /// Validate the deck in a single process. Return the [`Problem`], including the warnings about the deck.
     ///
     /// If a horizon depends on the mean spacing of points, the process reads all files of these points.
     /// [`Self::problem_on`] shares this work between ranks.
@@ -157,8 +157,8 @@ impl Deck {
         Ok(problem)
     }
 
-    /// Return the parsed deck, with numbers in place of horizons that depend on the mean spacing of points.
-    /// Collective.
+    /// Return the parsed deck. Horizons that depend on the mean spacing of points are replaced by their
+    /// values. Collective.
     fn with_horizons(&self, scope: &mut Scope, comm: &dyn Communicator) -> Result<&grammar::Deck> {
         let known = self.with_horizons.get();
         // Ranks may be threads that share this deck, so some ranks may find the result of other ranks here.
@@ -196,7 +196,7 @@ pub fn parse(source: &Source) -> Result<Problem> {
 /// Return the text of a deck with every default written out.
 ///
 /// # Errors
-/// As [`Deck::new`] and [`Deck::explain`].
+/// Same as for [`Deck::new`] and [`Deck::explain`].
 pub fn explain(source: &Source) -> Result<String> {
     Deck::new(source.clone())?.explain()
 }

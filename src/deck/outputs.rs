@@ -1,4 +1,4 @@
-//! Validation of the results (content and interval), the checkpoints and the rebalancing.
+//! Validation of the settings for results (content and interval), checkpoints and rebalancing.
 
 use super::grammar::{self, Balance, Deck};
 use super::resolve::{Scope, find};

@@ -7,8 +7,9 @@ use super::toml_error::toml_error;
 use crate::error::Result;
 
 /// Return the text of a deck merged with overlays; later overlays override earlier overlays. Tables are
-/// merged key by key. Any other value, including the list of stages, is replaced as a whole. A different
-/// choice in an overlay, for example another law of a material, replaces the choice of the deck.
+/// merged key by key. Any other value, including the list of stages, is replaced as a whole. In some
+/// tables, the only key names a choice, for example the law of a material. If the overlay has another key in
+/// such a table, this key replaces the key of the deck.
 ///
 /// # Errors
 /// If there are overlays, and the deck or an overlay is not TOML.
@@ -72,8 +73,8 @@ fn merge_tables<'k>(
     }
 }
 
-/// Return whether the only key of the table at `path` names a choice: the law of a material, the kind of a
-/// damage law or crack, or a shape.
+/// Return whether `path` belongs to a table whose only key names a choice: the law of a material, the kind of
+/// a damage law or crack, or a shape.
 fn is_choice(path: &[&str]) -> bool {
     matches!(
         path,
@@ -116,7 +117,8 @@ mod tests {
             .unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
 
-    /// Merge two tables key by key, without the rule for choices; the reference for the test.
+    /// Merge two tables key by key. Unlike in [`merge`], a different choice in `upper` does not replace the
+    /// choice in `lower`. A test compares the result of [`merge`] with this function.
     fn over(lower: &mut Table, upper: &Table) {
         for (key, value) in upper {
             match (lower.get_mut(key), value) {

@@ -297,7 +297,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Parse one expression per component. A component with `"free"` is an error.
+    /// Parse one expression per component. It is an error if a component is `"free"`.
     pub fn expressions(
         &self,
         vector: &Vector,
@@ -342,7 +342,8 @@ fn is_free(entry: &Number) -> bool {
     matches!(entry.get_ref(), Written::Text(text) if text == "free")
 }
 
-/// Return the index of `name` in `names`. The error suggests the most similar name.
+/// Return the index of `name` in `names`. If `names` does not contain `name`, the error suggests the most
+/// similar name.
 pub fn find<'n>(
     source: &Source,
     name: &Text,

@@ -20,8 +20,8 @@ pub fn schema() -> Value {
     schema
 }
 
-/// Rewrite two constructs in all parts of a schema, because editors handle them badly: the type `null`, which
-/// TOML lacks, and choices of tables.
+/// Rewrite, in all parts of a schema, two constructs that editors handle badly: the type `null`, which TOML
+/// lacks, and the choice between several tables.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Array(entries) => entries.iter_mut().for_each(tidy),
@@ -55,9 +55,9 @@ fn remove_null(schema: &mut Value) {
     }
 }
 
-/// Replace a choice between several tables, each with one key, by a single table that must have exactly one
-/// of these keys. Editors can then complete the keys, and the messages of editors point to the key with the
-/// mistake.
+/// Simplify the schema of a choice between several tables, each with one key. Replace these tables by a
+/// single table that must have exactly one of the keys. Editors can then complete the keys, and the messages
+/// of editors point to the key with the mistake.
 fn merge_choices(schema: &mut Value) {
     let joined = |choices: &Vec<Value>| {
         let mut properties = serde_json::Map::new();

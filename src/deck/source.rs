@@ -18,8 +18,8 @@ const LONGEST_ERROR: usize = 790;
 /// Largest number of characters of the message of an error or warning, without location and excerpt.
 const LONGEST_MESSAGE: usize = 600;
 
-/// Smallest and largest width of the excerpt of a line, in characters. The width depends on the length of the
-/// message. A line that fits in this width is shown whole.
+/// Smallest and largest width of the excerpt of a line, in characters. The longer the
+/// message of the error, the smaller the width. A line that fits in this width is shown whole.
 const EXCERPT_WIDTHS: [usize; 2] = [24, 160];
 
 /// The path and the text of a deck.
@@ -164,7 +164,7 @@ struct Window {
 }
 
 impl Window {
-    /// Return an excerpt of a line that includes `column` and has at most `width` characters.
+    /// Return an excerpt of a line. The excerpt includes `column` and has at most `width` characters.
     fn new(line: &str, column: usize, width: usize) -> Self {
         // `column` may be one past the last character of the line.
         let fits = line.chars().nth(width).is_none();

@@ -30,8 +30,9 @@ const TIME: [&str; 2] = ["t", "time"];
 /// Read the tables, and store them in the scope.
 ///
 /// # Errors
-/// On a name that no expression can use or that is already the name of a parameter or function, and on an
-/// invalid table.
+/// - If the name of a table cannot be used in expressions.
+/// - If the name of a table is already the name of a parameter or function.
+/// - If a table is invalid.
 pub fn read(scope: &mut Scope, deck: &Deck) -> Result<()> {
     for (name, spanned) in &deck.table {
         let key = format!("[table.{name}]");

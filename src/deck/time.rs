@@ -31,7 +31,7 @@ struct TimeSegment<'a> {
     adaptive: Option<&'a Spanned<grammar::Adaptive>>,
 }
 
-/// Validate the time axis.
+/// Validate the section `[time]`.
 ///
 /// # Errors
 /// On an invalid number, and on keys of a method that no stage uses.
@@ -72,7 +72,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     segment.time(scope)
 }
 
-/// Validate the stages of the run, whose time axis is `whole`.
+/// Validate the stages of the run. `whole` is the time axis of the run.
 ///
 /// # Errors
 /// On a missing or invalid end of a stage, an unknown name, or an invalid number. If a stage has both `on`

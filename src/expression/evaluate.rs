@@ -7,7 +7,8 @@ use super::{Table, Variable};
 /// Largest absolute value of an integer exponent for which a power is computed by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
 
-/// Stack size, in values, that is enough for nearly all expressions. Setting a small stack to zero is cheap.
+/// Stack size, in values, that is enough for nearly all expressions. An evaluation first sets its stack to
+/// zero, which is cheap for a small stack.
 const SHALLOW_STACK: usize = 16;
 
 /// Stack size, in values, for the most deeply nested expression. A level of nesting has at most two pending
@@ -236,8 +237,8 @@ fn small_integer(exponent: f64) -> Option<i32> {
 /// Append an instruction. If all operands of the instruction are constants, replace the operands by the
 /// result. A power with a small constant integer as exponent becomes [`Unary::IntegerPower`].
 ///
-/// A constant at the end of postfix code is always a complete operand. It is therefore enough to check the
-/// last instructions.
+/// A constant at the end of postfix code is always a complete operand. Therefore all n operands of an
+/// instruction are constants if, and only if, the last n instructions of the code are constants.
 pub(super) fn append(code: &mut Vec<Instruction>, instruction: Instruction) {
     use Instruction::{Constant, Unary as One};
     let (operands, replacement) = match (instruction, code.as_slice()) {

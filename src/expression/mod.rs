@@ -24,7 +24,8 @@
 //! of a [table](Table) stands for the value of the table at the time `t`, and is allowed where `t` is
 //! allowed. The functions are:
 //!
-//! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
+//! - `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2(y, x)`, with angles in radians;
+//! - `sinh`, `cosh`, `tanh`;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
 //! - `sign(a)`: -1, 0 or 1;
 //! - `min(a, b, …)`, `max(a, b, …)`: NaN if any argument is NaN;
@@ -67,7 +68,7 @@ pub enum Variable {
     Z,
     /// `t`, the time.
     T,
-    /// `r`, a length. Its value is passed as the first coordinate.
+    /// `r`, a length. [`Expression::evaluate`] takes the value as the first coordinate of the position.
     R,
 }
 
@@ -241,8 +242,8 @@ impl Expression {
         &self.tables
     }
 
-    /// Test whether this expression has the same code as `other`, and each of its tables starts with all rows
-    /// of the corresponding table of `other`.
+    /// Test whether this expression extends `other`: both have the same code, and each table of this
+    /// expression starts with all rows of the corresponding table of `other`.
     pub fn extends(&self, other: &Self) -> bool {
         let mut tables = self.tables.iter().zip(&other.tables);
         self.code == other.code

@@ -33,8 +33,8 @@ pub(super) fn parse(text: &str, scope: &Scope) -> Result<Vec<Instruction>, Expre
     }
 }
 
-/// Return the names in the text that are neither functions nor constants, each once, in order. A name counts
-/// as a function if `(` follows.
+/// Return the names in the text that are neither functions nor constants. Each name occurs once, in the order
+/// of first use in the text. A name counts as a function if `(` follows.
 pub(super) fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
     let tokens = tokenize(text)?;
     let mut names: Vec<String> = Vec::new();
@@ -273,8 +273,8 @@ impl Parser<'_> {
         token.error(message)
     }
 
-    /// Return the error for an unclosed parenthesis `open`: the next token follows a value inside the
-    /// parenthesis, but does not close the parenthesis.
+    /// Return the error for a parenthesis `open` that is not closed: the next token comes after a value in
+    /// the parenthesis, and is not `)`.
     fn unclosed(&self, open: Token) -> ExpressionError {
         if self.peek().kind == Kind::End {
             return open.error("unbalanced parenthesis: this `(` is never closed");
@@ -282,7 +282,7 @@ impl Parser<'_> {
         self.misplaced()
     }
 
-    /// Return the error for a misplaced token: the next token cannot follow a value.
+    /// Return the error for the next token, which is misplaced: it cannot follow a value.
     fn misplaced(&self) -> ExpressionError {
         let token = self.peek();
         let text = self.text_of(token);

@@ -13,7 +13,8 @@ impl Table {
     ///
     /// # Errors
     /// If there are fewer than two rows, the counts differ, or the times do not increase. The error holds
-    /// the row index, from 0, and a message.
+    /// a row index, from 0, and a message. The row is the first whose time is not larger than the time of the
+    /// row before it. For the other two errors, it is the last row.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
         if times.len() < 2 || times.len() != values.len() {
             let message = format!("needs two rows or more, has {}", times.len());
@@ -75,7 +76,8 @@ impl Table {
         self.at(end) - self.at(time)
     }
 
-    /// Return the index of the first row of the segment that contains a time (s), or of the nearest segment.
+    /// Return the index of the first row of the segment that contains a time (s). A time before or after all
+    /// rows belongs to the nearest segment.
     fn segment(&self, time: f64) -> usize {
         let after = self.times.partition_point(|row| *row <= time);
         after.clamp(1, self.times.len() - 1) - 1

@@ -29,8 +29,8 @@ pub enum Fault {
     },
     /// Bonds that do not fit in memory.
     TooLittleMemory {
-        /// The pair of blocks whose lattice or weights do not fit. If the lists or bond histories of
-        /// all pairs need more memory in total than is available, this is the pair that takes most memory.
+        /// The pair of blocks whose lattice or weights do not fit in memory. If the lists or bond histories
+        /// of all pairs need more memory in total than is available, this is the pair that takes most memory.
         blocks: [usize; 2],
         /// Needed and available memory.
         shortage: Shortage,

@@ -4,8 +4,8 @@
 //! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its last.
 //!   Lines are stored one after the other without gaps.
-//! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two bands,
-//!   and no line covers the space between them.
+//! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two bands.
+//!   Each line lies within one band, so no line covers the space between bands.
 
 use std::ops::Range;
 
@@ -84,7 +84,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Lay out the points of those blocks of a domain that lie on a grid; `longest` is the longest bond, m.
+    /// Lay out the points of `domain` that belong to the blocks on the grid. `longest` is the length of the
+    /// longest bond, m.
     ///
     /// # Errors
     /// If two points coincide, or the layout has too many holes.

@@ -41,8 +41,8 @@ pub struct BondLattice {
     vectors: Vec<Vector>,
     /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
-    /// Shift for each line of the grid and each line offset. For a point in the line, the slot of the point
-    /// plus the shift is the slot at the same x in the line at this offset.
+    /// Shift for each line of the grid and each line offset. The offset leads from this line to another line.
+    /// The slot of a point in this line, plus the shift, is the slot at the same x in the other line.
     shifts: Vec<i32>,
     /// State of the bonds: a group of eight bonds for each lane group and offset.
     pub(super) store: Store,

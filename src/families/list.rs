@@ -95,7 +95,7 @@ impl BondList {
         self.reach
     }
 
-    /// The rows of a range.
+    /// The rows whose indices are in `range`.
     pub fn rows(&mut self, range: std::ops::Range<usize>) -> Rows<'_> {
         let groups = self.starts[range.start]..self.starts[range.end];
         Rows {
@@ -155,7 +155,8 @@ impl BondList {
         }
     }
 
-    /// Memory of the weights, bytes. `ends` is the number of ends with weights of their own.
+    /// Memory of the weights, bytes. `ends` is the number of ends whose weights are stored: 1 if both ends
+    /// use the same stored weights, otherwise 2.
     pub fn weight_bytes(&self, ends: usize) -> u64 {
         (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
     }

@@ -33,7 +33,7 @@ pub use store::{Groups, Store};
 pub use vectors::{VectorBonds, Vectors};
 pub use volume::VolumeFactors;
 
-/// The bonds from points i of one block to points j of one block.
+/// The bonds from the points i of a block to the points j of the same block or of another block.
 #[derive(Debug, Clone)]
 pub enum BlockBonds {
     /// Neighbour lists, for any cloud of points.
@@ -122,8 +122,8 @@ impl BlockBonds {
         with!(self, bonds => &mut bonds.store)
     }
 
-    /// Call `visit(i, bytes)` for each point with bonds. The arguments are the local index and the length of
-    /// the checkpoint row of the point. The rows do not depend on the number of ranks.
+    /// Call `visit(i, bytes)` for each point with bonds. `i` is the local index of the point, and `bytes` is
+    /// the length of its checkpoint row. The rows do not depend on the number of ranks.
     pub fn row_lengths(&self, mut visit: impl FnMut(usize, usize)) {
         match self {
             Self::List(list) => list.for_each_row(|_, point, length| visit(point, length)),
@@ -134,8 +134,8 @@ impl BlockBonds {
         }
     }
 
-    /// Write the checkpoint row of each point with bonds at `bytes[next[point]..]`, and advance `next[point]`
-    /// by the length of the row; `point` is the local index of the point.
+    /// For each point with bonds, write the checkpoint row at `bytes[next[point]..]`, and advance
+    /// `next[point]` by the length of the row. `point` is the local index of the point.
     pub fn save(&self, next: &mut [usize], bytes: &mut [u8]) {
         match self {
             Self::List(list) => list.for_each_row(|row, point, length| {

@@ -37,9 +37,9 @@ struct Order {
     local: Vec<u32>,
     /// For each block, the position of its first point in this order. The last entry is the number of points.
     first: Vec<u32>,
-    /// Bins of the points of each block. The bins contain indices in this order, counted from the block's
-    /// first point. Each block has separate bins, so the neighbour search of a point skips the blocks to
-    /// which the point has no bonds.
+    /// Bins of the points of each block. The bins contain indices into this `Order`, counted from the first
+    /// point of the block. Each block has separate bins, so the neighbour search of a point skips the blocks
+    /// to which the point has no bonds.
     bins: Vec<Bins>,
 }
 
@@ -89,7 +89,7 @@ impl Order {
 /// The rows that one task found.
 #[derive(Default)]
 struct Chunk {
-    /// Local index of the point, block of the neighbours and number of groups.
+    /// For each row: local index of its point, block of the neighbours, and number of groups of bonds.
     rows: Vec<(u32, u32, u32)>,
     neighbours: Neighbours,
     intact: Vec<u8>,

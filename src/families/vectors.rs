@@ -61,8 +61,8 @@ pub(super) struct LatticeTables<'a> {
     pub(super) lines: usize,
 }
 
-/// Create the lane groups of a grid, sorted by local index. At first, `members` contains all
-/// their points.
+/// Create the lane groups of a grid, sorted by local index. Initially, the mask `members` of a lane group
+/// contains all points of the lane group.
 pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
     let mut vectors: Vec<Vector> = Vec::new();
     let mut line = 0;

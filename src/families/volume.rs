@@ -52,7 +52,7 @@ pub struct VolumeFactors {
     reach_squared: f64,
     /// Number of table entries per direction, one per quarter of the edge; 0 if the table would be too large.
     multiples: usize,
-    /// Factors at multiples of a quarter of the edge, as bit patterns.
+    /// Factors at offsets whose components are multiples of a quarter of the edge, as bit patterns.
     table: OnceLock<Vec<AtomicU64>>,
     /// Factors at all other offsets.
     cache: Mutex<FxHashMap<[i64; 3], f64>>,

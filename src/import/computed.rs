@@ -120,8 +120,8 @@ impl<'n> Quantity<'n> {
         ))
     }
 
-    /// Write a probe, which records the variable at the nearest point. Every probe records displacement and
-    /// velocity, so these two need no key.
+    /// Write a probe. It records the variable at the point nearest to the position in the source deck. Every
+    /// probe records displacement and velocity, so these two need no key.
     fn probe(&self, translation: &mut Translation) -> Result<Written> {
         let mut position = Vec::new();
         for axis in ["X", "Y", "Z"].iter().take(translation.dimension) {

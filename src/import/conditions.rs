@@ -27,7 +27,7 @@ struct Initial {
     key: &'static str,
     component: usize,
     value: Value,
-    /// Node of the value.
+    /// Node of the value in the source deck, for the log.
     node: Node,
 }
 
@@ -35,8 +35,8 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Name of each condition in the new deck, and the numbers of the steps in which it acts. The list
-    /// of numbers is empty for all steps.
+    /// Name of each condition in the new deck, and the numbers of the steps in which it acts. An empty list
+    /// means that the condition acts in all steps.
     pub written: Vec<(String, Vec<u64>)>,
     /// Whether a condition prescribes temperatures.
     pub has_temperature: bool,

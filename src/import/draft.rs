@@ -170,12 +170,12 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Set a key before all sections.
+    /// Set a key that stands before all sections of the deck.
     pub fn top(&mut self, key: &str, value: Value) {
         self.top.push((key.to_owned(), value));
     }
 
-    /// Test whether a key before all sections is set.
+    /// Test whether the draft has this key before all sections.
     pub fn has_top(&self, key: &str) -> bool {
         self.top.iter().any(|(known, _)| known == key)
     }
@@ -185,7 +185,7 @@ impl Draft {
         self.sections.push(section);
     }
 
-    /// Return the section with a header; add the section if it is missing.
+    /// Return the section whose header is `header`; add this section if it is missing.
     pub fn section(&mut self, header: &str) -> &mut Section {
         let found = self.sections.iter().position(|section| section.is(header));
         let index = found.unwrap_or_else(|| {
@@ -217,8 +217,8 @@ impl Draft {
         self.sections.push(section);
     }
 
-    /// Return the text of the deck. The text starts with comments: the lines of `heading`, then `entries`,
-    /// which are the outcomes of the keys.
+    /// Return the text of the deck. The text starts with comments: the lines of `heading`, then one line for
+    /// each of `entries`. An entry is a key of the source deck with its outcome.
     pub fn text(&self, heading: &[String], entries: &[Entry]) -> String {
         let mut text = String::new();
         let comment = |text: &mut String, line: &str| {

@@ -158,7 +158,7 @@ struct Rewriter<'a> {
 }
 
 impl Rewriter<'_> {
-    /// Return the expression of `value` after all statements.
+    /// Translate all statements. Return the expression that they assign to the name `value`.
     fn statements(&self, tokens: &[Token]) -> Result<String, String> {
         let (value, end) = self.block(tokens, 0, None, 0)?;
         if end < tokens.len() {
@@ -167,8 +167,9 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// Translate the statements from `at` to the end or a `}`. The parameter `value` is the expression that
-    /// earlier statements assign to the name `value`. Return the new expression and the index after the last
+    /// Translate the statements from `at` to the end or a `}`. The statements assign expressions to the name
+    /// `value` of the source language. The parameter `value` is the expression that earlier statements have
+    /// assigned to this name. Return the expression after the last statement, and the index after this
     /// statement.
     fn block(
         &self,

@@ -63,7 +63,7 @@ impl fmt::Display for Code {
 /// A translated deck.
 #[derive(Debug, Clone)]
 pub struct Import {
-    /// Code of the source deck.
+    /// The code for which the source deck was written, such as Peridigm.
     pub code: Code,
     /// Text of the new deck.
     pub text: String,

@@ -8,7 +8,8 @@ use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::Result;
 
-/// Output variables: name, name of the field, and how the field differs from the variable.
+/// Output variables. An entry has the name of the variable, the name of its field, and a text that says
+/// how the field differs from the variable. The text is empty if both are equal.
 const FIELDS: [(&str, &str, &str); 33] = [
     ("Displacement", "displacement", ""),
     ("Displacements", "displacement", ""),
@@ -181,8 +182,9 @@ impl Outputs {
         }
     }
 
-    /// Read a table of computed quantities. The name of a quantity is its key `Output Label`, or else the
-    /// name of its table. Each pair in `bodies` is the name of a block and the name of its body.
+    /// Read a table of computed quantities. The name of a quantity is the value of its key
+    /// `Output Label`. Without this key, it is the name of the table of the quantity. Each pair in `bodies`
+    /// is the name of a block and the name of its body.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.
@@ -293,9 +295,9 @@ impl Outputs {
         Ok(())
     }
 
-    /// Return the largest interval in `intervals` of an output with fields. If none of these outputs has
-    /// fields, return the largest of all `intervals`. Log the other intervals. Return `None` if there is no
-    /// interval.
+    /// Return the largest entry of `intervals` that belongs to an output with fields. If none of the outputs
+    /// has fields, return the largest of all `intervals`. Log the other intervals. Return `None` if there is
+    /// no interval.
     fn interval(&self, translation: &Translation) -> Option<Interval> {
         let with_fields = self.intervals.iter().any(|frequency| frequency.has_fields);
         let candidates = self.intervals.iter();
@@ -330,8 +332,8 @@ impl Outputs {
         Some(smallest.interval)
     }
 
-    /// Return kind, outcome and note of an output variable. Add the field of the variable to the output, if
-    /// there is one.
+    /// Return kind, outcome and note of an output variable. If the variable has a field, add
+    /// this field to the output.
     fn variable(&mut self, translation: &Translation, name: &str) -> (Kind, Fate, String) {
         let mut computed = self.computed.iter();
         if let Some((_, fate, note)) = computed.find(|(label, ..)| is_key(label, name)) {

@@ -64,8 +64,11 @@ pub fn is_script(text: &str) -> bool {
 /// values that they have at this command.
 ///
 /// # Errors
-/// If a quote or bracket is not closed, a variable is not defined, a formula in `$(…)` is invalid or changes
-/// with time, a time step is not a number, or the script or a line is too long.
+/// - If a quote or bracket is not closed.
+/// - If a variable is not defined.
+/// - If a formula in `$(…)` is invalid or changes with time.
+/// - If a time step is not a number.
+/// - If the script or a line is too long.
 pub fn parse(text: &str) -> Result<Script, Mistake> {
     let mut script = Script::default();
     let mut variables = Variables::default();
@@ -240,7 +243,8 @@ impl Variables {
         Ok(result)
     }
 
-    /// Return the value of a variable as text; a formula is evaluated if it is constant.
+    /// Return the value of a variable as text: the computed number if the text is a constant
+    /// formula, otherwise the unchanged text.
     fn value(&self, name: &str) -> Result<String, String> {
         let text = self.values.get(name);
         let text = text.ok_or_else(|| format!("the variable `{name}` is not defined"))?;

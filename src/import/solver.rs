@@ -76,8 +76,10 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
 /// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
-/// If `node` has no solver that this module reads, if the end is missing or not after the start, if a value
-/// is not a number, or if the numbers of `Time Steps` do not rise.
+/// - If `node` has no solver that this module reads.
+/// - If the end is missing or is not after the start.
+/// - If a value is not a number.
+/// - If the numbers of `Time Steps` do not rise.
 pub fn stage(
     translation: &Translation,
     node: &Node,

@@ -27,12 +27,12 @@ pub enum Content {
     Text(String),
     /// Values in order.
     List(Vec<Node>),
-    /// Values by name, in the order of the text.
+    /// Values by name, in their order in the deck.
     Table(Vec<(String, Node)>),
 }
 
 impl Node {
-    /// Return the value of a key; names are compared with the key by [`is_key`].
+    /// Return the value of a key in a table. The names in the table are compared with the key by [`is_key`].
     pub fn get(&self, key: &str) -> Option<&Self> {
         let (_, node) = self.entries().iter().find(|(name, _)| is_key(name, key))?;
         Some(node)

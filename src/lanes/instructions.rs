@@ -25,7 +25,7 @@ pub enum Instructions {
 /// Environment variable with the name of the largest set that may be used, for tests.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
-/// Names of the sets that the program was built for, the smallest first.
+/// Names of the instruction sets that the program was built for, from the smallest to the largest.
 pub const BUILT: &[&str] = if cfg!(target_arch = "x86_64") {
     &["AVX2", "AVX-512"]
 } else if cfg!(target_arch = "aarch64") {

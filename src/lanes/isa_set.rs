@@ -18,7 +18,7 @@ impl IsaSet {
         matches!(self, Self::Each)
     }
 
-    /// Test whether there is only one version.
+    /// Test whether the loop is compiled once, for any processor of the target ([`Self::One`]).
     pub const fn is_one(self) -> bool {
         matches!(self, Self::One)
     }

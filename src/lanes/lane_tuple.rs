@@ -16,7 +16,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// One column per quantity, to read.
     type Columns<'a>: Copy + Send + Sync;
 
-    /// One column per quantity, to add to.
+    /// One column per quantity, for adding values.
     type ColumnsMut<'a>: Send;
 
     /// Create the tuple by calling `value` with the index of each quantity.
@@ -31,14 +31,14 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Select the first [`Self::COUNT`] columns, to read.
     ///
     /// # Panics
-    /// If there are fewer columns, unless [`Self::PADDED`]. The first tuple of a pair must have all its
-    /// columns.
+    /// If there are fewer columns, unless [`Self::PADDED`]. For a pair of tuples, also if there are fewer
+    /// columns than the first tuple has quantities.
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
-    /// Select the first [`Self::COUNT`] columns, to add to.
+    /// Select the first [`Self::COUNT`] columns, for adding values.
     ///
     /// # Panics
-    /// If there are fewer columns.
+    /// If there are fewer than [`Self::COUNT`] columns.
     fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_>;
 
     /// Return the column of a quantity.
@@ -47,7 +47,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Split each column into the entries before `middle` and the entries from `middle` on.
     fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2];
 
-    /// Return the column of a quantity, to add to.
+    /// Return the column of a quantity, for adding values.
     fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64];
 
     /// Test whether every column has at least `entries` entries. Quantities without a column

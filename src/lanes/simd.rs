@@ -6,8 +6,8 @@
 
 use super::Lanes;
 
-/// Proof that the machine has an instruction set. The methods are the operations that depend on this
-/// instruction set.
+/// Proof that the machine has a particular instruction set. The methods are the operations that depend on
+/// this instruction set.
 pub trait Simd: Copy + Send + Sync + 'static {
     /// Return `a * b + c`. The result is rounded once, except by [`Portable`] without fused multiply-add.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
@@ -57,7 +57,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
     }
 }
 
-/// Work that can run out of line with an instruction set.
+/// Work that can run out of line, in a function that is compiled for an instruction set.
 /// [`Self::run`] must be `#[inline(always)]`. A closure is not sufficient, because it is a separate function
 /// that is compiled without the instruction set. If the compiler does not inline a large closure, every
 /// vector operation in it is a call.
@@ -430,10 +430,11 @@ mod x86 {
     }
 
     /// Return the value, but hide from the compiler that it is unchanged. The compiler then keeps the
-    /// operations before and after this call in whole vectors, instead of splitting them by lane. Measured
-    /// with rustc 1.95 on AMD Zen 3 (AVX2): without this call, the law `pmb` for bonds in lists runs at 0.68
-    /// times the speed. The law `ordinary` for bonds in lattices runs at 0.75 times the speed. `pmb` in
-    /// lattices does not need the call, and `correspondence` is faster without the call.
+    /// operations before and after this call in whole vectors, instead of splitting them by lane. The speed
+    /// without this call was measured with rustc 1.95 on AMD Zen 3 (AVX2), as a fraction of the speed with
+    /// this call. It is 0.68 for the law `pmb` with bonds in lists, and 0.75 for the law `ordinary` with
+    /// bonds in lattices. `pmb` in lattices does not need the call, and `correspondence` is faster without
+    /// the call.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {

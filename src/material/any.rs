@@ -9,7 +9,8 @@ use super::{
 };
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
-/// Sizes of the point data and bond data of a law, and other constants of its type.
+/// Sizes of the point data, bond data and sums of a law, the number of its passes, and whether its force
+/// state is central.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Count of the constants of a point, [`Law::CONSTANTS`].
@@ -45,8 +46,8 @@ impl Counts {
         }
     }
 
-    /// Return, for each size, the larger value of the two arguments. `central` is true only if it is
-    /// true in both arguments.
+    /// Return the larger of the two values of each count. `central` is true only if it is true in both
+    /// arguments.
     const fn or_more(self, other: Self) -> Self {
         const fn more(a: usize, b: usize) -> usize {
             if a > b { a } else { b }
@@ -64,7 +65,7 @@ impl Counts {
     }
 }
 
-/// Largest sizes of all laws, in three dimensions.
+/// For each size, the largest value of all laws, in three dimensions.
 pub const MOST: Counts = {
     let mut most = COUNTS[0];
     let mut k = 1;
@@ -185,9 +186,11 @@ impl PairLaw {
     }
 }
 
-/// This implementation serves bonds between different laws, and breaking bonds of all laws (`BreakingBonds`).
-/// Bonds between different laws are never linear, because a linear law is paired only with itself. Functions
-/// that are called per bond are not inlined. Otherwise, every loop would contain the code of all laws.
+/// This implementation has two uses: bonds between different laws, and the kernel `BreakingBonds`, which all
+/// laws share.
+/// The forces of bonds between different laws are never [linear](Law::LINEAR), because a linear law is paired
+/// only with itself. Functions that are called per bond are not inlined. Otherwise, every loop would contain
+/// the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;

@@ -58,7 +58,7 @@ pub struct Bond<const D: usize> {
     pub extension_over_deformed: Lanes,
     /// η by component, m.
     pub eta: [Lanes; D],
-    /// Y by component, m; for linear laws ξ.
+    /// Y by component, m. For linear laws, ξ by component instead.
     pub deformed: [Lanes; D],
     /// One bit per intact bond whose |x| exceeds the `limit` of [`deform`]; for linear laws, one bit per
     /// intact bond.
@@ -139,10 +139,11 @@ pub struct Elastic<const D: usize> {
     pub slope: Lanes,
 }
 
-/// Task that removes the thermal stretch a of bonds from their relative displacement η (m).
+/// Task that removes the thermal stretch from the relative displacement η (m) of bonds. Let a be the thermal
+/// stretch of a bond.
 ///
-/// Laws receive Y/(1 + a) instead of Y. Forces are multiplied by the slope 1/(1 + a), so that they remain the
-/// derivative of the energy.
+/// Laws receive Y/(1 + a) instead of Y. Forces are multiplied by 1/(1 + a), the derivative of Y/(1 + a) with
+/// respect to Y. Forces then remain the derivative of the energy with respect to Y.
 /// A bond of length (1 + a)|ξ| is free of force.
 pub struct SeparateThermal<const D: usize> {
     /// ξ by component, m.
@@ -376,7 +377,8 @@ mod tests {
         extension_over_deformed: true,
     };
 
-    /// Return bonds with exactly these values of x, from artificial reference data.
+    /// Return bonds with exactly the given values of x = (|Y|² − |ξ|²)/|ξ|². The reference data are
+    /// artificial.
     fn of_growth(simd: impl Simd, relative_square_extension: [f64; 8]) -> Bond<1> {
         let one = Lanes::splat(1.0);
         let reference = Reference {

@@ -289,7 +289,7 @@ impl Values {
         }
     }
 
-    /// Return the function of a key, if the deck gives it.
+    /// Return the function that the deck gives for a key; `None` if the deck gives no function.
     pub fn of_length(&self, key: &str) -> Option<&Arc<dyn OfLength>> {
         match self.get(key) {
             Some(Value::OfLength(function)) => Some(function),

@@ -1,9 +1,10 @@
 //! Surface correction from extensions along the coordinate axes. The factor of a point for a bond is the
 //! radius of an ellipsoid in the direction of the bond.
 //!
-//! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. Consider a unit extension along a coordinate axis a. The
-//! factor g_a scales a sum over the family of a point to the value that this sum has in the solid. A bond of
-//! direction n has the factor g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
+//! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. Consider a unit extension along a coordinate axis a. A
+//! quantity of a point, such as the energy density, is then a sum over its family. The factor g_a scales this
+//! sum to the value of the quantity in the classical solid. A bond of direction n has the factor
+//! g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
 //!
 //! In the sources, a bond has one ellipsoid, and each semi-axis is the mean of the values at both ends. Here
 //! each end has its own ellipsoid, because the force state of a point depends on the numbers of this point
@@ -23,8 +24,9 @@ use crate::lanes::Lanes;
 /// plane, would be unbounded.
 const LARGEST: f64 = 30.0;
 
-/// Diagonal entry of the tensor of a point without bonds within its own horizon. The radii of this point are
-/// nearly 0, so it contributes nothing to its bonds with points of a larger horizon.
+/// Diagonal entry of the tensor of a point that has no bonds within its own horizon. The radii of the
+/// point's ellipsoid are then nearly 0. Therefore the point contributes nothing to its bonds with points that
+/// have a larger horizon.
 pub const WITHOUT_BONDS: f64 = 1e300;
 
 /// Return the semi-axis g_a = `wanted`/`found`, at most [`LARGEST`]. `wanted` is the value of the sum in the

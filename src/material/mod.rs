@@ -10,9 +10,9 @@
 //!
 //! A law declares the counts of its point numbers and history values, and computes these values. An *end* of
 //! a bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
-//! cracks. The *initial* family of a point contains the bonds over which step 1 of [`Law`] sums, before any
-//! bond breaks. ξ is the undeformed bond, η the relative displacement of its ends, and Y = ξ + η the deformed
-//! bond. ω is the influence function, and Ṽ the corrected volume of j.
+//! cracks. The *initial* family of a point is its family before any bond breaks: the bonds over which step 1
+//! of [`Law`] sums. ξ is the undeformed bond, η the relative displacement of its ends, and Y = ξ + η the
+//! deformed bond. ω is the influence function, and Ṽ the corrected volume of j.
 
 mod any;
 pub mod bond;
@@ -194,8 +194,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     const FORCE_READS_HISTORY: bool = true;
 
     /// Whether the out-of-plane stress of a point is the mean of the stresses of its bonds. If so, the caller
-    /// computes the mean as the sum of [`Self::out_of_plane_bond_stress`]. This sum replaces the value of
-    /// [`Self::out_of_plane_stress`], unless this value is `None`.
+    /// computes this mean: it sums the contributions that [`Self::out_of_plane_bond_stress`] returns for the
+    /// bonds. This sum replaces the value of [`Self::out_of_plane_stress`], unless this value is `None`.
     const HAS_OUT_OF_PLANE_BOND_STRESS: bool = false;
 
     /// Return the contribution of an undeformed bond to the sums over the initial family.
@@ -343,8 +343,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return the dilatation θ of a point, without thermal strain, from the numbers of this point. If `None`,
-    /// the caller computes θ = (d/m) Σ ω|ξ| e Ṽ, with the number of dimensions d and the extension
-    /// e = |Y| − |ξ|.
+    /// the caller computes θ = (d/m) Σ ω|ξ| e Ṽ, with the number of dimensions d, the weighted volume m and
+    /// the extension e = |Y| − |ξ|.
     fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
@@ -398,15 +398,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Lanes::splat(0.0)
     }
 
-    /// Return the fraction of the stiffness that an intact bond has lost at one end, from 0 to 1. In
-    /// the damage of the point at this end, this fraction of the bond counts as broken.
+    /// Return the fraction of the stiffness that an intact bond has lost at one end, from 0 to 1. The
+    /// damage of the point at this end counts this fraction of the bond as broken.
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
     /// Return one bit per bond, set if the bond breaks because of its history at one end. The bit counts only
-    /// if the force state of this end acts on the bond. The bond also breaks if its body has no damage law.
+    /// if the force state of this end acts on the bond. The bond breaks even if its body has no damage law.
     /// The bits are checked in each force evaluation that stores the history.
     #[inline(always)]
     fn is_worn_out<S: Simd>(&self, _simd: S, _history: &Self::BondHistory) -> u8 {
@@ -414,12 +414,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Return a spring constant k (N/m⁷) per bond that bounds the strain energy density W (J/m³) of one end:
-    /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ, or the weaker bound of [`Self::resists_across`]. For bond-based laws
-    /// k = |∂T/∂η|.
+    /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. If [`Self::resists_across`] returns true, k satisfies only the weaker bound
+    /// that is stated there. For bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes;
 
-    /// Test whether the springs of [`Self::stiffness`] also resist displacements across the bonds:
-    /// W ≤ ½ Σ k |η|² Ṽ.
+    /// Test whether the springs of [`Self::stiffness`] must also resist displacements across the bonds. The
+    /// bound of the strain energy density W is then ½ Σ k |η|² Ṽ instead of ½ Σ k (|Y| − |ξ|)² Ṽ.
     fn resists_across(&self) -> bool {
         false
     }

@@ -17,9 +17,9 @@ pub fn index_of(wanted: [usize; 3]) -> usize {
     found.expect("the degree is the sum of the exponents")
 }
 
-/// Return the number of components of a symmetric tensor whose indices differ only in their order. The
-/// exponents say how often x, y and z occur among the indices. For example, (1, 1, 0) stands for the
-/// components xy and yx, so the result is 2.
+/// Return the number of components of a symmetric tensor that have these exponents. The exponents of a
+/// component say how often x, y and z occur among its indices. For example, the components xy and yx have the
+/// exponents (1, 1, 0), so the result is 2.
 pub fn multiplicity(exponents: [usize; 3]) -> f64 {
     let factorial = |n: usize| (1..=n).product::<usize>();
     let all = factorial(exponents.iter().sum());

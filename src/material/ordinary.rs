@@ -1,9 +1,14 @@
 //! Ordinary state-based linear peridynamic solid, for any Poisson ratio.
 //!
 //! Silling, Epton, Weckner, Xu & Askari 2007; the plane forms follow Le, Chan & Schwartz 2014.
-//! In d dimensions, the law uses the weighted volume m = Σ ω|ξ|²Ṽ, the extension e = |Y| − |ξ|, the
-//! dilatation θ = (d/m) Σ ω|ξ|eṼ and the deviatoric extension e_d = e − θ|ξ|/d. The force state t along
-//! the bond (N/m⁶) and the strain energy density W (J/m³) are
+//! In d dimensions, the law uses these quantities:
+//!
+//! - weighted volume m = Σ ω|ξ|²Ṽ,
+//! - extension e = |Y| − |ξ|,
+//! - dilatation θ = (d/m) Σ ω|ξ|eṼ,
+//! - deviatoric extension e_d = e − θ|ξ|/d.
+//!
+//! The force state t along the bond (N/m⁶) and the strain energy density W (J/m³) are
 //!
 //! t = (d k′θ/m) ω|ξ| + (A/m) ω e_d, W = ½ k′θ² + ½ (A/m) Σ ω e_d² Ṽ.
 //!
@@ -36,7 +41,7 @@ pub struct Ordinary {
     volumetric: f64,
     /// Constant A of the law, Pa.
     extensional: f64,
-    /// m of an untruncated family, m⁵.
+    /// Weighted volume m of an untruncated family, m⁵.
     untruncated_weighted_volume: f64,
 }
 
@@ -96,7 +101,7 @@ impl Ordinary {
         self.extensional
     }
 
-    /// Return m of an untruncated family, m⁵.
+    /// Return the weighted volume m of an untruncated family, m⁵.
     pub(super) fn untruncated_weighted_volume(&self) -> f64 {
         self.untruncated_weighted_volume
     }
@@ -212,8 +217,8 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 /// Return the force state t = v |ξ| + a (e − e_i) of bonds with the inelastic deviatoric extension e_i. Here
-/// a = A/m is `extension_factor` and v is `volume_factor`, for example d κ θ/m, both N/m⁷.
-/// `inelastic_stretch` is e_i/|ξ|.
+/// a = A/m is `extension_factor`, and v is `volume_factor`, such as d κ θ/m. The unit of both factors is
+/// N/m⁷. `inelastic_stretch` is e_i/|ξ|.
 #[inline(always)]
 pub(super) fn inelastic_force_state<const D: usize>(
     bond: &Bond<D>,
@@ -246,7 +251,7 @@ impl<const D: usize> Law<D> for Ordinary {
     const CONSTANTS: usize = 1;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// The own number of a point is the dilatation θ.
+    /// Each point has one own number, the dilatation θ.
     const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]

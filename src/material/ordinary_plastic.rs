@@ -150,7 +150,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 3;
-    /// The own number of a point is the dilatation θ.
+    /// Each point has one own number, the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

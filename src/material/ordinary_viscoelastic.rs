@@ -10,7 +10,8 @@
 //! The force is the derivative of W, and therefore has the additional term λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ. This
 //! term is 0 until bonds of the family break.
 //!
-//! e_d is assumed to change linearly during a step Δt, from e_d,n to e_d,n + Δe_d. Then
+//! The index n marks values at the start of a step Δt. During the step, e_d is assumed to change linearly
+//! from e_d,n to e_d,n + Δe_d. Then
 //! e_b ← e_d,n (1 − a) + e_b,n a + β Δe_d with a = exp(−Δt/τ) and β = 1 − (τ/Δt)(1 − a).
 //! The elastic constants are those of the instantaneous response. The long-term shear modulus is (1 − λ) G.
 
@@ -149,9 +150,9 @@ impl Relaxation {
         }
     }
 
-    /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step (s), from these three
-    /// quantities before the step. `deviatoric` is e_d/|ξ| after the step. Without relaxation, a bond has the
-    /// energy ½ `factor` (e_d/|ξ|)², J/m⁶.
+    /// Return e_b/|ξ|, e_d/|ξ| and the dissipated energy (J/m⁶) of bonds after a step of length `step` (s).
+    /// The second argument contains these three quantities before the step. `deviatoric` is e_d/|ξ| after the
+    /// step. Without relaxation, a bond has the energy ½ `factor` (e_d/|ξ|)², J/m⁶.
     #[inline(always)]
     pub(super) fn after(
         &self,
@@ -187,7 +188,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 2;
-    /// The own number of a point is the dilatation θ.
+    /// Each point has one own number, the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

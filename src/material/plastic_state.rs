@@ -3,12 +3,13 @@
 /// Plastic state of a point; all numbers are initially 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlasticState {
-    /// Plastic strain E_p, or C_p⁻¹ − I with C_p = F_pᵀ F_p for logarithmic strains, in the order xx, yy, zz,
-    /// yz, xz, xy.
+    /// Plastic strain E_p for small strains; C_p⁻¹ − I with C_p = F_pᵀ F_p for logarithmic strains. The order
+    /// is xx, yy, zz, yz, xz, xy.
     pub strain: [f64; 6],
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,
-    /// Factor by which strain rate and temperature multiply the yield stress in the last step, minus 1.
+    /// Relative change of the yield stress by strain rate and temperature in the last step: their factor on
+    /// the yield stress, minus 1.
     pub yield_change: f64,
     /// Energy that the zero-energy control would have if plastic flow did not reduce the control, J/m³.
     pub control: f64,

@@ -22,7 +22,7 @@ macro_rules! register {
             }
         )+
 
-        /// The laws of both ends of bonds.
+        /// The two laws of a bond: the laws of points i and j.
         #[derive(Debug, Clone, Copy)]
         pub enum PairLaw {
             $($law([$law; 2]),)+
@@ -60,7 +60,7 @@ macro_rules! register {
         pub(crate) use with_law;
 
         /// Evaluate an expression in which a name stands for the two laws in a [`PairLaw`]. The expression is
-        /// compiled once per law.
+        /// compiled once for each law, and once for points with different laws.
         macro_rules! with_pair {
             ($d pair:expr, $d laws:ident => $d body:expr) => {
                 match $d pair {

@@ -16,9 +16,10 @@
 //! f_t is the largest stress in uniaxial tension. This stress is computed by quadrature over the directions
 //! of the bonds.
 //!
-//! Stretching a bond to sc dissipates c |ξ| A with A = ∫ F dκ. Breaking a `pmb` bond at the stretch s_e
-//! dissipates c |ξ| s_e²/2. Let s_e be the critical stretch of `pmb` for a given fracture energy. With
-//! A = s_e²/2, the bonds across a unit area dissipate this fracture energy. This holds in every dimension.
+//! Let s_e be the critical stretch of `pmb` for a given fracture energy. Breaking a `pmb` bond at the stretch
+//! s_e dissipates c |ξ| s_e²/2. Stretching a bond of this law to sc dissipates c |ξ| A with A = ∫ F dκ. With
+//! A = s_e²/2, the bonds across a unit area dissipate the given fracture energy. This holds in every
+//! dimension.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -46,7 +47,7 @@ pub struct SofteningPmb {
     pub curve: SofteningCurve,
 }
 
-/// Decrease of a bond's force.
+/// Shape of the decrease of a bond's force between the stretches s0 and sc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SofteningCurve {
     /// Two straight lines that meet at the stretch `kink`, where the force is `kink_force` times the
@@ -67,7 +68,7 @@ pub enum SofteningCurve {
 /// Residual r of the exponential curve: the value of exp(−(κ − s0)/a) at κ = sc.
 const RESIDUAL: f64 = 0.01;
 
-/// Number of decay stretches from s0 to sc, ln(1/r).
+/// Ratio (sc − s0)/a = ln(1/r), with the decay stretch a.
 const DECAYS: f64 = 4.605_170_185_988_092;
 
 /// β and γ of a straight line.
@@ -206,7 +207,7 @@ fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     })
 }
 
-/// Return β and γ of a curve of lines.
+/// Return β and γ of a bilinear or trilinear curve.
 fn kink(values: &Values) -> [f64; 2] {
     if values.word(CURVE.name) == "bilinear" {
         return STRAIGHT;
@@ -254,7 +255,7 @@ fn critical_stretch(given: &Given, strength: f64) -> f64 {
 /// iteration gains more than half a digit of s0.
 const STRENGTH_ITERATIONS: u32 = 8;
 
-/// Return s0 and sc from the keys of the deck. If no valid curve exists, sc is not above s0.
+/// Return s0 and sc from the keys of the deck. sc is above s0 only if the keys give a valid softening curve.
 fn stretches(given: &Given) -> (f64, f64) {
     let values = given.values;
     if let Some(strength) = number(values, &STRENGTH_STRETCH) {
@@ -278,7 +279,7 @@ fn stretches(given: &Given) -> (f64, f64) {
     (strength, critical_stretch(given, strength))
 }
 
-/// Create the curve F between these s0 and sc.
+/// Create the curve F between s0 and sc. `strength` is s0, and `critical` is sc.
 fn curve(values: &Values, strength: f64, critical: f64) -> SofteningCurve {
     let falls = critical - strength;
     if values.word(CURVE.name) == "exponential" {
@@ -300,7 +301,7 @@ fn rounded(number: f64) -> String {
 }
 
 /// Return the error message if sc is not above s0, because bonds would then break before they soften. A
-/// possible cause is a long horizon: the bonds then store more than the fracture energy already at s0.
+/// possible cause is a long horizon: the energy that the bonds store at s0 then exceeds the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -338,11 +339,11 @@ fn build(given: &Given) -> Built {
     })
 }
 
-/// Number of bond directions between the axis of tension and the plane normal to this axis, in the quadrature
-/// of the stress.
+/// Number of bond directions in the quadrature of the stress. The directions lie between the axis of tension
+/// and the plane normal to this axis.
 const DIRECTIONS: usize = 64;
 
-/// Factor of the strain from one sample to the next in the search for the largest stress.
+/// Strain of a sample, divided by the strain of the previous sample, in the search for the largest stress.
 const STRAIN_GROWTH: f64 = 1.02;
 
 /// The search for the largest stress ends when the stress is below this fraction of the largest stress so

@@ -8,8 +8,8 @@ use super::netcdf::Netcdf;
 use super::{BLOCK, Group, Members, Mesh, Runs, SIDE_SET, fault, position};
 use crate::error::{Result, excerpt};
 
-/// Node orders of Exodus that differ from those of [`super::kind`]: for each node after the corners, the
-/// corners between which the node lies.
+/// Node orders of Exodus that differ from the orders of [`super::kind`]. An order has one entry for each node
+/// after the corners: the corners between which this node lies.
 mod orders {
     use super::Between;
 
@@ -85,7 +85,8 @@ fn kind(name: &str, nodes: usize) -> Option<Kind> {
     is_known.then_some(Kind::new(form, nodes))
 }
 
-/// Return for each node of a type, in the order of [`super::kind`], its position in the order of Exodus.
+/// Return the position of each node of an element type in the node order of Exodus. The result has the node
+/// order of [`super::kind`].
 fn order(kind: Kind) -> Vec<usize> {
     kind.permutation(match (kind.form, kind.nodes) {
         (Form::Hexahedron, 20) => orders::HEXAHEDRON_20,
@@ -199,7 +200,8 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
 /// Return the volumes of a block of `count` sphere elements; empty if the block has no volumes.
 ///
 /// The volume is the attribute whose name ends with `volume`. In a block without names of attributes, the
-/// volume is the second attribute, as in the files of Peridigm. There, the first attribute is a radius.
+/// volume is the second attribute, as in the files of Peridigm. In the files of Peridigm, the first attribute
+/// is a radius.
 fn sphere_volumes(file: &Netcdf, block: usize, name: &str, count: usize) -> Fault<Vec<f64>> {
     let [variable, names] = ["attrib", "attrib_name"].map(|prefix| format!("{prefix}{block}"));
     if !file.has(&variable) {
@@ -281,8 +283,8 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
 
 /// Return the number (from 1), id and name of each block or set. Ids and names are in variables whose names
 /// start with `prefix`, such as `eb`. If the file has no ids, there is one block or set for each of the
-/// variables `VARIABLE1`, `VARIABLE2`, …, and its number is also its id. A missing name becomes
-/// `DEFAULT_ID`, such as `block_3`.
+/// variables `VARIABLE1`, `VARIABLE2`, …. The id of each block or set is then its number. A missing name
+/// becomes `DEFAULT_ID`, such as `block_3`.
 fn entities(
     file: &Netcdf,
     prefix: &str,

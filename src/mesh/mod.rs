@@ -195,7 +195,7 @@ pub struct Group {
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
     /// Whether the group is a geometrical entity. A deck can give a number without the kind of the group. If
-    /// an entity and another group have this number, the number means the other group.
+    /// both an entity and a group that is not an entity have this number, the number means the latter.
     pub is_entity: bool,
     /// Members of the group.
     pub members: Members,
@@ -259,9 +259,9 @@ impl Mesh {
     /// Find the group that `key` means, among the groups that `is_wanted` accepts.
     ///
     /// A key is a name or a number. The kind of the group may come before the name or number, such as in
-    /// `side set 1`. A number without a kind means a geometrical entity only if no other group has this
-    /// number. If the key means several groups of one kind, return the first of these groups. If the key
-    /// means no group, return `None`.
+    /// `side set 1`. A number without a kind means a geometrical entity only if all groups with this
+    /// number are geometrical entities. If the key means several groups of one kind, return the first of
+    /// these groups. If the key means no group, return `None`.
     ///
     /// # Errors
     /// If the key means groups of different kinds; the message lists these groups.

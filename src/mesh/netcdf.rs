@@ -243,8 +243,8 @@ impl<'a> Cursor<'a> {
         Ok(String::from_utf8_lossy(self.padded(length)?).into_owned())
     }
 
-    /// Read the number of entries of a list. If the number is too large, reading the entries fails at the end
-    /// of the file, because each entry takes bytes.
+    /// Read the number of entries of a list. The number is not checked: if it is too large, reading the
+    /// entries fails at the end of the file, because no entry is empty.
     fn list(&mut self) -> Fault<usize> {
         self.word()?;
         self.count()

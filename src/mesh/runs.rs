@@ -1,4 +1,4 @@
-//! Sets of whole numbers as ranges, because ids and indices of meshes are mostly consecutive.
+//! Sets of whole numbers, stored as ranges, because ids and indices of meshes are mostly consecutive.
 
 /// A set of whole numbers, as sorted ranges with gaps between them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -17,7 +17,7 @@ pub enum Creation {
     Truncate,
 }
 
-/// Open an existing file for reading; with a raw communicator, collectively.
+/// Open an existing file for reading. With a raw communicator, the call is collective.
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
     // No collective metadata reads: HDF5 1.10.8 deadlocks in such a read if the ranks have read different
     // rows before, because the metadata caches of the ranks then differ. Such reads are safe only for a new
@@ -25,7 +25,7 @@ pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hd
     options(raw, false)?.open(path)
 }
 
-/// Open an existing file for reading and writing; with a raw communicator, collectively.
+/// Open an existing file for reading and writing. With a raw communicator, the call is collective.
 pub(super) fn open_to_append(
     path: &Path,
     raw: Option<RawCommunicator>,
@@ -33,7 +33,7 @@ pub(super) fn open_to_append(
     options(raw, false)?.open_rw(path)
 }
 
-/// Create a file; with a raw communicator, collectively.
+/// Create a file. With a raw communicator, the call is collective.
 pub(super) fn create(
     path: &Path,
     raw: Option<RawCommunicator>,

@@ -22,14 +22,14 @@ use super::seal;
 /// Names of the two files.
 const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 
-/// Name of the temporary file.
+/// Name of the file into which a checkpoint is written. A complete file is renamed to one of [`NAMES`].
 const PART: &str = "checkpoint.part";
 
 /// Version of the file layout.
 const VERSION: i64 = 10;
 
-/// Test whether a path is in use. A link to a missing file also counts as in use, and so does a path
-/// that cannot be examined.
+/// Test whether a path exists. A link to a missing file counts as existing, and so does a path that cannot be
+/// examined.
 pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
@@ -38,7 +38,7 @@ pub fn is_taken(path: &Path) -> bool {
 /// step, load factors, rigid bodies).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
-    /// Number of the time step.
+    /// Number of completed time steps.
     pub number: u64,
     /// Time step, s.
     pub step: f64,

@@ -27,7 +27,7 @@ const OBJECT_BYTES: u64 = 8192;
 /// The file is abandoned: further calls fail. The handles of the file are leaked on purpose, because closing
 /// them makes HDF5 write, which would fail or hang again. The state of the last successful
 /// [`flush`](Self::flush) stays readable. The process can continue and call `MPI_Finalize`, provided that
-/// [`initialise`](super::transfer::initialise) was called before MPI.
+/// [`initialise`](super::transfer::initialise) was called before MPI started.
 ///
 /// # Full disk
 /// Rank 0 reserves the space before the ranks write (see [`Reservation`]). Otherwise, if the disk became
@@ -60,9 +60,9 @@ impl<'a> CollectiveFile<'a> {
     /// Create a file.
     ///
     /// # Errors
-    /// If the file exists and `creation` is exclusive, or the file cannot be created. If
-    /// [`initialise`](super::transfer::initialise) was not called before MPI. If there are several ranks, and
-    /// these ranks are threads instead of MPI processes.
+    /// If the file exists and `creation` is exclusive, or the file cannot be created. If the ranks are MPI
+    /// processes, and [`initialise`](super::transfer::initialise) was not called before MPI started. If there
+    /// are several ranks, and these ranks are threads instead of MPI processes.
     pub fn create(path: &Path, comm: &'a dyn Communicator, creation: Creation) -> Result<Self> {
         let raw = comm.raw();
         if raw.is_some() && !transfer::initialised_before_mpi() {
@@ -301,7 +301,7 @@ impl<'a> CollectiveFile<'a> {
         )
     }
 
-    /// Read an attribute of integers of a group (`/` for the root).
+    /// Read an attribute of a group (`/` for the root) as a list of integers.
     ///
     /// # Errors
     /// If the attribute is missing or cannot be converted to integers.

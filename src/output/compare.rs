@@ -15,10 +15,11 @@ const BLOCK: usize = 1 << 16;
 /// Largest difference of matched times, as a fraction of the interval between outputs or rows.
 const TIME_TOLERANCE: f64 = 1e-6;
 
-/// Largest difference of matched times, as a fraction of the last time: round-off of a sum over many steps.
+/// Largest difference of matched times, as a fraction of the last time. This limit allows for the round-off
+/// of a sum over many steps.
 const ROUND_OFF: f64 = 1e-13;
 
-/// Name of the reference positions among the fields.
+/// Name of the field with the reference positions.
 const POSITION: &str = "position";
 
 /// Name of the field by which points are matched.
@@ -148,8 +149,8 @@ impl Comparison {
     }
 }
 
-/// Compare two results. After each pair of outputs, `progress` is called with the number of the pair, the
-/// number of all pairs and the time (s).
+/// Compare two results. After each pair of outputs, `progress` is called with the count of compared pairs,
+/// the total count of pairs and the time (s).
 ///
 /// # Errors
 /// If a file is damaged. If the points of two outputs cannot be matched in order, and one of these outputs
@@ -191,7 +192,8 @@ pub fn compare(
 }
 
 /// Add the common fields, and the names of the fields that only one result has, to `comparison`. Return one
-/// flag per common field: true if at least one of the results stores values of the field for each output.
+/// flag per common field. The flag is true if at least one of the results stores separate values of the field
+/// for each output.
 fn common_fields(
     first: &ResultReader,
     second: &ResultReader,
@@ -230,9 +232,11 @@ struct OutputPair<'a> {
 
 /// How the points of two outputs are matched.
 enum Matching {
-    /// Block by block: the ids of both outputs ascend, or are the same sequence.
+    /// The points are matched one block after the other. The ids of both outputs ascend, or both outputs have
+    /// the same sequence of ids.
     InOrder,
-    /// By these pairs of rows, one row of each output, sorted by the row of the first output.
+    /// By these pairs of rows. A pair has one row of each output. The pairs are sorted by the row of the
+    /// first output.
     Rows(Vec<[usize; 2]>),
 }
 
@@ -317,7 +321,7 @@ impl OutputPair<'_> {
         self.readers[side].ids_of(self.indices[side], rows)
     }
 
-    /// Create the error for two points of an output with the same id.
+    /// Create the error for an output in which two points have the same id.
     fn repeated_id(&self, (side, id): (usize, u64)) -> Error {
         Error::input(format!(
             "{}: two points of the output at t = {} s have the id {id}; \
@@ -347,7 +351,8 @@ impl OutputPair<'_> {
         Ok(())
     }
 
-    /// Compare a field at pairs of rows. For each output, `ranges` has the range that contains these rows.
+    /// Compare a field at pairs of rows. For each output, `ranges` has the range from the smallest to the
+    /// largest row index in the pairs.
     fn compare_field(
         &self,
         pairs: &[[usize; 2]],
@@ -443,9 +448,8 @@ struct Matches {
 }
 
 impl Matches {
-    /// Match each time of the first list with the nearest unmatched time of the second list. Two tolerances
-    /// follow from [`TIME_TOLERANCE`] and [`ROUND_OFF`]. The difference of the times may be at most the
-    /// larger tolerance.
+    /// Match each time of the first list with the nearest unmatched time of the second list. The difference
+    /// of the times may be at most the larger of two tolerances; see [`TIME_TOLERANCE`] and [`ROUND_OFF`].
     fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
         let reach = |index: usize, time: f64| {

@@ -23,8 +23,8 @@ pub struct StoredField {
     pub components: usize,
     /// Number type of the stored values.
     pub number: Number,
-    /// The field has values for each step, because the field changes with time or each step has its own
-    /// points.
+    /// Whether the field has values for each step. True if the field changes with time, or if each step has
+    /// its own points.
     pub dynamic: bool,
 }
 
@@ -145,7 +145,7 @@ impl ResultReader {
         self.counts[time_index.min(self.counts.len() - 1)]
     }
 
-    /// Test whether each step has its own points.
+    /// Test whether the file stores a separate set of points for each step.
     pub fn is_changing(&self) -> bool {
         let id = self.file.dataset(&format!("{POINT_DATA}/id"));
         id.is_ok_and(|dataset| dataset.is_resizable())
@@ -199,8 +199,8 @@ impl ResultReader {
         Ok(values.as_chunks::<3>().0.to_vec())
     }
 
-    /// Return the global ids of the points at one of the [times](Self::times). All point data have the same
-    /// order.
+    /// Return the global ids of the points at one of the [times](Self::times). All other point data at this
+    /// time are in the same order.
     ///
     /// # Errors
     /// If the file is damaged or has no ids.
@@ -371,7 +371,7 @@ impl ResultReader {
     /// Check that the history, and all points and values of the first `steps` steps, are readable.
     ///
     /// # Errors
-    /// If the file is damaged or has fewer steps.
+    /// If the file is damaged or has fewer than `steps` steps.
     pub fn check(&self, steps: usize) -> Result<()> {
         let fields = self.fields()?;
         self.history()?;

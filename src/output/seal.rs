@@ -41,8 +41,8 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// Read the caller's number from the seal of a file, or return `None` if the file has no seal. The sealed
-/// bytes are not checked.
+/// Return the number in the seal of a file, as the caller of [`seal`] gave it. Return `None` if the file has
+/// no seal. The sealed bytes are not checked.
 ///
 /// # Errors
 /// If the file cannot be read.

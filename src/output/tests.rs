@@ -142,9 +142,9 @@ fn a_replaced_file_stays_readable_where_it_is_open() -> Result<()> {
     Ok(())
 }
 
-/// Write a result of a deck `one` with allocated space for two steps, and write these steps. Resume the
-/// result after its first step with the deck `deck`, and write three more steps. Return true if the file was
-/// continued in place.
+/// Create a result with the deck text `one` and with allocated space for two steps. Write these two steps.
+/// Resume the result after its first step with the deck text `deck`, and write three more steps. Return true
+/// if the file was continued in place.
 fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
 

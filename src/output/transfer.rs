@@ -132,7 +132,7 @@ struct Selection {
 }
 
 impl Selection {
-    /// Select the rows from `first_row` on that have `numbers` values in total.
+    /// Select consecutive rows that have `numbers` values in total, starting with row `first_row`.
     fn new(dataset: &hdf5::Dataset, first_row: u64, numbers: usize) -> hdf5::Result<Self> {
         let mut count: Vec<u64> = dataset.shape().iter().map(|&n| n as u64).collect();
         let mut start = vec![0; count.len()];

@@ -22,8 +22,8 @@ const HALO_WIDTH: usize = 3;
 
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
-/// `owned` are this rank's points after migration, `owner` is the rank of each cell, `total` is the number of
-/// points of all ranks, and `cutoff` (m) is slightly longer than the longest bond.
+/// `owned` are this rank's points after migration. `owner` is the rank of each cell. `total` is the number of
+/// points of all ranks. `cutoff` (m) is slightly longer than the longest bond.
 pub fn domain(
     comm: &dyn Communicator,
     cells: &Cells,
@@ -113,8 +113,8 @@ fn offers(
     (offers, edge)
 }
 
-/// Build the halo plan. `requests` are the ids and local indices of the ghosts from each rank. `border` are
-/// the border points; the first of them has the local index `interior`. Collective.
+/// Build the halo plan. For each rank, `requests` has the ids and local indices of the ghosts that belong to
+/// that rank. `border` are the border points; the first of them has the local index `interior`. Collective.
 fn halo(
     comm: &dyn Communicator,
     requests: Vec<(Vec<u64>, Range<usize>)>,

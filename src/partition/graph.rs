@@ -104,8 +104,9 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Multiply the estimated number of bonds of each occupied cell by a relative time per bond. This is the
-/// measured time per estimated bond of the cell's present owner, divided by the mean time per bond.
+/// Multiply the estimated number of bonds of each occupied cell by a relative time per bond. The time per
+/// bond of a rank is the measured time of the rank, divided by its estimated number of bonds. The relative
+/// time is the time per bond of the present owner of the cell, divided by the mean time per bond.
 fn weight_by_time(bonds: &mut [f64], occupied: &[usize], loads: &Loads) {
     let rank_of = |cell: usize| loads.owners[cell] as usize;
     let mut sums = vec![0.0; loads.times.len()];

@@ -29,8 +29,9 @@ pub fn distribute(
     distribute_by_time(comm, pieces, total, cutoff, None)
 }
 
-/// Same as [`distribute`], with the measured computing time of this rank's points (ns). Cells are weighted by
-/// the time of their present rank, and few points migrate.
+/// Same as [`distribute`], with the measured computing time of this rank's points (ns). The weight of a cell
+/// is multiplied by the time per bond of the present owner of the cell. Parts are numbered so that few points
+/// migrate.
 ///
 /// # Errors
 /// Same as for [`distribute`].

@@ -17,7 +17,7 @@ pub struct Vectors<'a> {
     pub values: &'a [[f64; 3]],
     /// Name of the field, for the legend.
     pub field: &'a str,
-    /// Unit of the vectors without prefix; empty if dimensionless.
+    /// Unit of the vectors, such as m, without a metric prefix; empty if dimensionless.
     pub unit: &'a str,
     /// Length, in the drawing plane, of the vector that the longest arrow represents. The arrows of longer
     /// vectors are cut. `None` to choose this length from the drawn points.
@@ -42,8 +42,9 @@ const WHITE: Colour = [255; 3];
 
 /// Draw arrows whose middles are at the points, and the legend.
 ///
-/// The length of an arrow is proportional to the length of the projected vector. The arrows of projected
-/// vectors longer than `longest` are cut. Only some points have arrows, so that arrows do not overlap.
+/// The length of an arrow is proportional to the length of the projected vector. If a projected vector is
+/// longer than `longest`, its arrow is cut to the length of the longest arrow. Only some points have arrows,
+/// so that arrows do not overlap.
 pub fn draw(
     pen: &mut Pen,
     marks: impl Iterator<Item = (Mark, [f64; 3])>,

@@ -16,8 +16,8 @@ use super::scene::Mark;
 /// the point. In comparison, the border of a square lattice cell is 0.5 to 0.71 sizes away from the point.
 const REACH: f64 = 0.6;
 
-/// Larger limit of the ratio in [`REACH`], for pixels between points. Such a pixel has points on all sides
-/// within the larger distance.
+/// Limit that replaces [`REACH`] at pixels between points. Such a pixel has points on all sides within this
+/// larger limit.
 const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
@@ -70,8 +70,8 @@ struct Pixel {
     colour: Colour,
     /// A point is within [`REACH`] of the pixel.
     is_near: bool,
-    /// Directions from the pixel in which there are points within [`REACH_INSIDE`]: one bit per eighth of a
-    /// full turn.
+    /// One bit per eighth of a full turn around the pixel, set if a point within [`REACH_INSIDE`] lies in
+    /// this direction.
     directions: u8,
 }
 

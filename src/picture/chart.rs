@@ -46,8 +46,8 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the square that marks an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Number of samples on each line between two points of a curve. The samples are used to find the possible
-/// places of the legend that the curve crosses.
+/// Number of samples on each line between two points of a curve. The samples show which possible places of
+/// the legend the curve crosses.
 const LINE_SAMPLES: usize = 32;
 
 /// Distance in pixels below which consecutive points of a curve are drawn as one point.

@@ -3,9 +3,9 @@
 use delaunator::{Point, triangulate};
 use rustc_hash::FxHashMap;
 
-/// Longest edge of a triangle in which values are interpolated, divided by the mean cell edge of the two
-/// ends. In a square lattice, this ratio is at most 1.41. Edges longer than the limit lie across holes,
-/// notches and open cracks.
+/// Maximum length of a triangle's edge, divided by the mean cell edge of the two points that this edge joins.
+/// Values are interpolated only in triangles whose edges are within this limit. In a square lattice, this
+/// ratio is at most 1.41. Edges longer than the limit lie across holes, notches and open cracks.
 const LONGEST_EDGE: f64 = 2.2;
 
 /// A point in the plane with a value.

@@ -22,9 +22,9 @@ const SMALL_CUBE: f64 = 10.0;
 /// Largest difference in depth between pixels whose brightness is averaged, divided by the edge of the cube.
 const SAME_SURFACE: f32 = 2.0;
 
-/// Limit of the cosine of the angle between the direction of view and the normal of a face. Below this limit,
-/// the larger cube behind a cube extends less along this normal. The limit is half the cosine in the
-/// isometric view.
+/// Limit of the cosine of the angle between the direction of view and the normal of a face. If the cosine is
+/// below this limit, the larger cube behind a cube is enlarged less along this normal. The limit is half the
+/// cosine in the isometric view.
 const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
 
 /// Smallest cosine of the angle between the direction of view and the normal of a painted face. Faces with a
@@ -40,7 +40,8 @@ pub struct Cubes<'a> {
     /// Decrease of depth along each of these edges: the cosine of the angle between the direction of view and
     /// the axis.
     cosines: [f64; 3],
-    /// Enlargement of the larger cube along x, y and z, divided by the edge of the cube in front of it.
+    /// Increase of the edges along x, y and z from a cube to the larger cube behind it, divided by the edge
+    /// of the cube.
     growth: [f64; 3],
     /// Surface that each pixel shows.
     surfaces: Vec<Surface>,
@@ -142,9 +143,10 @@ impl<'a> Cubes<'a> {
         (0..3).filter(move |axis| cosines[*axis] >= LEAST_COSINE)
     }
 
-    /// Paint the visible faces of a box without shading. The box is a cube, or the larger box behind the
-    /// cube. `centre` is the position of the centre of the box, and `depth` the depth of this centre. `sizes`
-    /// are the edges of the box along x, y and z, and `edge` is the edge of the cube, all in pixels.
+    /// Paint the visible faces of a box without shading. The box is a cube, or the larger box that is painted
+    /// behind a cube. `centre` is the position of the centre of the box, and `depth` the depth of this
+    /// centre. `sizes` are the edges of the box along x, y and z, and `edge` is the edge of the cube, all in
+    /// pixels.
     fn paint_box(
         &mut self,
         (centre, depth): ([f64; 2], f64),

@@ -45,7 +45,7 @@ const BOTTOM: f64 = 4.2;
 const UPRIGHT_BAR: f64 = 8.0;
 /// Room in text sizes for a horizontal colour bar and its labels.
 const LYING_BAR: f64 = 5.4;
-/// Additional room in text sizes for a ruler between the frame and the colour bar.
+/// Additional room for a ruler between the frame and the colour bar, in text sizes.
 const RIGHT: f64 = 3.0;
 /// Height in text sizes of the legend of the arrows, at the bottom of the picture.
 const LEGEND: f64 = 1.5;

@@ -199,7 +199,8 @@ fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)
 }
 
 /// Return the largest number (2 to 10) of intervals between the ticks of a ruler. `from` and `to` are the
-/// ends of the ruler, and `text` is the text size, all in pixels. Each label needs `spacing` text sizes.
+/// ends of the ruler, and `text` is the text size, all in pixels. Each label needs a length of `spacing`
+/// times `text` along the ruler.
 fn most_intervals_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     ((length / (spacing * text)) as usize).clamp(2, 10)
@@ -251,10 +252,10 @@ fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera)
     }
 }
 
-/// Smallest length of an edge of the box along which a ruler is drawn, in text sizes.
+/// Smallest length of a box edge that gets a ruler, in text sizes. The length is measured in the picture.
 const LEAST_RULER: f64 = 3.0;
 
-/// Draw rulers along outer edges of the box, one for each axis, and the axis triad. An axis that is almost
+/// Draw the axis triad. For each axis, draw a ruler along an outer edge of the box. An axis that is almost
 /// parallel to the direction of view has no ruler.
 fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds, camera: Camera) {
     let view = Projection::Orthographic(camera);

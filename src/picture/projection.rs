@@ -7,7 +7,7 @@ use super::scene::{Axis, Mark, Scene, View};
 pub enum Projection {
     /// The first coordinate only: a 1-D body, drawn as a strip.
     Strip,
-    /// Two coordinates, across and up.
+    /// Two coordinates: the first axis points to the right of the picture, the second axis up.
     Flat([Axis; 2]),
     /// All three coordinates, without perspective.
     Orthographic(Camera),
@@ -59,9 +59,9 @@ impl Camera {
     }
 
     /// Find the outer edge of a box along which the ruler of an axis is drawn. Return the corner at the low
-    /// end of the edge, and a unit vector in the picture (to the right and down) that points away from the
-    /// box. The corner has one entry per axis: true at the high end of this axis, false at the low end.
-    /// `None` if the axis is parallel to the direction of view.
+    /// end of the edge, and a unit vector in the picture that points away from the box. The corner has one
+    /// entry per axis: true at the high end of this axis, false at the low end. The components of the vector
+    /// are positive to the right and downwards. `None` if the axis is parallel to the direction of view.
     ///
     /// An outer edge belongs to one face that the camera sees and to one face that the camera does not see.
     /// Of the two outer edges along an axis, the ruler is at the edge that is lower in the picture. If these
@@ -118,7 +118,7 @@ impl Projection {
         }
     }
 
-    /// Return the position in the drawing plane, across and up, m.
+    /// Return the coordinates of a position in the drawing plane, m: the horizontal and the vertical one.
     pub fn project(self, position: [f64; 3]) -> [f64; 2] {
         match self {
             Self::Strip => [position[0], 0.0],

@@ -22,8 +22,8 @@ impl Scale {
     /// Create a scale from `low` to `high` with at most `most_intervals + 1` ticks. `unit` is the unit of
     /// both numbers.
     ///
-    /// The prefix of the unit suits numbers up to `magnitude`. Scales that belong together get the same
-    /// magnitude, so that their units have the same prefix.
+    /// The prefix of the unit suits numbers up to `magnitude`. For scales that belong together, pass the same
+    /// `magnitude`. Their units then have the same prefix.
     pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most_intervals: usize) -> Self {
         let (exponent, unit) = prefixed(unit, magnitude);
         let factor = 10_f64.powi(-exponent);

@@ -76,7 +76,7 @@ pub struct Scene<'a> {
     /// Name of the values, for the colour bar. If the name contains "damage", the colour map of damage and a
     /// range from 0 are the defaults.
     pub field: &'a str,
-    /// Unit of the values without prefix; empty if dimensionless.
+    /// Unit of the values, without an SI prefix; empty if dimensionless.
     pub unit: &'a str,
     /// The colour map; `None` for the default of the field.
     pub colours: Option<ColourMap>,
@@ -274,14 +274,14 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// Fraction of the vectors whose arrows are never cut. These vectors are the shortest vectors.
+/// Fraction of the vectors, counted from the shortest one, whose arrows are never cut.
 const WHOLE_ARROWS: f64 = 0.995;
 
-/// Let w be the length of the longest vector whose arrow is never cut (see [`WHOLE_ARROWS`]). Arrows are cut
-/// only if the longest of all vectors is longer than this ratio times w.
+/// Largest ratio L/w at which no arrow is cut. L is the length of the longest of all vectors, and w is the
+/// length of the longest vector whose arrow is never cut (see [`WHOLE_ARROWS`]).
 const LONG_ARROWS: f64 = 4.0;
 
-/// The points of a scene to draw, in painting order.
+/// The drawn points of a scene, in painting order.
 pub struct Marks<'a> {
     scene: &'a Scene<'a>,
     /// Indices of the points. Copies of the points would need more than ten times the memory.
@@ -340,7 +340,7 @@ impl Marks<'_> {
         }
     }
 
-    /// Return the box of the cells of the points, with a margin.
+    /// Return a box that contains the points and their cells, with a margin.
     pub fn extent(&self) -> Bounds {
         Bounds::of(self.iter())
     }

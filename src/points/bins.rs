@@ -96,8 +96,8 @@ impl Bins {
         coincident
     }
 
-    /// Call `run` with contiguous ranges of points that together include all points with distance² ≤ `square`
-    /// (m²) from a position.
+    /// Call `run` with slices of `entries`. The slices together include all points whose squared distance
+    /// from a position is at most `square` (m²), and may include other points.
     fn for_each_run(
         &self,
         position: [f64; 3],

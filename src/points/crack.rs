@@ -13,8 +13,8 @@ const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.
 ///
-/// - If an end of a bond lies in the plane of a crack without width, this end counts as on the side to which
-///   the normal points.
+/// - If an end of a bond lies in the plane of a crack without width, this end is treated as if it lay on the
+///   side to which the normal points.
 /// - A bond crosses a slot if the bond touches the volume between the faces of the slot.
 /// - Pass the end with the lower id first, so that both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
@@ -71,8 +71,8 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     }
 }
 
-/// Test with bounding boxes whether a bond can cross the crack. The bond starts at a position (m) and has at
-/// most this length (m). The result may be true for bonds that do not cross.
+/// Test with bounding boxes whether a bond can cross the crack. The bond starts at `position` (m) and is at
+/// most `length` (m) long. The result may be true for bonds that do not cross.
 pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     let (corners, width) = match crack {
         Crack::Segment { from, to, width } => ([*from, *to, *from, *to], width),

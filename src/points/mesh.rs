@@ -310,7 +310,7 @@ fn bodies_of_elements(
 ///
 /// If all elements that belong to no other body are such elements, the part is the whole rest of the mesh. In
 /// files of Exodus, the part may also be a block of spheres that no other body selects. In other files,
-/// single-node elements may define sets, so only the whole rest of the mesh counts.
+/// single-node elements may define sets, so the part can only be the whole rest of the mesh.
 fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {
     let is_left = |element: usize| bodies[element] == NO_BODY;
     let is_single = |element: usize| mesh.elements.kind(element).dimension() == 0;
@@ -345,8 +345,8 @@ fn has_single_nodes(mesh: &Mesh, block: &GroupKey) -> bool {
         .is_ok_and(|group| group.is_some())
 }
 
-/// Generate the points of the elements that belong to bodies. Also return the point of each element, or
-/// [`NO_POINT`].
+/// Generate the points of the elements that belong to bodies. Also return the point of each element;
+/// [`NO_POINT`] for an element that belongs to no body.
 fn points(
     dimension: Dimension,
     mesh: &Mesh,
@@ -408,7 +408,8 @@ fn points(
 /// negative if the nodes of a solid element have the order of a mirrored element.
 ///
 /// # Errors
-/// If det J changes sign within the element.
+/// If det J changes sign within the element. J is the Jacobian matrix of the map from the reference element
+/// to the element.
 fn solid(
     mesh: &Mesh,
     element: usize,

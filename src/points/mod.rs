@@ -96,8 +96,8 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Generate this rank's piece of the points. Return the piece and the total number of points on all ranks.
-/// The ids of a piece are contiguous per body. If several bodies share a file or mesh, the ids of the piece
-/// are contiguous per file or mesh. Collective.
+/// In a piece, the ids of the points of each body are contiguous. If several bodies share a file or mesh, the
+/// ids of all points of this file or mesh are contiguous instead. Collective.
 ///
 /// # Errors
 /// If a body has no points, or a rank has too many points. If a file is unreadable or invalid. If a set has

@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Test containment with all edges, without the index.
+    /// Same as [`Polygon::contains`], with a loop over all edges instead of the index.
     fn by_all_edges(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool {
         let edges = || {
             let next = vertices.iter().cycle().skip(1);

@@ -15,8 +15,8 @@ pub(super) const TOLERANCE: f64 = 1e-9;
 /// Largest cell number per direction; integers up to this number are exact in floating point.
 const FARTHEST: f64 = 1e15;
 
-/// If a union has more parts than this, overlapping parts are merged per direction. This limits the number of
-/// spans.
+/// If a union has more parts than this, the ranges of its parts along a direction are merged where they
+/// overlap or touch. This limits the number of spans.
 const MANY_PARTS: usize = 32;
 
 /// The cells whose centres can lie within a shape.
@@ -49,7 +49,8 @@ struct Span {
 
 impl Region {
     /// Find the candidate cells of a lattice with a cell corner at `origin` (m). The bounds of the shape are
-    /// enlarged by `margin` edges. `None` if some cells are too far from the origin to be numbered.
+    /// enlarged by `margin` times the cell edge on each side. `None` if some cells are too far from the
+    /// origin to be numbered.
     pub fn new(
         shape: &Shape,
         spacing: [f64; 3],
@@ -117,8 +118,8 @@ fn parts(shape: &Shape) -> Vec<&Shape> {
     }
 }
 
-/// Return the cells whose centres can lie within a box (m) that is enlarged by `margin` edges. `None` if
-/// cells are too far from the origin to be numbered.
+/// Return the cells whose centres can lie within a box (m). The box is first enlarged by `margin` times the
+/// cell edge on each side. `None` if cells are too far from the origin to be numbered.
 fn cells(
     (lower, upper): ([f64; 3], [f64; 3]),
     spacing: [f64; 3],
@@ -144,8 +145,9 @@ fn cells(
     Some(cells)
 }
 
-/// Compute the union of boxes as spans along `direction`, with nested spans along the lower directions. With
-/// more than [`MANY_PARTS`] boxes, the result may also contain cells outside the boxes.
+/// Compute the union of boxes as spans along `direction`. Spans along z contain spans along y, and spans
+/// along y contain spans along x. With more than [`MANY_PARTS`] boxes, the result may also contain cells
+/// outside the boxes.
 fn spans_along(boxes: &[&CellBox], direction: usize) -> Vec<Span> {
     let span = |cells: &CellBox| [cells.first[direction], cells.end[direction]];
     let mut spans: Vec<[i64; 2]> = boxes.iter().map(|cells| span(cells)).collect();

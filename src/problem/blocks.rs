@@ -13,8 +13,8 @@ const KINDS: usize = 3;
 /// their horizon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Lattice points with the full cell volume of their level. Without refinement, all points of a body have
-    /// this kind.
+    /// Lattice points whose volume is the full volume of a cell of their level. Without refinement, all
+    /// points of a body have this kind.
     Whole,
     /// Points with a smaller volume, next to finer points or at the edge of the body.
     Partial,

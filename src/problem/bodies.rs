@@ -1,4 +1,4 @@
-//! Bodies with their points, materials, bonds and damage; sets of points and pre-cracks.
+//! Bodies with their points, materials, bonds and damage. Also sets of points, and pre-cracks.
 
 use std::fmt;
 use std::ops::Range;
@@ -208,7 +208,7 @@ impl Interface {
     }
 
     /// Return how the bonds between two bodies break. The result does not depend on the order of the bodies.
-    /// If both are the same body, bonds break by its damage law.
+    /// If both are the same body, bonds break by the damage law of this body.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)

@@ -14,7 +14,7 @@ use crate::expression::Expression;
 const DEFAULT_SAFETY: f64 = 0.8;
 
 impl Problem {
-    /// Create a problem without bodies from a horizon (m) and an end time (s). All other settings have the
+    /// Create a problem with a horizon (m), an end time (s) and no bodies. All other settings have the
     /// defaults of a deck whose points are centres of cubic cells.
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {

@@ -79,8 +79,8 @@ impl Law {
         fault(&self.values, dimension)
     }
 
-    /// Return the fault if the law, or a word that is the value of one of its keys, has no 1-D form. `None`
-    /// if the law and all these words have a 1-D form.
+    /// Return the fault of the law in 1-D. There is a fault if the law has no 1-D form. There is also a fault
+    /// if the value of one of its keys is a word without a 1-D form. `None` if there is no fault.
     fn fault_of_a_line(&self) -> Option<LawFault> {
         let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
             (Kind::Word(words), Some(Value::Word(given))) => {

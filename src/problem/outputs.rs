@@ -218,8 +218,8 @@ pub struct JIntegral {
     pub direction: [f64; 3],
     /// Direction of the crack front, a unit vector; in 3-D only.
     pub front: Option<[f64; 3]>,
-    /// Width (m) of the layer along the inner side of the box faces. In this layer, the weight of the points
-    /// falls from 1 to 0 at the faces.
+    /// Width (m) of the layer along the inner side of the box faces. Across this layer, the weight of the
+    /// points falls from 1 to 0. The weight is 0 at the faces.
     pub layer: f64,
 }
 

@@ -17,8 +17,8 @@ pub struct Refinement {
     pub rule: HorizonRule,
     /// Factor on the horizon of each point that has points of a coarser level inside its horizon.
     pub interface_factor: f64,
-    /// Horizon of a bond between two points of one body whose horizons differ: each end uses its own horizon,
-    /// or both ends use the mean of the two horizons.
+    /// Rule for bonds between two points of one body, if the two points have different horizons: each end
+    /// uses its own horizon, or both ends use the mean of the two horizons.
     pub bonds: InterfaceRule,
     /// Regions that are refined from the start.
     pub regions: Vec<RefinedRegion>,
@@ -40,7 +40,7 @@ pub struct Trigger {
     pub energy: Option<f64>,
     /// Smallest damage that fulfils this criterion.
     pub damage: Option<f64>,
-    /// A condition on reference position and time that makes a point trigger refinement.
+    /// A condition on reference position and time. A point that fulfils this condition triggers refinement.
     pub condition: Option<Expression>,
     /// A condition on reference position and time that every triggering point must fulfil.
     pub only: Option<Expression>,

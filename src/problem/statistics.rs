@@ -1,4 +1,4 @@
-//! Settings of sums and extremes of fields over sets, for the history.
+//! Settings of history columns: sums, means and extremes of a field over a set of points.
 
 use std::ops::Range;
 

@@ -94,7 +94,7 @@ impl Method {
         }
     }
 
-    /// Return what to change in the deck if the method finds no equilibrium, as advice in the error message.
+    /// Return advice for the error message if the method finds no equilibrium: which keys to change.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 use super::Grids;
 use super::grid_index::GridIndex;
 
-/// Calculator of the fraction of a point that belongs to a set.
+/// Calculator that determines which fraction of a point belongs to a set.
 ///
 /// The fraction of a level-0 point is 0 or 1. The fraction of a finer point is the mean of the fractions of
 /// its parents. A point takes its volume in equal parts from its parents, so refinement does not change the

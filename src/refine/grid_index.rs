@@ -31,9 +31,9 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
     between(low, high).filter(move |other| *other != middle)
 }
 
-/// The grid index with a given number in a level-0 cell. The indices of a level in the cell are numbered from
-/// 0, with x fastest. Number 0 is `origin`, the index of the centre of the level-0 cell. All indices are in
-/// spacings of the level.
+/// Return the grid index with the number `number` in a level-0 cell. The grid indices of `level` in this cell
+/// are numbered from 0, with x fastest. Number 0 is `origin`, the index of the centre of the level-0 cell.
+/// All indices are in spacings of the level.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)
@@ -44,7 +44,8 @@ pub(super) fn halves(index: GridIndex) -> u32 {
     index.iter().map(|x| (x & 1) as u32).sum()
 }
 
-/// The coarsest level whose grid contains the position of an index, and the index in spacings of this level.
+/// Return the coarsest level whose grid contains the position of `index`, and the grid index of this position
+/// in spacings of that level. `index` is in spacings of `level`.
 pub(super) fn canonical(mut level: u32, mut index: GridIndex) -> (u32, GridIndex) {
     while level > 0 && halves(index) == 0 {
         level -= 1;

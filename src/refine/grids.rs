@@ -169,8 +169,8 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// Suppress each node that is new since `earlier` and has two parents that are separated. `separated`
-    /// tests this for the positions (m) of two parents.
+    /// Suppress each node that is new since `earlier`, if any two of its parents are separated. `separated`
+    /// tests whether two parents are separated, given their positions (m).
     pub fn suppress_separated(
         &mut self,
         earlier: &Self,
@@ -215,8 +215,8 @@ impl<'a> Grids<'a> {
         faces
     }
 
-    /// All refined nodes, then all suppressed nodes with their canonical level and index. Both lists are
-    /// sorted.
+    /// Two sorted lists: the refined nodes, and the suppressed nodes. A suppressed node is stored with its
+    /// canonical level, and with its index at this level.
     pub fn state(&self) -> [Vec<NodeKey>; 2] {
         let mut state = [Vec::new(), Vec::new()];
         for (body, grid) in (0..).zip(&self.bodies) {
@@ -258,15 +258,16 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// The grid index in spacings of the finest level at a position (m) in a body. `None` if the body is on
-    /// no lattice, or if the problem has no refinement.
+    /// Return the grid index of a position (m) in a body, in spacings of the finest level. `None` if the body
+    /// is on no lattice, or if the problem has no refinement.
     pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
-    /// Reference position (m) of a grid index in spacings of the finest level. `None` if the index is not on
-    /// the grid of level 0, if the body is on no lattice, or if the problem has no refinement.
+    /// Reference position (m) of the grid index `index`, which is in spacings of the finest level. `None` if
+    /// the index is not on the grid of level 0, if the body is on no lattice, or if the problem has no
+    /// refinement.
     pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
         (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))
@@ -396,7 +397,7 @@ impl<'a> Grids<'a> {
         Some(grid.pattern.changed())
     }
 
-    /// The cell of level 0 that contains a grid index in spacings of the finest level.
+    /// The cell of level 0 that contains the position `index`, counted in spacings of the finest level.
     pub fn cell_of(&self, index: GridIndex) -> GridIndex {
         index.map(|x| x >> self.finest)
     }

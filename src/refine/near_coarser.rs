@@ -8,21 +8,21 @@ use super::pattern::Pattern;
 pub struct NearCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// Indices, in spacings of the level, at which the refinement of coarser levels creates nodes in addition
-    /// to the grid of level 0. A node exists at such an index only if [`Pattern::is_possible`] holds there.
+    /// Indices at which the refinement of nodes of coarser levels adds nodes to the grid of level 0, in
+    /// spacings of the level. A node exists at such an index only if [`Pattern::is_possible`] holds there.
     finer: GridIndexSet,
     /// Bits of a word whose indices lie on the grid of level 0. These bits are the same for all words that
     /// contain indices of this grid.
     coarsest: u64,
-    /// For each bit of a word: the words that contain indices within the distance from the bit's index. Each
-    /// entry is the offset to such a word, and the bits of the indices in this word that lie within the
-    /// distance.
+    /// For each bit of a word, the words that contain indices near the index of the bit. An index is near if
+    /// it lies within the given distance. Each entry has the offset to such a word, and the bits of the near
+    /// indices in this word.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
 impl<'a> NearCoarser<'a> {
-    /// Create the test for a level above 0. `edges` is the spacing of the level, and `reach` is the distance
-    /// in the same unit.
+    /// Create the test for a level above 0. `edges` is the spacing of the level along each axis. `reach` is
+    /// the distance within which coarser nodes are sought, in the same unit as `edges`.
     pub fn new(pattern: &'a Pattern, level: u32, edges: [f64; 3], reach: f64) -> Self {
         let dimension = pattern.dimension();
         let mut finer = GridIndexSet::default();
@@ -66,8 +66,8 @@ impl<'a> NearCoarser<'a> {
         }
     }
 
-    /// Test whether a coarser node lies within the distance of the node at `index`. This is the case if, at
-    /// an index within the distance, a node of the level is possible but missing.
+    /// Test whether a coarser node lies within the distance of the node at `index`. The result is true if, at
+    /// an index within the distance, a node of the level is possible but does not exist.
     ///
     /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {
@@ -84,7 +84,8 @@ impl<'a> NearCoarser<'a> {
         })
     }
 
-    /// The bits of a word at which nodes exist. Bits of indices at which no node is possible have no meaning.
+    /// Return the bits of a word; a bit is set if a node exists at its index. Bits of indices at which no
+    /// node is possible have no meaning.
     fn occupied(&self, word: GridIndex) -> u64 {
         let steps = (1 << self.level).max(EDGE);
         let on_coarsest = word.iter().all(|x| x * EDGE % steps == 0);

@@ -20,7 +20,7 @@ pub struct Node {
 
 /// The refined nodes of a body, by level. A node is stored as a grid index in spacings of its level.
 ///
-/// - The `body` arguments test whether a level-0 cell belongs to the body.
+/// - The arguments `body` of the methods are functions that test whether a level-0 cell belongs to the body.
 /// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level, except
 ///   next to suppressed nodes.
 /// - If a crack separates the parents of a new node, the node is suppressed. Crack faces then act like the
@@ -93,8 +93,9 @@ impl Pattern {
         self.permanent = self.refined.as_slice().into();
     }
 
-    /// The finest level at which a grid index is a refined node, and the index in spacings of this level. The
-    /// argument is in spacings of the finest level. `None` if the node is permanent or not refined.
+    /// The finest level at which the node at `index` is refined, and the index of the node in spacings of
+    /// this level. `index` is in spacings of the finest level of the pattern ([`Self::finest`]). `None` if
+    /// the node is permanent or not refined.
     pub fn refined_at(&self, index: GridIndex) -> Option<(u32, GridIndex)> {
         let finest = self.finest();
         let (coarsest, _) = canonical(finest, index);
@@ -153,7 +154,7 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The level-0 cells whose nodes may differ from the nodes without refinement.
+    /// The level-0 cells whose nodes may differ from the nodes of an unrefined grid.
     pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
         let mut changed = GridIndexSet::default();

@@ -1,8 +1,8 @@
 //! Checks of the energy balance, which detect unstable time steps and lost energy.
 //!
 //! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
-//! last load step or the start. Negative fracture energy is left out of this change. The energy input is
-//! `EnergyWatch::input`.
+//! last load step. In a run without an earlier load step, it is the change since the start of the run.
+//! Negative fracture energy is left out of this change. The energy input is `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -30,8 +30,9 @@ const CERTAIN_GAIN: f64 = 1e9;
 /// printed.
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
-/// Error of the energy balance at the end of a run, as a fraction of the largest energy, above which a
-/// warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on coarse grids.
+/// Fraction of the largest energy. If the error of the energy balance at the end of a run exceeds this
+/// fraction, a warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on
+/// coarse grids.
 const MAX_FINAL_ERROR: f64 = 0.2;
 
 /// Strain below which strain energy may be round-off.
@@ -68,7 +69,7 @@ pub struct EnergyWatch {
     /// Maximum energy input so far, J. The energy input is |initial energy| + |work of loads and supports| +
     /// [`HistoryRow::step_energy`].
     input: f64,
-    /// Energy gain up to the last load step, J.
+    /// Energy gain from the start of the run to the latest load step, J; 0 before the first load step.
     gain_of_load_steps: f64,
     /// Whether a warning about an energy gain has been printed.
     warned: bool,
@@ -108,7 +109,7 @@ impl EnergyWatch {
     /// says whether this row is the last of the run. The warnings are the same on all ranks.
     ///
     /// # Errors
-    /// If a time step is clearly unstable, see [`Self::check`].
+    /// If a time step is clearly unstable; [`Self::check`] states the limits.
     pub fn check_row<const D: usize>(
         &mut self,
         row: &HistoryRow,
@@ -239,8 +240,8 @@ impl EnergyWatch {
     }
 }
 
-/// Return the energy gain since the start of the run, J. Negative fracture energy means that breaking bonds
-/// have added energy, which would hide part of the gain, so it is left out.
+/// Return the energy gain since the start of the run, J. If breaking bonds have added energy, the fracture
+/// energy is negative. A negative fracture energy is left out, because it would hide part of the gain.
 fn gain_since_start(row: &HistoryRow) -> f64 {
     row.energies.error - row.energies.fracture.min(0.0)
 }

@@ -23,8 +23,8 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data to ranges of ids. `rows` are the rows of the points in the result, within
-    /// this rank's range; `None` for all rows. `steps` is the expected number of outputs. Collective.
+    /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range whose points
+    /// are in the result; `None` for all rows. `steps` is the expected number of outputs. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,

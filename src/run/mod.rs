@@ -505,8 +505,8 @@ impl<'a> Job<'a> {
         Ok((checkpoints, recorder))
     }
 
-    /// Rename the existing files that cannot be continued, so that new files can be created, and report the
-    /// reason. Collective.
+    /// Rename the existing files that cannot be continued, so that new files can be created. Report why these
+    /// files cannot be continued. Collective.
     fn set_aside<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

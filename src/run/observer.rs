@@ -37,7 +37,7 @@ impl Observer for Unobserved {}
 /// A message of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
-    /// The folder is locked; the set-up starts.
+    /// The run has locked its folder and starts the set-up.
     Started,
     /// The set-up of points and bonds is complete.
     SetUp {

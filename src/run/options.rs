@@ -19,9 +19,8 @@ pub struct Options {
     pub started: Instant,
     /// Signals that stop the run or request a checkpoint.
     pub signals: Option<Signals>,
-    /// The deck; `None` for a problem that was built in Rust. Errors and warnings refer to lines of the deck,
-    /// the result contains the text of the deck, and a restart compares the deck with the deck of the
-    /// checkpoint.
+    /// The deck; `None` for a problem that was built in Rust. Errors and warnings refer to lines of the deck.
+    /// The result contains the text of the deck. A restart compares the deck with the deck of the checkpoint.
     pub deck: Option<Deck>,
     /// Additional attributes of the result: name and text, such as the command line. The attributes of rank 0
     /// are used.

@@ -31,7 +31,7 @@ pub struct OutputFile<'a> {
     /// Index of this output among the further outputs that count newly broken bonds; `None` for other
     /// outputs.
     counter: Option<usize>,
-    /// Rows of the points in the result, within this rank's range of ids; `None` for all rows.
+    /// Rows of this rank's range of ids whose points are in the result; `None` for all rows.
     rows: Option<Vec<usize>>,
     /// The side-car; on rank 0 only.
     side_car: Option<SideCar>,
@@ -173,8 +173,7 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// Find the rows of the points in the result, within this rank's range of ids; `None` for all rows.
-/// Collective.
+/// Find the rows of this rank's range of ids whose points are in the result; `None` for all rows. Collective.
 ///
 /// # Errors
 /// If the set of the output is empty.

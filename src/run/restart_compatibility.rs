@@ -7,8 +7,8 @@ use crate::problem::{Interval, Output, Problem};
 /// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
 
-/// In the description of a problem without a deck, the separator between the physics and the history
-/// definitions.
+/// Separator between the physics and the history definitions, in the description of a problem without a
+/// deck.
 const HISTORY: &str = "# its history\n";
 
 /// Maximum length of a line in a message, in characters.

@@ -16,8 +16,8 @@ const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// Receiver of the signals of this process.
 ///
-/// - SIGTERM, SIGINT, SIGUSR1: write a checkpoint and stop, within about ten steps. Another of these
-///   signals more than 1 s later ends the process at once.
+/// - SIGTERM, SIGINT, SIGUSR1: write a checkpoint and stop, within about ten steps. If another of these
+///   signals arrives more than 1 s later, the process ends at once.
 /// - SIGUSR2: write a checkpoint.
 #[derive(Clone)]
 pub struct Signals {

@@ -16,8 +16,8 @@ const LONGEST_HEADING: u64 = 1 << 20;
 
 /// Find the further results, with their side-cars, and the tables of cracks that a run of this problem does
 /// not replace. Files that have names like these, but were not written by an earlier run, are omitted. The
-/// names of the earlier cracks are read from the history file, so the function is called on rank 0 before
-/// that file is replaced.
+/// names of the earlier cracks are read from the history file. Therefore the function must be called before
+/// the run replaces this file. Only rank 0 calls the function.
 ///
 /// # Errors
 /// If the folder cannot be read.

@@ -123,8 +123,8 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn if a restarted run continues with another time step than a new run with the same end time would
-    /// use. Only runs with one stage are checked.
+    /// Warn if the time step of a restarted run differs from the time step that a new run with the same end
+    /// time would use. Only runs with one stage are checked.
     pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -1,4 +1,5 @@
-//! Decisions on checkpoints and stops, from signals, wall-clock time, deck and observer.
+//! Decisions to write a checkpoint or to stop the run. They depend on signals, the wall-clock time, the deck
+//! and the observer.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -18,9 +19,9 @@ const INTERVAL: f64 = 0.2;
 
 /// Fraction of the wall-clock limit reserved for the last checkpoint.
 const RESERVED_FRACTION: f64 = 0.05;
-/// Smallest reserved time, s.
+/// Smallest time reserved for the last checkpoint, s.
 const MIN_RESERVE: f64 = 0.5;
-/// Largest reserved time, s.
+/// Largest time reserved for the last checkpoint, s.
 const MAX_RESERVE: f64 = 60.0;
 
 /// Common decision of all ranks after an iteration of the time loop.
@@ -103,7 +104,7 @@ pub enum Reason {
     Observer,
 }
 
-/// Signals, wall clock and schedule on a rank, from which decisions are made.
+/// Signals, wall clock and schedule on a rank, for the decisions on checkpoints and stops.
 pub struct Watch<'a> {
     signals: Option<&'a Signals>,
     rule: CheckpointRule,

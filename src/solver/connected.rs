@@ -5,18 +5,18 @@ use crate::comm::total;
 use super::Simulation;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Replace each entry of each column by the minimum over the piece of its point. A column has an entry
-    /// per local point. The piece consists of the point and of all points, on any rank, that chains of intact
-    /// bonds connect to it. Collective.
+    /// In each column, replace the entry of every local point by the smallest entry in the piece of this
+    /// point. The piece consists of the point and of all points, on any rank, that chains of intact bonds
+    /// connect to it. Collective.
     pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
         let mut pieces = Pieces::new(self.model.volume.len());
         self.forces.for_each_intact(|i, j| pieces.join(i, j));
         self.spread_least_over(pieces, columns);
     }
 
-    /// Replace each entry of each column by the minimum over the piece of its point. A column has an entry
-    /// per local point. `pieces` are the pieces of this rank. Pieces of different ranks count as one piece if
-    /// they contain the same point. Collective.
+    /// In each column, replace the entry of every local point by the smallest entry in the piece of this
+    /// point. `pieces` are the pieces of this rank. Pieces of different ranks count as one piece if they
+    /// contain the same point. Collective.
     pub(super) fn spread_least_over(&mut self, mut pieces: Pieces, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
         loop {

@@ -12,7 +12,8 @@ use crate::points::bins::Bins;
 use crate::problem::{FamilyRule, Kind, PointSource, Problem, Quadrature};
 
 /// Tolerance as a fraction of a cell's edge: for points that must lie at cell centres, and for grids that
-/// must coincide. Two coordinates that differ by at most this fraction of the longest bond count as equal.
+/// must coincide. Also, two coordinates count as equal if their difference is at most this fraction of the
+/// length of the longest bond.
 const ON_GRID: f64 = 1e-6;
 
 /// Largest cell index; integers up to this size are exact in floating point.

@@ -1,4 +1,4 @@
-//! Progress of a run, without point data, as checkpoints store it.
+//! Progress of a run in the form that checkpoints store. It does not include point data.
 
 use super::Simulation;
 use super::conditions::LoadFactors;

@@ -52,7 +52,7 @@ pub struct Simulation<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// Conditions of the present stage.
     pub conditions: Conditions<D>,
-    /// Rules of all stages, and conditions of the other stages.
+    /// Rules of all stages, and conditions of all stages except the present stage.
     pub stages: Stages<D>,
     /// Quantities of the undeformed bodies.
     pub undeformed: Undeformed,
@@ -80,7 +80,7 @@ pub struct Undeformed {
     /// twice.
     pub cut: Vec<u64>,
     /// Number of intact bonds of the owned points before any bond could break. A bond between two owned
-    /// points counts twice. `None` if no bond can break at the start.
+    /// points counts twice. `None` if no bond can break at the initial positions, see `starts_deformed`.
     pub intact: Option<u64>,
     /// Stable step with the density of the materials, s.
     pub stable_step: f64,
@@ -504,7 +504,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Of the owned points whose motion, force or reaction is not finite, return the one with the smallest
-    /// id. `clock` gives the step and the time of the record.
+    /// id. The step and the time of the returned [`BadPoint`] are those of `clock`.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -533,9 +533,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ///
     /// # Errors
     /// - If a value is not finite. The message names a condition or initial value that is not finite, or a
-    ///   temperature that causes a thermal stretch of −1 or less. If there is none, the message names the
-    ///   first point whose values are not finite. If several points have such values first at the same
-    ///   step, this is the one with the smallest id.
+    ///   temperature that causes a thermal stretch of −1 or less. If all conditions and initial values are
+    ///   valid, the message names the first point whose values are not finite. If several points have such
+    ///   values first at the same step, this is the one with the smallest id.
     /// - If the motion of a rigid body is not finite. The message names this body.
     /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
     ///   is one.
@@ -592,8 +592,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// Complete a step of length `step` (s) with the forces at the new positions: loads, second half kick,
-/// supports and work. Returns whether all velocities and reactions are finite.
+/// Complete a step of length `step` (s) after the forces at the new positions have been evaluated: apply the
+/// loads, the second half kick and the supports, and add the work. Returns whether all velocities and
+/// reactions are finite.
 fn second_half<const D: usize>(
     part: &mut Part<'_, D>,
     conditions: &mut PartConditions<'_, D>,
@@ -695,8 +696,8 @@ fn protect<const D: usize>(
     }
 }
 
-/// Set `protected` to 1 at points of the no-failure sets of `damage`, if `is_own` is true for the block of
-/// the point.
+/// Set `protected` to 1 at the points of the no-failure sets of `damage`. Skip a point if `is_own` is false
+/// for the block of this point.
 fn mark_no_failure<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

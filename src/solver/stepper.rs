@@ -20,7 +20,7 @@ use super::simulation::Times;
 /// next step, in one loop over the points. Until then, the velocities, reactions and external forces do not
 /// yet have their values at the full step. The same holds for the external work, and for the power and energy
 /// of damping. Therefore a caller gets the [`Simulation`] only from [`Self::at_full_step`], which applies the
-/// pending half kick first. The number of these calls does not change the results.
+/// pending half kick first. The results do not depend on how often this function is called.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
     /// Whether the second half kick of the last step must still be applied.

@@ -21,7 +21,7 @@ const MOST_STEPS: f64 = 1e15;
 /// - If no point has a bond, and a stage has load steps or an automatic step.
 /// - If a stage has too many steps to count.
 /// - If a step is too long for viscous damping.
-/// - If the adaptive rule may repeat a step too often.
+/// - If the adaptive rule could repeat one step more than `MOST_REPEATS` times.
 pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     let mut start = 0.0;
     let choose = |stage: Stage| {
@@ -32,8 +32,8 @@ pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     problem.all_stages().into_iter().map(choose).collect()
 }
 
-/// Return a clock with equal steps. Their number is the total number of steps of all stages. `steps` contains
-/// the length of the first step (s) and the number of steps of each stage.
+/// Return a clock with equal steps. Their number is the total number of steps of all stages. For each stage,
+/// `steps` contains the length of the first step (s) and the number of steps.
 pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
     let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
     Clock::new(problem.time.end / all, problem.time.end)
@@ -106,7 +106,7 @@ const MOST_REPEATS: f64 = 100.0;
 
 /// Return an error if the adaptive rule may repeat a step too often, or if its smallest step gives too many
 /// steps. Also return an error if its largest step is too long for viscous damping. `length` is the duration
-/// of the stage (s), and `step` is the step without the rule (s).
+/// of the stage (s). `step` is the time step that the stage would have without the adaptive rule (s).
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
     let error = |message: String| Err(Error::input(message).at(&problem.spans.adaptive));
@@ -173,7 +173,7 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
 }
 
 /// Return the length of the first step (s) of a stage with an adaptive rule, and the number of steps of the
-/// stage if no bond breaks. `step` and `steps` are the length and the number of steps without the rule, and
+/// stage if no bond breaks. Without the rule, the stage would have `steps` steps of the length `step` (s).
 /// `length` is the duration of the stage, s. The first step is at most `largest`; later steps grow up to
 /// `largest`.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {

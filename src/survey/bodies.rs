@@ -45,8 +45,9 @@ impl BodyFigures {
         dimension.edge(self.volume / self.points as f64)
     }
 
-    /// Test whether the mean volume of points from a file or a mesh fits their mean distance to the nearest
-    /// neighbour, within a factor of `VOLUME_FACTOR`; `None` for points without neighbours.
+    /// Test whether the mean volume of points from a file or a mesh equals the volume of a reference cell,
+    /// within a factor of `VOLUME_FACTOR`. The edge of this cell is the mean distance to the nearest
+    /// neighbour. `None` for points without neighbours.
     pub fn volumes_fit(&self, dimension: Dimension) -> Option<bool> {
         let cell = self.cell(dimension);
         let ratio = self.volume / self.points as f64 / cell;

@@ -64,8 +64,8 @@ pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
     /// Total memory of all ranks at the peak of the time loop (during an output, a checkpoint, a restart or a
-    /// contact search), without ghosts, bytes. The entries are for runs on one rank and for runs on several
-    /// ranks.
+    /// contact search), without ghosts, bytes. The first entry is for runs on one rank, the second for runs
+    /// on several ranks.
     pub time_loop: [f64; 2],
     /// Disk space of the main result, including the history, and then of each further result.
     pub results: Vec<ResultCost>,

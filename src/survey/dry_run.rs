@@ -45,7 +45,7 @@ pub struct DryRun {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seconds {
     /// Time of a force evaluation in the first stage. An explicit time step makes one evaluation. An
-    /// iteration of a load step makes one or more.
+    /// iteration of a load step makes one or more evaluations.
     pub evaluation: f64,
     /// Time of a row of the history.
     pub row: f64,

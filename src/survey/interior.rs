@@ -32,8 +32,9 @@ pub struct Interior {
     pub exact: [f64; 2],
 }
 
-/// Compute the properties of a lattice body. The result is `None` for points that are not on a lattice, for
-/// families that are too large for a block, and if the block cannot be set up.
+/// Compute the properties of a lattice body from a small block of the lattice. The result is `None` if the
+/// points are not on a lattice, if the families are so large that the block has too many bonds, or if the
+/// block cannot be set up.
 pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     if !problem.bodies[body].is_on_lattice(problem.jitter) {
         return None;

@@ -153,9 +153,10 @@ fn without_effect<const D: usize>(
     }
 }
 
-/// Check a traction or pressure with the default depth, which is the spacing of a body. Warn if this depth
-/// differs from the thickness of the loaded layer by more than a factor of [`MAX_THICKNESS_RATIO`]. Layers of
-/// more than [`LARGE_LAYER`] points are not checked. Collective.
+/// Check a traction or pressure with the default depth. This depth is, for each point, the spacing of the
+/// body to which the point belongs. Warn if the depth differs from the thickness of the loaded layer by more
+/// than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked.
+/// Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,

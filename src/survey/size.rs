@@ -171,8 +171,8 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
 }
 
 /// Test whether a point is in the set of an output; `None` is the set of all points. For sets of ids, the
-/// result is meaningless and not used. All points count as members of a group of a mesh, because the ids of
-/// the points of a group are not known yet.
+/// result is meaningless and not used. If the set is a group of a mesh, the result is true for all points,
+/// because the ids of the points of the group are not known yet.
 fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f64; 3]) -> bool {
     set.map(|set| &problem.sets[set]).is_none_or(|set| {
         matches!(set.selector, Selector::Mesh(_))

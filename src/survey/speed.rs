@@ -28,7 +28,7 @@ pub struct Speed {
     pub instructions: Instructions,
     /// Time of the set-up.
     pub set_up: Duration,
-    /// Time of the steps.
+    /// Wall-clock time of all measured steps together.
     pub whole: Duration,
     /// Time of the steps by phase.
     pub times: Times,

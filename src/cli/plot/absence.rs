@@ -8,8 +8,8 @@ use super::painter::Painter;
 
 impl Painter<'_> {
     /// Check that the options `--slice`, `--clip` and `--threshold` leave points to draw in at least one of
-    /// these outputs. With `--log`, at least one drawn value must be above 0. Also check that the result of
-    /// `--minus` has outputs at the same times, with the same numbers of points.
+    /// these outputs. With `--log`, at least one drawn value must be above 0. For each of these outputs, also
+    /// check that the result of `--minus` has an output at the same time with the same number of points.
     ///
     /// # Errors
     /// If a check fails, or if the result is damaged.

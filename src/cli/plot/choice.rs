@@ -9,8 +9,8 @@ use fissure::picture::{Axis, Camera, ColourMap, View};
 
 use crate::cli::without_output;
 
-/// A requested time may be before the first output or after the last output, by at most this fraction of the
-/// first or last interval between outputs.
+/// Largest distance from the nearest output, for a requested time before the first or after the last output.
+/// The distance is a fraction of the interval between the first two or the last two outputs, respectively.
 const TIME_REACH: f64 = 0.5;
 
 /// Fields that are drawn by default, in order of preference.
@@ -77,9 +77,9 @@ pub fn choose_times(text: &str, path: &Path, times: &[f64]) -> Result<Vec<usize>
     chosen.collect()
 }
 
-/// Return the field to draw. If `name` is given, this is the field with this name. Otherwise, it is the first
-/// of these fields that exists:
-/// - the first existing field of [`PREFERRED`],
+/// Return the field to draw. If `name` is given, return the field with this name. Otherwise, return the first
+/// of these choices that exists:
+/// - the field of the result that comes first in [`PREFERRED`],
 /// - the first field that is stored for each output and is not `id`,
 /// - the first field of the result.
 ///
@@ -111,7 +111,7 @@ pub fn choose_field<'a>(
     })
 }
 
-/// Return the colour map with a name.
+/// Return the colour map that has the name `name`.
 ///
 /// # Errors
 /// If there is no such colour map.
@@ -148,8 +148,9 @@ fn camera_of(text: &str) -> Result<Camera> {
 /// `--slice` and `--camera`.
 ///
 /// # Errors
-/// If the text of the slice is not AXIS=POSITION, if the text of the camera is not AZIMUTH,ELEVATION with an
-/// elevation from -90 to 90 degrees, or if one of these options is given and the body is not 3-D.
+/// - If the slice is not of the form AXIS=POSITION.
+/// - If the camera is not of the form AZIMUTH,ELEVATION, or the elevation is not from -90 to 90 degrees.
+/// - If one of these options is given, but the body is not 3-D.
 pub fn view(slice: Option<&str>, camera: Option<&str>, dimension: usize) -> Result<View> {
     let wanted = "--slice must be AXIS=POSITION, such as z=0.005";
     let given = camera.is_some();

@@ -9,7 +9,7 @@ use fissure::output::ResultReader;
 const CHUNK: usize = 1 << 18;
 
 /// Largest difference of coordinates that count as equal, as a fraction of the extent of the body.
-/// Coordinates of points in one row of a lattice differ by round-off.
+/// Coordinates that are equal in an exact lattice can differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
 /// A body of n points counts as scattered if its number of combinations exceeds this constant times n^1.5.
@@ -40,7 +40,7 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
 /// empty in 1-D and without outputs.
 ///
 /// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z
-/// coordinates of its points. A body of n points is scattered if this number is above
+/// coordinates of its points. A body of n points is scattered if its number of combinations is above
 /// [`MOST_COMBINATIONS`] n^1.5. The number of combinations is about n for a lattice; for scattered points, it
 /// is n² in 2-D and n³ in 3-D. In 2-D, 16 points or fewer never count as scattered.
 ///

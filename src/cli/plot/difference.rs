@@ -9,7 +9,8 @@ use fissure::output::ResultReader;
 use super::quantity::Quantity;
 use crate::cli::result_file;
 
-/// Largest difference of two times that count as equal, as a fraction of the larger absolute time.
+/// Relative tolerance of times. Two times count as equal if they differ by at most this fraction of the
+/// larger absolute time.
 const SAME_TIME: f64 = 1e-9;
 
 /// The result that `--minus` names. Its values are subtracted from those of the minuend, the drawn result.
@@ -68,11 +69,12 @@ impl Subtrahend {
         Ok(own)
     }
 
-    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the quantity
-    /// at the points `points` of output `index` of `minuend`.
+    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the values
+    /// of the minuend: the quantity at the points `points` in the output `index`.
     ///
     /// # Errors
-    /// If the subtrahend has no output at the same time, has other points, or is damaged.
+    /// If the subtrahend has no output at the time of output `index` of `minuend`, if the two outputs have
+    /// different points, or if one of the two files is damaged.
     pub fn subtract(
         &self,
         (minuend, index): (&ResultReader, usize),

@@ -15,7 +15,7 @@ pub struct Clip {
     axis: Axis,
     /// True if the half space is below `position`, false if it is above.
     is_below: bool,
-    /// Coordinate of the plane that bounds the half space, m.
+    /// Coordinate along `axis` of the plane that bounds the half space, m.
     position: f64,
 }
 

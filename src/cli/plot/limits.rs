@@ -20,7 +20,7 @@ const DECADES: i32 = 6;
 /// Requested range of the colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
-    /// All values, or [`PERCENTILES`] if there are outliers.
+    /// All values. If there are outliers, the values between the two [`PERCENTILES`].
     Automatic,
     /// All values.
     All,
@@ -77,7 +77,7 @@ pub struct Limits {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Cut {
     Nothing,
-    /// Exclude values beyond two percentiles.
+    /// Exclude values below the first percentile and above the second percentile.
     Percentiles([f64; 2]),
     /// Exclude values that are more than [`DECADES`] decades below the largest value.
     Decades,
@@ -85,8 +85,8 @@ enum Cut {
 
 impl Limits {
     /// Return the limits of some values for a requested range; `None` without values. For [`Range::Values`],
-    /// the limits are those of all values, because the painter applies the two numbers itself. The limits are
-    /// also those of all values if the values at the two percentiles are equal.
+    /// the limits are those of all values, because the painter applies the two numbers of this range itself.
+    /// The limits are also those of all values if the values at the two percentiles are equal.
     pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);
@@ -118,7 +118,7 @@ impl Limits {
         })
     }
 
-    /// Return the limits of the values above 0 on a logarithmic scale; `None` if no value is above 0. The
+    /// Return the limits of a logarithmic scale for the values above 0; `None` if no value is above 0. The
     /// automatic range covers at most [`DECADES`] decades.
     pub fn logarithmic(mut values: Vec<f64>, asked: Range) -> Option<Self> {
         values.retain(|value| *value > 0.0);
@@ -136,7 +136,7 @@ impl Limits {
         Some(limits)
     }
 
-    /// Test whether a rule that excludes values sets the ends of the colour bar.
+    /// Test whether the ends of the colour bar follow from a rule that excludes values.
     pub fn is_cut(&self) -> bool {
         self.cut != Cut::Nothing
     }

@@ -24,7 +24,7 @@ use picture::PictureArguments;
 
 /// Draw a field of a result, or curves of a history.
 ///
-/// Draws plane bodies in their plane, and solids as a camera sees them or as a slice. With `--y`, draws
+/// Draws a plane body in its plane. Draws a solid in the view of a camera, or as a slice. With `--y`, draws
 /// columns of histories or of CSV files as curves.
 #[derive(Args)]
 #[command(after_help = "\
@@ -75,7 +75,7 @@ pub struct PlotArguments {
     x: Option<String>,
 
     /// Path of the picture: .png, for curves also .svg [default: in the folder of the result, named after the
-    /// field and component, or after the columns].
+    /// field and component; for curves, named after the columns].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -83,8 +83,10 @@ pub struct PlotArguments {
 /// Draw one picture of a field, several pictures side by side, or curves.
 ///
 /// # Errors
-/// If a file is not a result, an argument is wrong, the field, component or column is missing, or a picture
-/// cannot be written.
+/// - If a file is not a result.
+/// - If an argument is wrong.
+/// - If the field, component or column is missing.
+/// - If a picture cannot be written.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let is_table = |path: &PathBuf| curves::is_csv(path);
     let curves = !arguments.y.is_empty() || arguments.results.iter().any(is_table);

@@ -65,8 +65,8 @@ pub(super) struct Points {
 }
 
 impl<'a> Painter<'a> {
-    /// Create a painter of `result`, whose file is `path`. The default field, the automatic displacement
-    /// factor, and the distinction between lattices and scattered points follow from the output `reference`.
+    /// Create a painter of `result`, whose file is `path`. The output with the index `reference` determines
+    /// the default field, the automatic displacement factor, and which bodies have scattered points.
     ///
     /// # Errors
     /// If an argument is wrong for this result, or if a result cannot be read.
@@ -378,8 +378,8 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Return, for each of the points `points` of output `index`, whether its body has scattered points. The
-    /// returned vector is empty if no body has scattered points.
+    /// Return one flag for each of the points `points` of output `index`. The flag says whether the body of
+    /// the point has scattered points. The returned vector is empty if no body has scattered points.
     fn are_scattered(&self, index: usize, points: ops::Range<usize>) -> Result<Vec<bool>> {
         if !self.scattered.contains(&true) {
             return Ok(Vec::new());
@@ -427,8 +427,8 @@ impl<'a> Painter<'a> {
         }))
     }
 
-    /// Draw an output. The title contains the text `time`. The drawn box, the limits of the values and the
-    /// length of the arrows come from `frame`, or from the output if `frame` is `None`.
+    /// Draw an output. `time` is the time as text, for the title. The drawn box, the limits of the values and
+    /// the length of the arrows come from `frame`, or from the output if `frame` is `None`.
     ///
     /// # Errors
     /// If the result is damaged, or has too many points for a picture.

@@ -35,7 +35,7 @@ pub struct PictureArguments {
     )]
     pub(super) deform: String,
 
-    /// Draw only the layer of points of a solid at this plane, such as z=0.005 (m).
+    /// Draw only one layer of points of a solid: the layer at this plane, such as z=0.005 (m).
     #[arg(long, value_name = "AXIS=POSITION")]
     pub(super) slice: Option<String>,
 
@@ -74,7 +74,7 @@ pub struct PictureArguments {
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(super) range: Option<String>,
 
-    /// Subtract another result, which must have the same points, and outputs at the same times.
+    /// Subtract another result. The other result must have the same points, and outputs at the same times.
     #[arg(long, value_name = "RESULT", conflicts_with = "log")]
     pub(super) minus: Option<PathBuf>,
 
@@ -92,8 +92,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) colors: Option<String>,
 
-    /// Logarithmic scale of the colours. Points with values of 0 or less are grey, or pale blue in the colour
-    /// map grey.
+    /// Logarithmic scale of the colours. Points with values of 0 or less are grey, or pale blue with the
+    /// colour map `grey`.
     #[arg(long)]
     pub(super) log: bool,
 
@@ -102,8 +102,8 @@ pub struct PictureArguments {
     pub(super) width: u32,
 }
 
-/// Draw one output of a result (the last output, or the output nearest to a time), or draw all outputs, each
-/// as a separate picture.
+/// Draw outputs of a result, each as a separate picture: the last output, the outputs nearest to given times,
+/// or all outputs.
 ///
 /// # Errors
 /// If the file is not a result, an argument is wrong, the field or component is missing, or a picture

@@ -10,7 +10,7 @@ use fissure::output::StoredField;
 pub struct Quantity {
     /// Name of the field.
     pub field: String,
-    /// Name of the quantity on the colour bar.
+    /// Name of the quantity, as written on the colour bar.
     pub label: String,
     /// Unit of the quantity; empty if dimensionless.
     pub unit: String,
@@ -20,9 +20,9 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Create the quantity for a component or invariant of a field. If `component` is `None`, the quantity is
-    /// the value of a scalar, the magnitude of a vector or a full tensor, and the von Mises equivalent of a
-    /// symmetric tensor.
+    /// Create the quantity for a component or invariant of a field. If `component` is `None`, the kind of the
+    /// field determines the quantity: the value of a scalar, the magnitude of a vector or a full tensor, or
+    /// the von Mises equivalent of a symmetric tensor.
     ///
     /// # Errors
     /// If the field has no component or invariant with this name.

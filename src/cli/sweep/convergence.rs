@@ -7,7 +7,8 @@ const LARGEST_RATE: f64 = 30.0;
 const BISECTIONS: usize = 60;
 
 /// Compute the rate of convergence p of each row of a series; `None` for a row without a rate. Each row is a
-/// pair (h, f): a parameter such as the spacing, and the value of a run; f is `None` if the run has no value.
+/// pair (h, f). h is a parameter such as the spacing. f is the value of a run, or `None` if the run has no
+/// value.
 ///
 /// - With a reference, |f − reference| ∝ h^p gives p from a row and the previous row.
 /// - Without a reference, f − f₀ ∝ h^p with unknown f₀ gives p from a row and the previous two rows.

@@ -113,8 +113,8 @@ impl SweepArguments {
     }
 }
 
-/// Return the runs of all combinations. Validate the deck of each run, and check that its history has the
-/// columns of all values to pick.
+/// Return the runs of all combinations. Validate the deck of each run, and check that the history of the run
+/// has every column that a `--value` option names.
 ///
 /// # Errors
 /// If the deck is invalid with the values of a combination, or if a value has an unknown column. The message

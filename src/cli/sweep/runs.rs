@@ -41,10 +41,10 @@ pub struct Run {
     pub label: String,
     pub folder: PathBuf,
     pub set: Vec<(String, String)>,
-    /// The deck with all defaults.
+    /// Text of the deck with the values of this combination and with every default written out.
     pub deck: String,
-    /// Horizons and spacings (m), and time steps (s, or as a fraction of the stable step): see
-    /// [`resolution`].
+    /// Horizons (m), spacings (m) and time steps of the run, see [`resolution`]. A fixed time step is in s.
+    /// An automatic time step is a fraction of the stable step.
     pub resolution: Vec<f64>,
 }
 
@@ -77,8 +77,8 @@ impl Run {
     /// sweep.
     ///
     /// # Errors
-    /// If the folder holds another run of a sweep (without `overwrite`), or a result that is not of a
-    /// sweep.
+    /// If the folder holds a result that is not of a sweep. Without `overwrite`, also if the folder holds
+    /// another run of a sweep.
     pub fn check(&self, overwrite: bool) -> Result<()> {
         let path = self.folder.join(DECK);
         match std::fs::read_to_string(&path) {
@@ -118,7 +118,8 @@ impl Run {
     }
 }
 
-/// The program that executes a run: this executable, started by the command of `--launcher`.
+/// The program that executes a run: this executable. If `--launcher` is given, its command starts this
+/// executable.
 pub struct Program<'a> {
     arguments: &'a SweepArguments,
     fissure: PathBuf,

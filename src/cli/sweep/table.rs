@@ -19,7 +19,8 @@ pub struct Table<'a> {
     columns: &'a [Column],
     references: &'a [Option<f64>],
     abscissa: Option<usize>,
-    /// Compute rates even without a reference, because the runs differ in resolution or `--x` is given.
+    /// Whether rates are also computed for values without a reference. This is the case if the runs differ in
+    /// resolution or `--x` is given.
     has_rates: bool,
     /// Values by run and column; `None` for incomplete runs and for values that are not finite.
     values: Vec<Option<Vec<Option<f64>>>>,
@@ -33,7 +34,7 @@ struct Cells {
     /// Headings in the printed table, and in sweep.csv.
     heading: [String; 2],
     unit: String,
-    /// Texts of each run in the printed table, and in sweep.csv.
+    /// For each run, the text in the printed table and the text in sweep.csv.
     texts: Vec<[String; 2]>,
 }
 

@@ -59,7 +59,7 @@ pub struct Condition {
     /// with edges of different lengths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth: Option<Number>,
-    /// Outward normal for a pressure, of any length.
+    /// Outward normal for a pressure; a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normal: Option<Vector>,
 }

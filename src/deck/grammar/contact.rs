@@ -14,12 +14,13 @@ use crate::deck::spanned::Spanned;
 pub struct Contact {
     /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon.
     /// `"short-range"`: short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`:
-    /// contact only for pairs of bodies with their own `model`.
+    /// contact only for the pairs of bodies for which a table `[contact.pair.NAME]` gives another `model`.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// With `"penalty"`, Young's modulus of the layer in Pa. The default is the modulus of two equally thick
-    /// layers in series, one of each material. With `"short-range"`, the spring constant in Pa. The default
-    /// is 15 times the smaller bulk modulus of the two materials.
+    /// With `"penalty"`, Young's modulus of the layer in Pa. The default is 2E₁E₂/(E₁ + E₂), where E₁ and E₂
+    /// are Young's moduli of the two materials. This is the modulus of two equally thick layers of these
+    /// materials in series. With `"short-range"`, the spring constant in Pa. The default is 15 times the
+    /// smaller bulk modulus of the two materials.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// Distance in m between two points at which contact begins. The default is the mean edge of the cells of
@@ -77,7 +78,7 @@ pub struct ContactPair {
 pub enum ContactName {
     /// No contact.
     None,
-    /// Penalty contact with the stiffness of a layer of material.
+    /// Penalty contact: the force has the stiffness of a layer of material between the points.
     Penalty,
     /// Short-range forces.
     ShortRange,

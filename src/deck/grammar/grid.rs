@@ -99,7 +99,7 @@ pub struct Interface {
     /// Constants of the bonds between bodies. `"own"`: each end exerts its half of the force with its own
     /// modulus and horizon. `"average"`: both ends use the mean modulus and the mean horizon. `"minimum"`:
     /// both ends use the smaller modulus and the smaller horizon. `"none"`: bodies are not bonded, whatever
-    /// their distance. The default is `"own"`, or `"none"` with `[contact]`.
+    /// their distance. The default is `"none"` in a deck with `[contact]`, otherwise `"own"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
     /// Pairs of bodies with their own rule or damage law, by a freely chosen name.
@@ -118,8 +118,9 @@ pub struct Pair {
     pub rule: Option<Spanned<Rule>>,
     /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`
     /// these bonds never break. If neither `damage` nor `strength` is given, the bonds break by the damage
-    /// laws of the two bodies. If the two bodies have the same horizon, the smaller of the thresholds of
-    /// their damage laws applies.
+    /// laws of the two bodies. If the horizons of the two bodies are equal, a bond breaks at the smaller
+    /// threshold of the two damage laws. Otherwise, the critical stretch or critical work of a bond is
+    /// computed from both damage laws and both horizons.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch of
@@ -136,7 +137,7 @@ pub enum Rule {
     None,
     /// The means of the moduli and of the horizons.
     Average,
-    /// The smaller modulus and horizon.
+    /// The smaller of the two moduli, and the smaller of the two horizons.
     Minimum,
     /// Each end uses its own constants.
     Own,

@@ -37,7 +37,8 @@ pub const DAMPING: &str = "damping";
 /// Key of the coefficient of thermal expansion α in 1/K; 0 if not given.
 pub const THERMAL_EXPANSION: &str = "thermal_expansion";
 
-/// Key of the temperature without thermal strain, in the unit of prescribed temperatures; 0 if not given.
+/// Key of the reference temperature, at which the thermal strain is 0. It has the unit of prescribed
+/// temperatures, and is 0 if not given.
 pub const REFERENCE_TEMPERATURE: &str = "reference_temperature";
 
 /// Keys of the elastic constants: moduli in Pa, and Poisson's ratio.
@@ -230,10 +231,10 @@ pub struct BondEnergy {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vector>,
     /// How the critical work follows from the toughness. `"energy"`: breaking all bonds across an area
-    /// dissipates the fracture energy. `"opening"`: separating a block of the body into two halves requires
-    /// the fracture energy. The energy of this separation is computed before the run. `"willberg2022"`: eq.
-    /// 16 and 18 of Willberg et al. (2022). `"perilab"`: as in PeriLab, for 2-D and 3-D. `"peridigm2021"`: as
-    /// in Peridigm in 2021, for 2-D.
+    /// dissipates the fracture energy. `"opening"`: the energy for separating a block of the body into two
+    /// halves, per crack area, equals the fracture energy. This energy is computed before the run.
+    /// `"willberg2022"`: eq. 16 and 18 of Willberg et al. (2022). `"perilab"`: as in PeriLab, for 2-D and
+    /// 3-D. `"peridigm2021"`: as in Peridigm in 2021, for 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
     /// Whether only bonds that are longer than initially can break; true if not given. If false, compressed
@@ -300,7 +301,7 @@ pub enum StressMeasure {
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Calibration {
-    /// From the energy that breaking all bonds across an area dissipates.
+    /// From the energy that all bonds across an area dissipate when they break.
     #[default]
     Energy,
     /// From the computed energy of separating a block into two halves.

@@ -86,7 +86,8 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for MainKeys<'_, A> {
     }
 }
 
-/// Schema of [`Output`]; the value of any other key is a further result with the same schema.
+/// Schema of [`Output`]. Any key that [`Output`] does not have is the name of a further result, whose table
+/// has the same schema.
 impl JsonSchema for Outputs {
     fn schema_name() -> Cow<'static, str> {
         "Outputs".into()
@@ -144,7 +145,8 @@ pub struct History {
     /// the whole run is explicit, this default writes rows only at multiples of 20 steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
-    /// Steps between rows. Together with `every`, rows are only written at multiples of this number of steps.
+    /// Steps between rows. If `every` is also given, rows are written only at multiples of this number of
+    /// steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
     /// Sets whose reaction force is recorded, by component.
@@ -153,8 +155,8 @@ pub struct History {
     /// Reaction forces of sets, projected on a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether the number of fragments is recorded, and the mass and momentum of the fragment that has the
-    /// most points; false if not given.
+    /// Whether fragments are recorded: the number of fragments, and the mass and momentum of the fragment
+    /// that has the most points. False if not given.
     #[serde(default)]
     pub fragments: bool,
     /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not
@@ -262,7 +264,8 @@ pub struct Probe {
     pub fields: Vec<Text>,
 }
 
-/// Sums, means and extremes of a field over a set or body; one history column for each.
+/// Statistics of a field over a set or body, such as its sum, mean and extremes. Each statistic is one column
+/// of the history.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldStatistics {
@@ -286,7 +289,7 @@ pub struct FieldStatistics {
 pub enum Statistic {
     /// The sum over the points.
     Sum,
-    /// The sum of value times volume over the points.
+    /// The sum over the points: value times volume of each point.
     Integral,
     /// The integral divided by the volume of the set.
     Mean,

@@ -61,8 +61,8 @@ pub struct Trigger {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
     /// Time in s after which refined points are coarsened. During this time, they must lie outside the
-    /// horizons of all triggers and of all points with broken bonds. Each evaluation coarsens these points by
-    /// one level. If not given, points are never coarsened.
+    /// horizons of all triggers and of all points with broken bonds. Each evaluation of the criteria coarsens
+    /// these points by one level. If not given, points are never coarsened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }

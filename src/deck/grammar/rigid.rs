@@ -22,7 +22,7 @@ pub struct Rigid {
     /// Displacement in m: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<Vector>,
-    /// Mass in kg, which makes the body free; in plane problems, the mass of the whole thickness.
+    /// Mass in kg; in plane problems, the mass of the whole thickness. A body with a mass is free.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<Number>,
     /// Velocity of a free body at the start, m/s.

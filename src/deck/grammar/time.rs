@@ -46,33 +46,33 @@ fn default_safety() -> Number {
     default_number(0.8)
 }
 
-/// A stage of the run. Keys that are not given are as in `[time]`, except `step` and `adaptive` in stages
-/// that are not explicit.
+/// A stage of the run. If a key is not given, its value in `[time]` applies. However, `step` and `adaptive`
+/// of `[time]` apply only to explicit stages.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
     /// End of the stage in s; the last stage ends with the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end: Option<Number>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Spanned<Method>>,
-    /// As in `[time]`; in an explicit stage, the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given in an explicit stage, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub safety: Option<Number>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Spanned<Relaxation>>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(rename = "static", skip_serializing_if = "Option::is_none")]
     pub newton: Option<Spanned<Static>>,
-    /// As in `[time]`; the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_scale: Option<Number>,
-    /// As in `[time]`; in an explicit stage, the value of `[time]` if not given.
+    /// Same key as in `[time]`. If not given in an explicit stage, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
     /// Names of the conditions (loads, supports and temperatures) that act; all conditions if neither `on`
@@ -210,7 +210,7 @@ pub struct Static {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
     /// Largest residual: norm of the unbalanced force, divided by the sum of the norms of loads and
-    /// reactions. If not given, `tolerance` of the relaxation.
+    /// reactions. If not given, the value of `tolerance` of the relaxation applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Number>,
     /// Largest number of iterations in a load step; the count restarts whenever bonds break.

@@ -102,7 +102,7 @@ fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
 
 /// Write a prescribed temperature.
 ///
-/// The reference of thermal expansion is the temperature at the start. If `uniform`, the start temperature is
+/// Thermal expansion is relative to the temperature at the start. If `uniform`, the start temperature is
 /// the reference temperature of all materials that expand. Otherwise, the start temperature is subtracted
 /// from the prescribed temperature.
 fn temperature<'n>(

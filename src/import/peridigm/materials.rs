@@ -9,7 +9,7 @@ use crate::import::log::OTHER_INFLUENCE;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: name, the law, and how the law differs from the model.
+/// Material models of Peridigm: the name, the law in the new deck, and how this law differs from the model.
 const MATERIALS: [(&str, &str, &str); 20] = [
     ("Elastic", "ordinary", ""),
     ("Elastic Bond Based", "pmb", ""),

@@ -12,7 +12,7 @@ const COLUMNS: [&str; 5] = ["x", "y", "z", "block", "volume"];
 
 /// Source of the points of the blocks.
 pub(super) enum Points {
-    /// A text file, with its summary if it can be read.
+    /// A text file, and its summary. The summary is `None` if the file cannot be read.
     File(Value, Option<PointFile>),
     /// A mesh.
     Mesh(Value),
@@ -156,7 +156,8 @@ pub(super) fn influence(translation: &Translation, node: &Node) -> Result<Option
     }))
 }
 
-/// Read the block number from the name of a block, which has the form `block_NUMBER` for a text file.
+/// Read the block number from the name of a block. If the points are in a text file, the name has the
+/// form `block_NUMBER`.
 pub(super) fn block_number(block: &str) -> Option<u32> {
     block.rsplit('_').next()?.parse().ok()
 }

@@ -21,8 +21,9 @@ pub(super) enum MeshBlocks {
     /// A block number of the deck is the number of a group of the mesh. The import does not read the mesh,
     /// which may have no groups. Therefore, if block 1 is the only block of the deck, it has all elements.
     NumbersOrAll,
-    /// A block number of the deck is a position, from 1, in this list of names of element sets. The list is
-    /// `None` if the mesh cannot be read. If block 1 is the only block of the deck, it has all elements.
+    /// A block number of the deck is the position of an element set in this list of names. Positions start
+    /// from 1. The list is `None` if the mesh cannot be read. If block 1 is the only block of the deck, it
+    /// has all elements.
     Sets(Option<Vec<String>>),
 }
 
@@ -160,7 +161,7 @@ pub(super) fn sets_with_all_nodes(
     Ok(sets)
 }
 
-/// Read the source of the points.
+/// Read from the discretization which file or mesh contains the points.
 pub(super) fn points(
     translation: &mut Translation,
     node: &Node,

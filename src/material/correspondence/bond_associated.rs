@@ -1,8 +1,8 @@
 //! Bond-associated correspondence: a classical stress for each bond, from the bond's own deformation
 //! gradient. This law has no zero-energy modes and needs no control.
 //!
-//! Breitzman & Dayal 2018. The deformation gradient F_ξ of a bond maps ξ to Y. It maps vectors perpendicular
-//! to ξ like the deformation gradient F of the family.
+//! Breitzman & Dayal 2018. The deformation gradient F_ξ of a bond maps ξ to Y. For vectors v
+//! perpendicular to ξ, F_ξ v = F v, with the deformation gradient F of the family.
 //! The strain energy density W of a point is the weighted mean of the classical energy densities at F_ξ.
 //! [`Correspondence`](super::Correspondence) evaluates the classical energy density once, at F.
 //! With F = I + H of [`Correspondence`](super::Correspondence), n = ξ/|ξ| and the classical strain energy
@@ -10,7 +10,8 @@
 //!
 //! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|², W = Σ w Ψ(F_ξ), w = ω Ṽ/Σ ω Ṽ,
 //!
-//! summed over the intact bonds. With the stress P_ξ = ∂Ψ/∂F at F_ξ, the derivative of W is the force state
+//! summed over the intact bonds. Let P_ξ = ∂Ψ/∂F be the stress at F_ξ. The derivative of W with respect to Y,
+//! divided by the volume Ṽ, is the force state
 //!
 //! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ), Z = Σ w P_ξ (I − n⊗n).
 //!
@@ -106,7 +107,7 @@ impl Places {
         Self::GRADIENT + D * D
     }
 
-    /// Return the first index of the diagonal and mixed entries of K⁻¹.
+    /// Return the index at which the diagonal and mixed entries of K⁻¹ begin.
     const fn inverse<const D: usize>() -> usize {
         Self::direct::<D>() + D * D
     }
@@ -147,7 +148,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     /// Diagonal and mixed entries of K (m⁵), and Σ ω Ṽ (m³).
     type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
     /// Pass 0: K over the intact bonds, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ. Pass 1: Z Σ ω Ṽ (N m), and Σ ω Ṽ of the
-    /// bonds without stress (m³).
+    /// bonds at which the stress does not exist (m³).
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;

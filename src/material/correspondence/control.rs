@@ -196,7 +196,7 @@ mod tests {
         Dimension::PlaneStrain { thickness: 0.5 },
     ];
 
-    /// Return λ and G, Pa; in plane stress, λ of a thin sheet.
+    /// Return Lamé's λ and G, Pa. In plane stress, λ is that of a thin sheet, 2Gν/(1 − ν), with ν = `ratio`.
     fn constants(dimension: Dimension, ratio: f64) -> [f64; 2] {
         let shear = YOUNG / (2.0 * (1.0 + ratio));
         let across = match dimension {

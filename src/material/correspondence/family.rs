@@ -10,8 +10,8 @@ use crate::lanes::{LaneTuple, Lanes};
 /// an isotropic shape tensor with the same trace.
 const SINGULAR: f64 = 1e-2;
 
-/// Limit of the stiffness of a family's intact part, relative to the initial family. A point whose intact
-/// part is stiffer carries no force.
+/// Limit of the stiffness of a family's intact part, relative to the initial family. If the intact part is
+/// stiffer, the point of the family carries no force.
 ///
 /// The stable step is computed for initial families only. In tests without a limit, points of torn plates
 /// moved without bound. A limit of 16 already prevented this.

@@ -253,8 +253,8 @@ fn indefinite(
     )
 }
 
-/// Return the smallest eigenvalue (Pa) of the matrix in Voigt's order, and the eigenvector of this eigenvalue
-/// as a text: the components of the strain, relative to the largest component.
+/// Return the smallest eigenvalue (Pa) of the matrix, which is in Voigt's order. Also return its eigenvector
+/// as a text. The eigenvector is a strain; the text gives its components relative to the largest component.
 fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     let used = used(dimension);
     let written = DMatrix::from_fn(used.len(), used.len(), |a, b| matrix[(used[a], used[b])]);

@@ -11,9 +11,9 @@
 //! becomes heat, and ρ c the volumetric heat capacity. A step is computed with the temperature at the start
 //! of the step.
 //!
-//! The factor of rate and temperature, the product of the last two factors of σ, is part of the plastic
-//! state. A force evaluation without passage of time uses this stored factor. Therefore a stress that was
-//! returned to the yield surface does not cause flow again.
+//! The product of the last two factors of σ is the factor of rate and temperature. This factor is part of the
+//! plastic state. A force evaluation without passage of time uses this stored factor. Therefore a stress that
+//! was returned to the yield surface does not cause flow again.
 //!
 //! Let S_d be the deviator and q the equivalent stress of the final stress. The increment of plastic strain
 //! is ΔE_p = x S_d with an unknown x, and Δε̄ = ⅔ x q. q follows from the trial stress and x: each part of
@@ -150,7 +150,7 @@ const DEFAULT_TAYLOR_QUINNEY: f64 = 0.9;
 /// stress.
 const MOLTEN: f64 = 1e-3;
 
-/// Tolerance of F, relative to the equivalent trial stress.
+/// Tolerance of the residual F of Newton's method, relative to the equivalent trial stress.
 const TOLERANCE: f64 = 1e-14;
 
 /// Largest number of Newton iterations. About five are needed, and up to thirty at the first yield with a
@@ -204,10 +204,10 @@ pub fn fault(values: &Values) -> Option<LawFault> {
 }
 
 /// Parts of the equivalent trial stress that plastic flow reduces at different rates. The square of the final
-/// equivalent stress is q² = Σ s/(1 + x c)², summed over the parts.
+/// equivalent stress is q² = Σ s/(1 + x c)², summed over the parts. x (1/Pa) is the unknown of ΔE_p = x S_d.
 #[derive(Debug, Clone, Copy)]
 pub struct Modes {
-    /// Squared parts s of the trial stress, Pa².
+    /// Squares s of the parts of the equivalent trial stress, Pa².
     pub squares: [f64; 2],
     /// Stiffnesses c, Pa. The second is at least as large as the first.
     pub stiffnesses: [f64; 2],
@@ -231,7 +231,7 @@ pub struct Surface {
     /// A + B ε̄ⁿ at the start of the step, Pa.
     pub by_strain: f64,
     /// Yield stress at the start of the step for rates below the reference strain rate, Pa. If no time
-    /// passes, this yield stress contains the factor of the strain rate of the last step.
+    /// passes, `limit` is computed with the factor of rate and temperature that the last step stored.
     pub limit: f64,
     /// Ratio of `limit` to `by_strain`.
     factor: f64,
@@ -241,8 +241,8 @@ pub struct Surface {
 }
 
 impl JohnsonCook {
-    /// Create the hardening of a body; `None` if the deck gives no yield stress, or no key that only this
-    /// hardening has.
+    /// Create the hardening of a body. `None` if the deck gives no yield stress, or if it gives none of the
+    /// keys that only this hardening has.
     pub fn of(values: &Values) -> Option<Self> {
         first_given(values)?;
         let number = |key: &Key| values.get(key.name).map(|_| values.number(key.name));

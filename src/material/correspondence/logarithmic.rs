@@ -1,7 +1,7 @@
 //! J2 plasticity at large strains, with the logarithmic elastic strain of each point's family.
 //!
-//! F = F_e F_p. The stored state of a point is C_p⁻¹ − I with C_p = F_pᵀ F_p. This state and F determine
-//! b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ.
+//! The deformation gradient is the product of an elastic and a plastic part, F = F_e F_p. The stored state of
+//! a point is C_p⁻¹ − I with C_p = F_pᵀ F_p. This state and F determine b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ.
 //! With the eigenvalues b_a and the eigenvectors n_a of b_e, the logarithmic strains ε_a, the Kirchhoff
 //! stress τ, P and the elastic energy density W are (Simo 1992):
 //!

@@ -13,8 +13,8 @@
 //! Σ ω z⊗ξ Ṽ = 0.
 //!
 //! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point. B is then multiplied
-//! by a factor s that falls with the flow ([`Plastic::control_left`]), because an elastic control would carry
-//! load that the solid cannot carry. When s changes by Δs, the control dissipates the energy
+//! by a factor s, which decreases as plastic flow proceeds ([`Plastic::control_left`]). An elastic control
+//! would carry load that the solid cannot carry. When s changes by Δs, the control dissipates the energy
 //! −Δs · ½ Σ ω z·B z Ṽ. In this energy, B is the matrix before the multiplication by s.
 
 mod bond_associated;
@@ -177,17 +177,19 @@ impl Described for Correspondence {
     }
 }
 
-/// Constants (both N/m⁷): a spring constant that bounds the energy, and [`Control::constant`]. Then A and the
-/// diagonal and mixed entries of B (all N/m⁷).
+/// Two constants, then A and the diagonal and mixed entries of B; all in N/m⁷. The constants are a spring
+/// constant that bounds the energy, and [`Control::constant`].
 type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// Count of the point's [own numbers](Law::OWN_NUMBERS): W − ½ P : H (J/m³), and the flag of a point without
-/// force.
+/// Count of the point's [own numbers](Law::OWN_NUMBERS): W − ½ P : H (J/m³), and a flag, which is 1 if the
+/// point has no force.
 ///
-/// If a body yields and has a control, two more numbers follow. The first is ½ tr(B H K Hᵀ), the part of
-/// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is s at the start of the step.
+/// If the law has plasticity and a zero-energy control, two more numbers follow. The first is
+/// ½ tr(B H K Hᵀ), the part of
+/// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is the factor s on B at the start of
+/// the step.
 const OWN: usize = 4;
 
 /// Count of the own numbers of a point if no control decreases with plastic flow.
@@ -305,7 +307,8 @@ impl<const D: usize> Law<D> for Correspondence {
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
     const CONSTANTS: usize = CONSTANTS;
-    /// The second pass computes the energy of a control that decreases with plastic flow.
+    /// The second pass computes the energy of the control. The pass is needed only if the control decreases
+    /// with plastic flow.
     const PASSES: usize = 2;
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;

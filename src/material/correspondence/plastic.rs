@@ -2,17 +2,17 @@
 //! This file implements small strains; [`logarithmic`] implements large strains.
 //!
 //! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic strain, E = E_e + E_p. The
-//! stress is S = C : E_e, P = F S.
+//! second Piola–Kirchhoff stress is S = C : E_e, and the first Piola–Kirchhoff stress is P = F S.
 //! A rigid rotation does not change E. Therefore the law needs no corotational frame, no polar decomposition
 //! and no integration of a stress rate.
 //! Without flow the law equals the St. Venant–Kirchhoff law. The law is meant for small strains with
 //! rotations of any size.
 //!
-//! With the deviator S_d of S, the equivalent stress q = √(3/2 |S_d|²), the equivalent plastic strain ε̄ and
-//! the hardening modulus H, the yield surface is q = σ_y + H ε̄. A trial stress outside the surface returns
-//! along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In plane
-//! stress, the out-of-plane stress stays 0. Then ΔE_p = x S_d, where S_d is the deviator of the final stress,
-//! and x solves a scalar equation (§3.4).
+//! Let S_d be the deviator of S, q = √(3/2 |S_d|²) the equivalent stress, and ε̄ the equivalent plastic
+//! strain. With the yield stress σ_y and the hardening modulus H, the yield surface is q = σ_y + H ε̄. A
+//! trial stress outside the surface returns along S_d (Simo & Hughes 1998, §3.3):
+//! Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In plane stress, the out-of-plane stress stays 0.
+//! Then ΔE_p = x S_d, where S_d is the deviator of the final stress, and x solves a scalar equation (§3.4).
 //!
 //! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain and by the strain
 //! rate, and softening by heat.
@@ -37,7 +37,7 @@ pub struct Plastic {
     /// Yield stress σ_y, Pa.
     yield_stress: f64,
     hardening: Hardening,
-    /// Lamé's λ, Pa; in plane stress that of the sheet.
+    /// Lamé's λ, Pa. In plane stress, λ is that of a thin sheet, 2Gν/(1 − ν), with the Poisson ratio ν.
     lambda: f64,
     /// Shear modulus G, Pa.
     shear: f64,
@@ -229,7 +229,8 @@ impl Plastic {
         stretch_of(zz - 0.5 * self.lambda / self.shear * elastic)
     }
 
-    /// Return the stress of an elastic strain, Pa: S, or the Kirchhoff stress of a logarithmic strain.
+    /// Return the stress of an elastic strain, Pa: S for Green's strain, or the Kirchhoff stress for a
+    /// logarithmic strain.
     pub fn stress(&self, elastic: &Matrix3<f64>) -> Matrix3<f64> {
         let mut stress = elastic * (2.0 * self.shear);
         if self.is_sheet {
@@ -251,8 +252,8 @@ impl Plastic {
     /// to G. The result is 1 before any flow and never grows, because σ depends on ε̄ only.
     ///
     /// The motion z of the zero-energy modes grows with ε̄. With the ratio instead of its square, the energy
-    /// of the control would grow with the plastic work, and limit loads would contain a part of this energy.
-    /// With the square, the energy of the control stays at its value at first yield.
+    /// of the control would grow with the plastic work. This energy would then contribute to the computed
+    /// limit loads. With the square, the energy of the control stays at its value at first yield.
     pub fn control_left(&self, state: &PlasticState) -> f64 {
         let limit = self.limit(state);
         (limit / (limit + 3.0 * self.shear * state.equivalent)).powi(2)
@@ -323,8 +324,9 @@ impl Plastic {
 
     /// Return the [`Modes`] of a trial stress (Pa) in plane stress.
     ///
-    /// The final stress is S = S_trial − x C Π S, with the stiffness C in plane stress and the projection Π
-    /// to the deviator, S_d = Π S. C and Π have the same eigenvectors. Each eigencomponent of the trial
+    /// The plastic strain increases by ΔE_p = x S_d, with the deviator S_d of the final stress S. Let Π be
+    /// the projection to the deviator, so that S_d = Π S. With the stiffness C in plane stress, the final
+    /// stress is S = S_trial − x C Π S. C and Π have the same eigenvectors. Each eigencomponent of the trial
     /// stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of C Π.
     fn modes_of_sheet(&self, trial: &Matrix3<f64>) -> Modes {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);

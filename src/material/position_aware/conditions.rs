@@ -46,7 +46,8 @@ impl<const D: usize> Conditions<D> {
     /// Create the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab on ω, with m = Σ |ξ|² Ṽ (m⁵) and c = ω₀ = d/m.
     ///
     /// Conditions with a ≠ b have the weight √2, because each of them represents the components ab and ba.
-    /// Therefore the function of [`Nearest`](super::Nearest) rotates with the family.
+    /// Therefore, if the family rotates, the function ω of [`Nearest`](super::Nearest) rotates in the same
+    /// way.
     pub(super) fn dilatational(weighted_volume: f64) -> Self {
         let axes = (0..D).map(|a| (vec![(of_product(a, a), 1.0)], 1.0));
         let shears = mixed::<D>().map(|(a, b)| (vec![(of_product(a, b), 2_f64.sqrt())], 0.0));
@@ -57,8 +58,8 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Create the conditions Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H on σ/σ₀, with m = Σ |ξ|² Ṽ (m⁵) and
-    /// c = 1.
+    /// Create the conditions on σ/σ₀, with σ₀ = A/m, m = Σ |ξ|² Ṽ (m⁵) and c = 1. The condition for a probe
+    /// strain H is Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H.
     ///
     /// The probe strains H are unit strains H_aa = 1 along the axes, and pure shears H_ab = H_ba = 1/√2
     /// between the axes.

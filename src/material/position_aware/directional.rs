@@ -1,6 +1,7 @@
-//! Functions ω and σ that are radii of ellipsoids. Semi-axis a of ω/ω₀ is a ratio of dilatations at a unit
-//! strain along axis a: the dilatation of the solid, divided by the dilatation of the family with ω₀.
-//! Semi-axis a of σ/σ₀ is the same ratio of deviatoric energies.
+//! Functions ω and σ that are radii of ellipsoids. The ellipsoid of ω/ω₀ has a semi-axis along each
+//! coordinate axis a. This semi-axis is a ratio of dilatations at a unit strain along a: the dilatation of
+//! the solid, divided by the dilatation of the family with ω₀. The semi-axes of σ/σ₀ are the same ratios of
+//! deviatoric energies.
 
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use super::{Fit, Form};
@@ -41,7 +42,7 @@ impl Form for Directional {
     }
 }
 
-/// Return the semi-axes from the conditions for unit strains along the axes.
+/// Return the semi-axes of an ellipsoid, from the conditions for unit strains along the coordinate axes.
 fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; D] {
     std::array::from_fn(|a| {
         let (polynomial, wanted) = &conditions.each[a];
@@ -53,9 +54,9 @@ fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; 
 /// `sigma` are the semi-axes of ω/ω₀ and σ/σ₀. `sums` are the sums of |ξ|² Ṽ times the monomials of n.
 /// `reference` is σ₀, N/m⁷.
 ///
-/// Let g be the radius of an ellipsoid with the semi-axes g_a. Then g and g² are convex functions of the
-/// numbers n_a², whose sum is 1. Therefore g ≤ Σ g_a n_a² and g² ≤ Σ g_a² n_a² for each bond. With
-/// M_a = Σ |ξ|² n_a² Ṽ, Jensen's inequality for the sum over the family gives
+/// Let g be the radius of an ellipsoid with the semi-axes g_a, in the direction n of a bond. Then g and g²
+/// are convex functions of the numbers n_a², whose sum is 1. Therefore g ≤ Σ g_a n_a² and g² ≤ Σ g_a² n_a²
+/// for each bond. With M_a = Σ |ξ|² n_a² Ṽ, Jensen's inequality for the sum over the family gives
 /// Σ |ξ|² g Ṽ ≥ m (Σ (M_a/m)/g_a²)^(−½).
 fn bounds<const D: usize>(sums: &[f64], [omega, sigma]: [[f64; D]; 2], reference: f64) -> [f64; 3] {
     let weighted_volume = weighted_volume::<D>(sums);

@@ -67,11 +67,13 @@ pub struct Fit<const D: usize> {
 
 /// Form of the functions ω and σ.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Diagonal entries of the tensors of a point without bonds of its own. They make ω and σ nearly 0.
+    /// Diagonal entries of the tensors of a point without bonds within its own horizon. These entries make ω
+    /// and σ nearly 0.
     const WITHOUT_BONDS: f64;
 
-    /// Fit ω and σ to `conditions`, the conditions on ω and on σ. `sums` are the sums of |ξ|² Ṽ times the
-    /// monomials of degree 4, first of n, then of N with N_a = n_a². `reference` is σ₀, N/m⁷.
+    /// Fit ω and σ to `conditions`, the conditions on ω and on σ. `sums[0]` are the sums of |ξ|² Ṽ times the
+    /// monomials of degree 4 in the components of the bond direction n. `sums[1]` are the same sums with N
+    /// instead of n, where N_a = n_a². `reference` is σ₀, N/m⁷.
     fn fit<const D: usize>(
         sums: [&[f64]; 2],
         conditions: [&Conditions<D>; 2],
@@ -156,9 +158,10 @@ type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 /// dimensions.
 ///
 /// Let ⟨a, b⟩ = Σ σ a b Ṽ be a scalar product. Then θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|. The
-/// inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. If R, Q and τ equal these products,
-/// they give the components of ε along r and normal to r. Then λ is the larger eigenvalue of
-/// [[k′R + (1 − τ/d)² + g², −g], [−g, 1]] with g² = (RQ − τ²)/d². Because λ ≥ 1, this eigenvalue grows with R
+/// inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. Let e₁ be the component of e along r.
+/// Let e₂ be the component of e normal to r, in the plane of r and |ξ|. If R, Q and τ equal the three scalar
+/// products, these components of ε are (1 − τ/d) e₁ and e₂ − g e₁, with g² = (RQ − τ²)/d². Then λ is the
+/// larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]]. Because λ ≥ 1, this eigenvalue grows with R
 /// and Q and decreases with τ. It is therefore an upper bound if the inputs are bounds.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
@@ -193,7 +196,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// The own number of a point is the dilatation θ.
+    /// Each point has one own number, the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const SCALED: bool = true;
@@ -452,8 +455,8 @@ mod tests {
         }
     }
 
-    /// A point without bonds of its own contributes nothing to a bond from a point with a larger horizon. The
-    /// critical stretch of this bond therefore changes only by the factor √2.
+    /// A point without bonds within its own horizon contributes nothing to a bond from a point with a larger
+    /// horizon. The critical stretch of this bond therefore changes only by the factor √2.
     #[test]
     fn points_without_bonds_have_no_share() {
         for functions in [
@@ -492,8 +495,8 @@ mod tests {
         assert!(bound <= most * largest, "{case}");
     }
 
-    /// The bounds of PALS are loose, because λ uses the smallest σ over all directions. Without volume
-    /// correction, σ of PALS varies by a factor of two even in an untruncated family.
+    /// The upper bound λ is loose for PALS, because λ is computed with the smallest σ over all directions.
+    /// Without volume correction, σ of PALS varies by a factor of two even in an untruncated family.
     #[test]
     fn the_spring_constants_bound_the_energy() {
         for (name, family, pals, directional) in [

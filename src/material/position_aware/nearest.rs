@@ -1,6 +1,7 @@
-//! The functions ω and σ nearest to ω₀ and σ₀ that satisfy all [`Conditions`]: ω = n·Λ n and σ = N·S N. The
-//! dilatation is linear in the strain. It is therefore exact for every homogeneous strain, not only for the
-//! probe strains.
+//! The functions ω = n·Λ n and σ = N·S N that satisfy all [`Conditions`] and are nearest to ω₀ and σ₀. n is
+//! the direction of the bond, and N_a = n_a². The symmetric tensors Λ and S are fitted to the family of each
+//! point. The dilatation is linear in the strain. It is therefore exact for every homogeneous strain, not
+//! only for the probe strains.
 //!
 //! The distance of ω from ω₀ is Σ |ξ|² (ω − ω₀)² Ṽ, and that of σ from σ₀ is Σ |ξ|² (σ − σ₀)² Ṽ.
 
@@ -66,7 +67,7 @@ impl Form for Nearest {
 
 /// The function of the bond direction that satisfies the conditions and is nearest to a constant.
 struct Function<const D: usize> {
-    /// Matrix of the function: T in n·T n or N·T N.
+    /// Matrix T of the function. The function is n·T n or N·T N.
     tensor: SMatrix<f64, D, D>,
     /// Sum of the squared function over the family.
     square: f64,
@@ -74,7 +75,8 @@ struct Function<const D: usize> {
     sum: f64,
 }
 
-/// Fit the multipliers τ_k of the function g = c + Σ τ_k p_k to the conditions, as far as the family allows.
+/// Return the function g = c + Σ τ_k p_k, with c and p_k of `conditions`. The multipliers τ_k are fitted to
+/// the conditions by least squares, because some families cannot meet all conditions.
 /// `sums` are the sums, over the family, of the monomials of degree 4 in the components of n or N.
 fn nearest<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> Function<D> {
     let (each, count) = (&conditions.each, conditions.each.len());

@@ -12,8 +12,9 @@
 //! σ_y²/(3G). Because Σ ω|ξ| ε_d Ṽ = 0, plastic flow does not change θ.
 //!
 //! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a
-//! number c of the point. As a function of 1 − r, the energy then has its minimum at Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ,
-//! with the values before the flow. A larger 1 − r would add energy, so 1 − r is limited to this value.
+//! number c of the point. The energy, as a function of 1 − r, then has its minimum at
+//! 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, with ε and ε_d before the flow. A larger 1 − r would add energy, so
+//! 1 − r is limited to this value.
 
 use super::directional::Directional;
 use super::nearest::Nearest;
@@ -86,7 +87,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 3;
     const LEAST_DIMENSION: usize = 2;
-    /// The own number of a point is the dilatation θ.
+    /// Each point has one own number, the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_STRETCH: bool = true;

@@ -49,7 +49,8 @@ const STEP_TABLES: [(&str, Option<usize>, i64, Counted); 5] = [
     ("ConnectivityIdOffsets", Some(1), 0, Counted::Points),
 ];
 
-/// The quantity that a table accumulates over previous steps if each step has its own points.
+/// Quantity that a table counts if each step has its own points: nothing, the previous steps, or the points
+/// of the previous steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Counted {
     Nothing,
@@ -79,7 +80,8 @@ pub struct ResultFile<'a> {
     steps: u64,
     /// In a resumed file: time (s) and number of points of each retained step.
     past: Vec<(f64, usize)>,
-    /// Number of points, summed over all written steps: the number of written rows of each moving field.
+    /// Number of points, summed over all written steps. Each field with values per step has this number of
+    /// written rows.
     rows: u64,
     /// The datasets of the points; `None` if all steps have the same points.
     changing: Option<ChangingPoints>,
@@ -98,8 +100,9 @@ struct Table {
     rule: Rule,
 }
 
-/// The values of a table: `start + stride · k` for step k, or `start` plus the counted quantity if each
-/// step has its own points.
+/// The values of a table. If all steps have the same points, the value of step k is `start + stride · k`. If
+/// each step has its own points, the value is `start` plus the total of the quantity `counted` over all
+/// previous steps.
 #[derive(Debug, Clone, Copy)]
 struct Rule {
     start: i64,

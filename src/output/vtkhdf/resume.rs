@@ -12,8 +12,8 @@ use super::{Contents, ResultFile, STEPS, Table, append_one, tables_of, truncate}
 use crate::comm::{Communicator, agree, threads, total};
 use crate::error::{Error, Result};
 
-/// Attributes that must match for a continuation in place; the other attributes describe the last start of
-/// the run.
+/// Attributes that must be equal in the file and in the resumed run, so that the file can be continued in
+/// place. The other attributes describe the last start of the run.
 const IDENTITY: [&str; 3] = ["deck", "deck_in_full", "version"];
 
 /// Number of steps and history rows that a resumed result retains.
@@ -28,18 +28,19 @@ struct Retained {
 type RetainedHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
-    /// Resume a result after its first steps and history rows, and drop later steps and rows. Return the
-    /// retained history rows.
+    /// Resume a result. Retain its first `steps` steps and the number of history rows that `history` gives,
+    /// and drop later steps and rows. Return the retained history rows.
     ///
-    /// A file is continued in place if the points never change, the deck and the version are the same, and
-    /// the file has space for all expected steps. In addition, dropping the later rows must not free a chunk.
+    /// A file is continued in place if the points never change, the file has the deck and the version of this
+    /// run, and it has space for all expected steps. In addition, dropping the later rows must not free a
+    /// chunk.
     /// The retained rows then do not move, so no row is lost if the process is killed. If a condition is not
     /// met, or the file is not writable, the retained part is copied to a new file. The new file then
     /// replaces the old file.
     ///
     /// # Errors
-    /// If the old file cannot be read, or has fewer steps, or other points or fields. If a write fails, for
-    /// example because the disk is full.
+    /// If the old file cannot be read, has fewer than `steps` steps, or has other points or fields. If a
+    /// write fails, for example because the disk is full.
     pub fn resume(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -266,7 +267,7 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
 }
 
 /// Test whether a file can be continued in place, under the conditions of [`ResultFile::resume`]. The number
-/// of points must also be the same.
+/// of points in the file must also equal the total number of points of `contents`.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,
@@ -305,8 +306,8 @@ fn has_room(
     Ok(true)
 }
 
-/// Return the paths of the datasets whose length is the number of written steps or history rows, and their
-/// lengths after truncation.
+/// Return the path of each dataset that has one row per written step or per history row, and the length of
+/// this dataset after truncation.
 fn counted_rows(retained: Retained) -> Vec<(String, u64)> {
     let mut counted = vec![
         (format!("{STEPS}/Values"), retained.steps),

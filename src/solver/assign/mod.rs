@@ -190,8 +190,8 @@ fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     reads
 }
 
-/// The damage laws at the two ends of the bonds between two bodies, in the order of the bodies in the
-/// problem. `None` if the pair has no separate damage law.
+/// Return the damage laws of the bonds between two bodies: one law for the end in each body. The laws are in
+/// the order of the bodies in the problem. `None` if the pair has no separate damage law.
 pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[DamageLaw; 2]> {
     let damage = pair.own_damage()?;
     let mut bodies = problem.bodies.iter().filter(|body| pair.has(body));
@@ -421,7 +421,7 @@ struct End {
     own_critical_stretch: Option<f64>,
     /// See [`bond_stiffness`].
     stiffness: f64,
-    /// Damage law at this end; `None` if the two bodies have no separate damage law.
+    /// Separate damage law of the pair of bodies, for this end; `None` if the pair has none.
     pair_damage: Option<DamageLaw>,
     /// Horizon, m.
     horizon: f64,

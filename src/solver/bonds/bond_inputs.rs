@@ -10,7 +10,7 @@ use super::list_points::{self, Node};
 /// Write access to the bond inputs of a range of owned points. Different threads hold disjoint ranges.
 pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
-    /// Nodes of these points, which bonds in lists read; empty if no bonds are stored in lists.
+    /// Data of the `points`, for bonds in lists; empty if no bonds are stored in lists.
     nodes: &'a mut [Node],
     /// Write access to the slots of the owned points, one entry per grid.
     places: &'a [OwnedPlaces<'a, D>],
@@ -35,8 +35,8 @@ impl<const D: usize> BondInputs<'_, D> {
         }
     }
 
-    /// Write the displacements (m) of all these points, and their thermal stretches if the run has
-    /// temperatures.
+    /// Write the displacements (m) of all points of the range. If the run has temperatures, also write the
+    /// thermal stretches of these points.
     ///
     /// # Panics
     /// If the number of values differs from the number of points.

@@ -8,7 +8,8 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, ForceState, Law, PairLaw};
 use super::kernel::{Group, Kernel};
 use super::measures::wanted;
 
-/// Kernel that sums over breaking bonds. The caller marks these bonds in [`Group::intact`]. The sums are:
+/// Kernel that sums over breaking bonds. In [`Group::intact`], the caller sets only the bits of these bonds.
+/// The sums are:
 ///
 /// - the number of these bonds;
 /// - the energy that they release at the point, J;
@@ -27,8 +28,8 @@ pub struct BreakingBonds {
 }
 
 impl BreakingBonds {
-    /// Return the work of the force states of both ends, J/m⁶, equal to `Force::work` up to rounding; 0 if
-    /// the criterion does not read the work.
+    /// Return the work of the force states of both ends, J/m⁶; 0 if the criterion does not read the work. The
+    /// work equals `Force::work` up to rounding.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> Lanes {
         if !self.criterion.reads_work() {
@@ -105,7 +106,7 @@ pub struct BrokenSums {
 pub const MAX_BROKEN_SUMS: usize = 6;
 
 /// The groups of one row or lane group that contain breaking bonds. An entry has the index of a group of
-/// eight bonds, and the bits of its bonds that break.
+/// eight bonds, and one bit per bond of this group. The bit is 1 if the bond breaks.
 pub type BreakingBits = Vec<(usize, u8)>;
 
 /// Note the breaking bonds of a group. Out of line to save registers.

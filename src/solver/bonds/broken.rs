@@ -26,16 +26,17 @@ const GAP: usize = 64;
 pub struct Broken<const D: usize> {
     /// Local index of the owned point.
     pub point: usize,
-    /// Number of bonds of the point that broke.
+    /// Number of bonds that the point loses.
     pub count: u64,
     /// Energy that the point loses, J: its part of the energy of the broken bonds, plus the decrease of its
-    /// remaining energy.
+    /// strain energy when its point numbers change. The part of this decrease that plastic flow dissipates is
+    /// not included.
     pub energy: f64,
     /// The point's part of the overshoot energy of the broken bonds, J. The overshoot energy of a bond is its
     /// energy above the criterion when it breaks.
     pub overshoot: f64,
-    /// Force density that the point loses, N/m³: the forces of the broken bonds, plus the decrease of the sum
-    /// of the forces of its other bonds.
+    /// Force density that the point loses, N/m³: the force sum over the broken bonds of the point, plus the
+    /// decrease of the force sum over its other bonds.
     pub force: [f64; D],
 }
 
@@ -115,7 +116,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Recompute the point numbers of a range of points. Record the energy that points with broken bonds lose
-    /// by the change of their point numbers, without the energy that plastic flow dissipates.
+    /// by this change. The energy that plastic flow dissipates is not included.
     fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
         // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);
@@ -158,9 +159,9 @@ impl<const D: usize> Forces<D> {
         energy
     }
 
-    /// Send the new point numbers to the ranks with ghosts of these points. `own` are the owned points with
-    /// new point numbers. Return the owned points whose forces may change; points may occur several times.
-    /// Collective.
+    /// Send the new point numbers of owned points to the ranks that have ghosts of these points. `own` are
+    /// the owned points with new point numbers. Return the owned points whose forces may change; points may
+    /// occur several times. Collective.
     fn send_numbers(
         &mut self,
         comm: &dyn Communicator,

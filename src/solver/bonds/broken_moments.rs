@@ -1,4 +1,4 @@
-//! Moments of the families of points and of their broken bonds, in 3-D.
+//! Moments of all bonds of a point, and moments of the broken bonds of the point, in 3-D.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -81,7 +81,7 @@ impl Moments {
 
     /// Compute the gradient (1/m) of a linear function of the neighbours' positions. The function is the best
     /// fit, by least squares with the weights ω Ṽ, to the value 1 at neighbours with a broken bond and 0 at
-    /// the others. The gradient is 0 if the matrix C is not invertible, see `LAYER`.
+    /// the others. `LAYER` defines the matrix C of this fit. If C is not invertible, the gradient is 0.
     pub fn gradient(&self) -> Vector {
         let mean = self.mean();
         let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| self.0[4 + k]);

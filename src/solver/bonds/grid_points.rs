@@ -313,8 +313,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     }
 
     /// Load the bonds of a lane group at the offset with index `o`. With `FAST_PATH`, the data of the
-    /// criterion, the breakable bits and the thermal stretches are not loaded. The closed forms for |x| above
-    /// [`NEAR`](crate::material::bond::NEAR) are then not computed (x: see [`crate::material::bond`]).
+    /// criterion, the breakable bits and the thermal stretches are not loaded. In addition, the closed forms
+    /// for |x| above [`NEAR`](crate::material::bond::NEAR) are not computed. [`crate::material::bond`]
+    /// defines x and the closed forms.
     ///
     /// # Safety
     /// The lane group must belong to the grid, and `o` must be the index of an offset of the lattice.

@@ -33,7 +33,8 @@ pub struct BlockLaws {
     /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
     /// all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Point data of this block that are read by the criteria of pairs of bodies with a separate damage law.
+    /// Data of the block's points that are read by the failure criteria of bonds to other bodies. Only pairs
+    /// of bodies with a separate damage law count.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
@@ -41,7 +42,7 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Point data that the failure criteria of bonds between two bodies read. Only pairs of bodies with a
+/// Point data that are read by the failure criteria of bonds between two bodies. Only pairs of bodies with a
 /// separate damage law count.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
@@ -51,7 +52,7 @@ pub struct PairReads {
     pub truncation_factors: bool,
     /// Whether these criteria read rotations.
     pub rotations: bool,
-    /// Whether these criteria read each stress measure, in the order of [`StressMeasure::ALL`].
+    /// For each stress measure, in the order of [`StressMeasure::ALL`], whether these criteria read it.
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 
@@ -68,8 +69,8 @@ impl PairReads {
 }
 
 impl BlockLaws {
-    /// Whether bonds of the points can break by the damage law of the block or of a pair of bodies, or by
-    /// their history.
+    /// Whether bonds of the block's points can break: by the damage law of the block, by the damage law of a
+    /// pair of bodies, or because of the bond history.
     pub fn has_breakable_bonds(&self) -> bool {
         self.damage.is_some() || self.pairs.breaks || self.wears_out
     }

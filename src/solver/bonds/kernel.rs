@@ -37,7 +37,8 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub history: [K::BondHistory; 2],
     /// One bit per bond, set if the bond is intact; for `BreakingBonds`, set if the bond breaks.
     pub intact: u8,
-    /// One bit per lane, set if the lane has a bond, intact or broken; only with [`Kernel::READS_BROKEN`].
+    /// One bit per lane, set if the lane has a bond, intact or broken. Without [`Kernel::READS_BROKEN`], all
+    /// bits are 0.
     pub whole: u8,
     /// One bit per bond, set if the bond can break.
     pub breakable: u8,
@@ -56,9 +57,9 @@ where
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     /// Weights of the force states in the work of a bond: the influence function, without volume correction.
-    /// `no_volume_correction` says whether [`Self::weights`] contain no volume correction. With a volume
-    /// correction, the weights are 1 or 0: criteria that use the work then require a constant influence
-    /// function.
+    /// `no_volume_correction` says whether [`Self::weights`] contain no volume correction. If this is true,
+    /// the result is [`Self::weights`]. Otherwise, the result is 1 at the ends whose force states act on the
+    /// bond, and 0 at the other ends. Criteria that use the work then require a constant influence function.
     #[inline(always)]
     pub fn weights_of_work<S: Simd>(&self, simd: S, no_volume_correction: bool) -> Weights {
         if no_volume_correction {
@@ -121,7 +122,8 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// Operation that combines the lanes of a sum with each other, and a sum with its column.
+/// Operation that combines two values of a quantity: two lanes of a sum, or a sum and the earlier entry of
+/// the column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
     /// Sum.
@@ -221,7 +223,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         true
     }
 
-    /// Whether the bits of broken bonds are needed. Called only with [`Self::READS_BROKEN`].
+    /// Whether the bits of broken bonds are needed. Called only if [`Self::READS_BROKEN`] is true.
     #[inline(always)]
     fn needs_broken(&self) -> bool {
         Self::READS_BROKEN

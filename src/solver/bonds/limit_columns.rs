@@ -21,7 +21,8 @@ pub struct LimitsRead {
 }
 
 impl LimitsRead {
-    /// Find out which data the damage laws of the blocks and of pairs of bodies read, in `D` dimensions.
+    /// Select the data that damage laws read: the damage laws of the blocks, and the damage laws of pairs of
+    /// bodies. `D` is the dimension of the problem.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());
@@ -185,8 +186,8 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         Self { columns, is_read }
     }
 
-    /// Load the rotations of eight points. `take` loads their entries of a column. It is called only for
-    /// columns whose length [`Self::new`] has checked.
+    /// Load the rotations of eight points. `take` loads the entries of these points from a column. It is
+    /// called only for columns whose length [`Self::new`] has checked.
     #[inline(always)]
     pub fn eight<const D: usize>(&self, take: impl Fn(&[f64]) -> Lanes) -> R {
         if !self.is_read {

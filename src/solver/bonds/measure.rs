@@ -128,8 +128,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(of_point).collect()
     }
 
-    /// Sum the tensor D of each owned point (N/m⁴), which `measures::Stiffness` defines. The columns are xx,
-    /// yy, zz, xy, yz, xz.
+    /// Compute the tensor D (N/m⁴) of each owned point, as defined by `measures::Stiffness`. The columns are
+    /// xx, yy, zz, xy, yz, xz.
     pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let laws = interaction.laws.laws();
@@ -201,7 +201,7 @@ impl<const D: usize> Forces<D> {
         self.gradient(model, false)
     }
 
-    /// Same as [`Self::deformation_gradient`], from bonds without their thermal stretch.
+    /// Same as [`Self::deformation_gradient`], but the thermal stretch of each bond is excluded.
     pub fn elastic_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
         self.gradient(model, true)
     }

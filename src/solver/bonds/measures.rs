@@ -67,8 +67,8 @@ impl<const D: usize> Kernel<D> for EnergiesAndFamilies {
     }
 }
 
-/// Kernel that sums the volume of the intact neighbours within the horizon of point i (m³), and counts the
-/// intact bonds as in [`EnergiesAndFamilies`].
+/// Kernel with two of the sums of [`EnergiesAndFamilies`]: the volume of the intact neighbours within the
+/// horizon of point i (m³), and the number of intact bonds, including bonds longer than this horizon.
 #[derive(Clone, Copy)]
 pub struct IntactFamilies;
 
@@ -93,8 +93,8 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
-/// Kernel that sums, over the intact neighbours j within the horizon of point i, V_j times the fraction of
-/// the stiffness that bond ij has lost, m³.
+/// Kernel that sums d_ij V_j over neighbours j, m³. d_ij is the fraction of the stiffness that bond ij has
+/// lost. The sum is over the intact bonds within the horizon of point i.
 #[derive(Clone, Copy)]
 pub struct Softened {
     /// The law of point i.
@@ -137,9 +137,9 @@ fn add_tensor<S: Simd, const D: usize>(
 }
 
 /// Kernel that sums the tensor D = Σ V_j C n⊗n (N/m⁴) over the intact bonds in the reference configuration.
-/// The sums are xx, yy, zz, xy, yz, xz. n is ξ/|ξ|, and C is the weighted sum of [`Law::stiffness`] of both
-/// ends. If the law of an end [resists displacements across](Law::resists_across) the bonds, the part of this
-/// end in C is multiplied by the identity I instead of n⊗n.
+/// The sums are xx, yy, zz, xy, yz, xz. n is ξ/|ξ|. C is the sum over both ends of [`Law::stiffness`] times
+/// the weight of the end. If the law of an end [resists displacements across](Law::resists_across) the bonds,
+/// the part of this end in C is multiplied by the identity I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.

@@ -36,7 +36,7 @@ pub struct PointNumbers {
     pub read: usize,
     /// Index of the first column that is recomputed before each force sum.
     pub first_changing: usize,
-    /// Number of point sums before the force sum.
+    /// Number of passes over the bonds before the force sum: the largest [`Law::PASSES`] of all laws.
     pub passes: usize,
     /// Whether any law has constants, which are point numbers that do not change; see [`Law::CONSTANTS`].
     pub with_constants: bool,

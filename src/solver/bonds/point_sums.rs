@@ -1,4 +1,4 @@
-//! Kernels of the sums over bonds from which point numbers and thresholds are computed.
+//! Kernels of sums over bonds. Point numbers and thresholds are computed from these sums.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
@@ -69,9 +69,10 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Kernel that sums the data for a point's constants over the undeformed family. In general, the sum contains
-/// the intact bonds only, without the bonds that pre-cracks cut. For laws with a shape tensor, the sum
-/// contains the cut bonds, too, because such laws compare the intact family with the whole family.
+/// Kernel that sums the data for a point's constants over the undeformed family. For laws without a shape
+/// tensor, the sum contains only the intact bonds, so it omits the bonds that pre-cracks cut. For laws with a
+/// shape tensor, the sum contains the cut bonds, too, because such laws compare the intact family with the
+/// whole family.
 #[derive(Clone, Copy)]
 pub struct FamilySum<const D: usize> {
     /// The law of point i.

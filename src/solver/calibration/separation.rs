@@ -1,6 +1,7 @@
 //! The separation energy of a body. In this file, the block is a rectangular sample of the body's lattice. A
-//! plane between two layers of points divides the block into two halves. The upper half moves away from the
-//! lower half until no intact bond of the points in the middle crosses the plane.
+//! plane between two layers of points divides the block into two halves. The middle column contains the
+//! points within half a cell of the line through the centre of the block along the normal of the plane. The
+//! upper half moves away from the lower half until no intact bond of these points crosses the plane.
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
@@ -17,7 +18,8 @@ const MAX_BONDS: f64 = 1e6;
 /// when they break. The remaining overshoot energy is subtracted from the result.
 const GROWTH: f64 = 0.01;
 
-/// Ratio of the first separation to the separation at which the first bond is expected to break.
+/// Separation of the two halves in the first step, divided by the separation at which the first bond is
+/// expected to break.
 const START: f64 = 0.02;
 
 /// Maximum number of steps; blocks need far fewer steps to separate.
@@ -33,8 +35,8 @@ const CHECK_INTERVAL: u32 = 20;
 /// Compute the ratio of the separation energy per area to the fracture energy of a body. The upper half of
 /// the block moves at an angle (rad) to the normal of the plane.
 ///
-/// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
-/// at breaking is subtracted.
+/// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of the
+/// broken bonds is subtracted from the separation energy.
 ///
 /// The result is `None` in these cases:
 ///
@@ -119,7 +121,7 @@ fn fracture_energy(problem: &Problem, body: usize, normal: [f64; 3]) -> Option<f
 
 /// The motion of the upper half, and the size of the block.
 struct Separation {
-    /// Angle to the normal, rad.
+    /// Angle between the motion and the normal of the plane, rad.
     angle: f64,
     /// Separation at the first step, m.
     start: f64,
@@ -167,7 +169,8 @@ impl Separation {
     }
 }
 
-/// Whether no intact bond of the middle points crosses the plane.
+/// Return true if no intact bond of a point in the middle crosses the plane. `middle` marks the points in the
+/// middle, and `upper` marks the points of the upper half.
 fn is_separated<const D: usize>(
     simulation: &Simulation<'_, D>,
     middle: &[bool],

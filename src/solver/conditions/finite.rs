@@ -130,8 +130,9 @@ impl<const D: usize> FiniteCheck<'_, D> {
         Err(Error::input(message).at(place))
     }
 
-    /// Return an error if a component, times its factor, is not finite at a point of a set. `names` are the
-    /// subjects of the messages. Collective.
+    /// Return an error if a component is not finite at a point of a set. `components` contains an expression
+    /// and a factor for each component. The component is the product of both. `names` are the subjects of
+    /// the messages. Collective.
     fn check_values<'e>(
         &self,
         key: &str,

@@ -38,8 +38,8 @@ pub struct Loaded<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// Create the load of the condition with this index. Each component of the force density (N/m³) is the
-    /// expression times the factor of this component.
+    /// Create the load of the condition with this index. Component d of the force density (N/m³) is
+    /// `values[d]` times `factors[d]`.
     pub fn new(condition: usize, values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
@@ -97,7 +97,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Compute the force densities if the load is due.
+    /// Compute the force densities if [`Load::is_due`] is true.
     pub fn compute_densities(&mut self, loads: &[Load<D>]) {
         let load = &loads[self.load];
         if !load.is_due {

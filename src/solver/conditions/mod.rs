@@ -208,7 +208,8 @@ pub fn not_empty(
 impl<const D: usize> Conditions<D> {
     /// Find the points of the conditions that act in a stage. For each condition, `begins` contains the time
     /// (s) at which the condition begins to act; `None` if the condition does not act in this stage. If two
-    /// supports prescribe the same component of a point, the later support applies. Collective.
+    /// supports prescribe the same component of a point, the support that comes later in the deck applies.
+    /// Collective.
     ///
     /// # Errors
     /// - If a set is empty.
@@ -435,7 +436,7 @@ impl<const D: usize> Conditions<D> {
 
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step (s)
     /// beyond the counted work. The work is integrated by the trapezoidal rule, which misses this energy. A
-    /// load contributes the energy that points initially at rest gain from the load in one step. A supported
+    /// load contributes the energy that it adds in one step to points initially at rest. A supported
     /// component contributes the energy of its velocity. It also contributes the energy that a point
     /// initially at rest gains from the prescribed acceleration in one step.
     ///
@@ -480,7 +481,7 @@ fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16
 }
 
 impl<'a, const D: usize> PartConditions<'a, D> {
-    /// Combine the conditions with their points in one part.
+    /// Combine the conditions of the stage with the points of one part on which they act.
     pub fn new(stage: StageConditions<'a, D>, on: &'a mut OnPart<D>) -> Self {
         Self { stage, on }
     }

@@ -35,7 +35,8 @@ struct PrescribedDisplacement {
     values: [At; 2],
 }
 
-/// Time (s) and step (s) for which the velocities and accelerations of the supported points are prescribed.
+/// Time and time step, both in s, for which the velocities and accelerations of the supported points are
+/// prescribed.
 struct PrescribedVelocity {
     time: f64,
     step: f64,
@@ -78,8 +79,8 @@ impl Support {
         }
     }
 
-    /// Prepare the displacements of points at `time` (s). `step` is the length of the last step (s), 0 at the
-    /// start.
+    /// Set the values that prescribe the displacements of the supported points at `time` (s). `step` is the
+    /// length of the last step (s), 0 at the start.
     pub fn set_displacements(&mut self, time: f64, step: f64) {
         self.displacement = PrescribedDisplacement {
             step,
@@ -128,7 +129,8 @@ impl Support {
 }
 
 impl Supported {
-    /// Create the entry for the support with this index and the points with these indices in the part.
+    /// Create the supported points of the support with index `support`. `points` are the indices of these
+    /// points in the part.
     pub fn new(support: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
         Self {
             support,

@@ -41,8 +41,9 @@ impl Temperatures {
         self.each.len() - 1
     }
 
-    /// Prepare the temperatures at a time (s). [`Self::apply`] sets the temperatures of points after the
-    /// first call and, if temperatures change with time, after each call with a new time.
+    /// Prepare the temperatures at a time (s). After the first call of this function, [`Self::apply`] sets
+    /// the temperatures of points. If temperatures change with time, it also sets them after each call of
+    /// this function with a new time.
     pub fn set_time(&mut self, time: f64) {
         let is_new = self.time != Some(time);
         let changes = self.each.iter().any(|one| one.values.changes);

@@ -1,4 +1,4 @@
-//! Checks of contact at the start.
+//! Checks of contact at the start of a run.
 
 use crate::comm::{Communicator, Found, least, total};
 use crate::error::{Error, Result};

@@ -18,8 +18,8 @@ const CALM: u64 = 100;
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
-    /// Largest 2 Σ k/m of a point or rigid body, 1/s². Contact adds at most this value to the square of an
-    /// angular frequency.
+    /// Largest value of 2 Σ k/m over all points and rigid bodies, 1/s². The sum is over the contacts of the
+    /// point or body. Contact adds at most this value to the square of an angular frequency.
     pub stiffness: f64,
     /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
@@ -76,8 +76,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Restore the state before a step that is rolled back. The rank must own the same points as before the
-    /// step. The bonds must have been restored already.
+    /// Roll back a step: restore `state`, the contact state before the step. The rank must own the same
+    /// points as before the step. The bonds must have been restored already.
     pub fn undo(&mut self, state: &ContactState, model: &Model<D>, forces: &Forces<D>) {
         self.set_state(state);
         self.update_bonds(model, forces);
@@ -115,8 +115,9 @@ impl<const D: usize> Contact<D> {
 
     /// Stable step (s) with contact; `step` is the stable step without contact.
     ///
-    /// With damping from the velocities half a step earlier, the step Δt is stable if Δt² ω² + 2 Δt C/m < 4.
-    /// Here ω² is the sum of 4/`step`² and `StepDemand::stiffness`, and C/m is `StepDemand::damping`.
+    /// Damping follows from the velocities half a step earlier. Therefore the step Δt is stable if
+    /// Δt² ω² + 2 Δt C/m < 4. Here ω² is the sum of 4/`step`² and `StepDemand::stiffness`, and C/m is
+    /// `StepDemand::damping`.
     pub fn stable_step(&self, step: f64) -> f64 {
         let square = 4.0 / (step * step) + self.demand.stiffness;
         let damping = self.demand.damping;

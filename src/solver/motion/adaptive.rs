@@ -38,7 +38,7 @@ pub struct StepControl {
     step: f64,
     /// Smallest and largest step, s.
     limits: [f64; 2],
-    /// Number of consecutive steps in which at most `stable_broken` bonds of any point broke.
+    /// Number of consecutive steps in which no point lost more than `stable_broken` bonds.
     calm: u64,
     /// Number of steps that were rolled back since the start of the run.
     pub undone: u64,

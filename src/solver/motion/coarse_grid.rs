@@ -33,7 +33,8 @@ const GROWTH: f64 = 1.1;
 /// evaluation needs for a point with few bonds.
 const SOLUTION: f64 = 16.0;
 
-/// This number of multiply-adds to solve with the factored matrix is always allowed, even with few points.
+/// Maximum number of multiply-adds to solve with the factored matrix, if there are so few points that
+/// `SOLUTION` gives a smaller maximum.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.
@@ -85,8 +86,9 @@ struct CellPosition<const D: usize> {
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Create a grid that covers all points. The edges of its cells are long enough that the matrix is small.
-    /// They are at least `horizon` (m), except along axes with a single cell. Collective.
+    /// Create a grid that covers all points. The edges of its cells are long enough that the stiffness
+    /// matrix of the grid is small. The edges are at least `horizon` (m), except along axes with a single
+    /// cell. Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -375,9 +377,9 @@ struct Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// Create the shape for a box of the size `length` (m). The edges of its cells are at least `edge` (m);
-    /// an axis of the box that is shorter than `edge` has one cell. Nodes are numbered first along the axis
-    /// with the fewest nodes, which gives the narrowest band.
+    /// Create the shape for a box of the size `length` (m). Along each axis, the edges of the cells are at
+    /// least `edge` (m), unless the box is shorter than `edge`. The box then has one cell along this axis.
+    /// Nodes are numbered first along the axis with the fewest nodes, which gives the narrowest band.
     fn new(length: [f64; D], edge: f64) -> Self {
         let cells = length.map(|length| ((length / edge) as usize).max(1));
         let mut axes: [usize; D] = std::array::from_fn(|d| d);

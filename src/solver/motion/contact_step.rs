@@ -9,8 +9,9 @@ use crate::solver::contact::Contact;
 /// further.
 const CONTACT_RESERVE: f64 = 0.95;
 
-/// Largest ratio of successive steps when the step grows again. If the step grew to its full length at once,
-/// a vibrating surface could reverse its motion and touch again within the first long step.
+/// Largest ratio of a time step to the time step before it, when the step grows again after contact. If the
+/// step grew to its full length at once, a vibrating surface could reverse its motion and touch again within
+/// the first long step.
 const GROWTH: f64 = 2.0;
 
 /// Number of consecutive adaptive steps that contact does not limit, after which the step may grow by any
@@ -74,7 +75,8 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
-    /// Change the step. If the new step is longer, restart the count of steps that contact does not limit.
+    /// Change the step. If the new step is longer, reset the counter of consecutive steps that contact did
+    /// not limit.
     pub(in crate::solver) fn set_step_for_contact(&mut self, step: f64) {
         if let Some(contact) = &mut self.contact
             && step > self.clock.step()

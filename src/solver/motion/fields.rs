@@ -32,7 +32,8 @@ pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
     Interpolated,
     /// A new point gets the mean. A removed point returns its volume times the difference of its value from
-    /// the mean of its parents. This conserves momentum, and fields that are linear in space.
+    /// the mean of its parents. These rules conserve momentum, and do not change a field that is linear in
+    /// space.
     Conserved,
     /// A new point gets the mean. The value of a removed point is averaged with the values of its parents,
     /// weighted by volume, so that no value leaves the previous range.
@@ -218,8 +219,8 @@ fields! {
         name: "freed_energy",
         ..ENERGY
     };
-    /// Part of the freed energy that was above the criterion of the bonds when they broke, J; none without
-    /// damage.
+    /// Overshoot energy of the broken bonds of a point, J: the part of the freed energy by which the bonds
+    /// exceeded the energy of their criterion when they broke; none without damage.
     overshoot_energy: Option<Vec<f64>> = Description {
         name: "overshoot_energy",
         ..ENERGY
@@ -239,7 +240,7 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Relative change of the yield stress of a point by strain rate and temperature, in the last step; none
+    /// Relative change of the yield stress of a point by strain rate and temperature, in the last step. None
     /// without plasticity.
     yield_change: Option<Vec<f64>> = Description {
         name: "yield_change",
@@ -247,16 +248,16 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density that the zero-energy control (the forces that resist zero-energy modes) would have if
-    /// plastic flow did not reduce the control, J/m³. None without plasticity.
+    /// Energy density of the zero-energy control without its reduction by plastic flow, J/m³. The control
+    /// consists of the forces that resist zero-energy modes. None without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density that plastic flow of a point and the reduction of its zero-energy control have
-    /// dissipated, J/m³; none without plasticity.
+    /// Energy density that plastic flow at a point has dissipated, J/m³. It includes the energy that is
+    /// dissipated when the flow reduces the zero-energy control of the point. None without plasticity.
     plastic_work: Option<Vec<f64>> = Description {
         name: "plastic_work",
         unit: "J/m^3",
@@ -268,7 +269,7 @@ fields! {
         name: "external_work",
         ..ENERGY
     };
-    /// Power that viscous damping at the rate r dissipates, r ρ V u̇², W; none without viscous damping.
+    /// Power r ρ V u̇² (in W) that viscous damping with the rate r dissipates; none without viscous damping.
     damping_power: Option<Vec<f64>> = Description {
         name: "damping_power",
         unit: "W",
@@ -353,8 +354,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Time at which a point was last within the horizon of a point that triggers refinement or has broken
-    /// bonds, s; none without coarsening.
+    /// Last time (s) at which the point was within the horizon of a source. A source is a point that triggers
+    /// refinement, or a point with broken bonds. None without coarsening.
     last_seen: Option<Vec<f64>> = Description {
         name: "last_seen",
         unit: "s",
@@ -393,7 +394,7 @@ pub struct Needs {
     pub relaxation: bool,
     /// Whether bonds can break.
     pub damage: bool,
-    /// Number of further results with newly broken bonds.
+    /// Number of further results that contain the number of newly broken bonds.
     pub further_counts: usize,
     /// Whether any point has a plastic state.
     pub plasticity: bool,
@@ -654,8 +655,8 @@ impl<const D: usize> Fields<D> {
     }
 
     /// Record friction and contact damping (N/m³) on an owned point at the end of a step of length `step`
-    /// (s). Add the energy that they dissipated in this step, by the trapezoidal rule, with the velocities in
-    /// the middle of the step.
+    /// (s). Add the energy that these forces have dissipated in this step. The energy is computed by the
+    /// trapezoidal rule, with the velocities in the middle of the step.
     pub fn book_dissipation(
         &mut self,
         point: usize,
@@ -684,7 +685,7 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds of the main result to 0.
+    /// Reset the main result's count of newly broken bonds to 0.
     pub fn forget_newly_broken(&mut self) {
         if let Some(new) = &mut self.newly_broken_bonds {
             new.fill(0.0);

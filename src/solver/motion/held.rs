@@ -176,8 +176,8 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Tolerance of the present stage times ‖loads‖ for the present loads, N: the largest allowed norm of the
-    /// unbalanced forces if there are no reactions. Collective.
+    /// Return the tolerance of the present stage, multiplied by the norm ‖loads‖ (N) of the present loads. If
+    /// there are no reactions, this product is the largest allowed norm of the unbalanced forces. Collective.
     fn allowed_force(&self) -> f64 {
         let tolerance = match self.time_rule().method {
             Method::Relaxation(Relaxation { tolerance, .. })

@@ -3,10 +3,11 @@
 //! A load step advances the time, which is the load parameter; loads and supports follow the time. A method
 //! then solves for the equilibrium: [`super::relaxation`] or [`super::newton`].
 //!
-//! Bonds break only at equilibria. Bonds that reach their criterion at an equilibrium break. The next
-//! equilibrium is then found at the same load. This is repeated until no bond breaks. The history of bonds
-//! and points is part of the equilibrium. Iterations compute the forces from a trial history: the history
-//! after a step from the last equilibrium to the present positions. The history is stored at equilibrium.
+//! Bonds break only at equilibria. A bond breaks if it reaches its criterion at an equilibrium. The next
+//! equilibrium is then found at the same load. This is repeated until no bond breaks. The forces at an
+//! equilibrium follow from the history of bonds and points at this equilibrium. Therefore iterations compute
+//! the forces from a trial history: the history after a step from the last equilibrium to the present
+//! positions. The history is stored at equilibrium.
 //!
 //! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖), with the total forces f on the
 //! points. If a free body only moves rigidly, f, the loads and the reactions are 0 apart from round-off.
@@ -313,8 +314,8 @@ impl<const D: usize> Simulation<'_, D> {
     ///
     /// # Errors
     /// If the load step has failed. In runs without contact, the message names a piece that is loaded along
-    /// an axis, but that no support holds along this axis. In all other cases, the message names the
-    /// residual, or says that forces are not finite.
+    /// an axis, but that no support holds along this axis. In runs with contact, or if there is no such
+    /// piece, the message describes the unbalanced forces, or says that forces are not finite.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.progress.load_step.has_failed {
             return Ok(());
@@ -412,9 +413,9 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Sum over this rank's owned points with a finite fictitious density; only points that have never had an
-/// intact bond are excluded. `terms` returns the terms of a point, given the index and the fictitious density
-/// (N/m⁴) of the point.
+/// Sum over this rank's owned points whose fictitious density is finite. It is finite at all points except
+/// points that have never had an intact bond. `terms` returns the terms of a point, given the index and the
+/// fictitious density (N/m⁴) of the point.
 pub(super) fn sums<const D: usize, const N: usize>(
     model: &Model<D>,
     fields: &Fields<D>,

@@ -55,10 +55,10 @@ const MAX_CG_ITERATIONS: u64 = 500;
 /// Maximum number of step lengths that are tried along a direction.
 const MAX_LINE_SEARCH_STEPS: usize = 8;
 
-/// The line search ends when |x·f| is at most this fraction of x·f before the search.
+/// The line search ends when |x·f| is at most this fraction of the value that x·f had before the search.
 const LINE_SEARCH_TOLERANCE: f64 = 0.9;
 
-/// η of the first solution of a linear problem in a run.
+/// Value of η for the first linear problem of a run.
 const FIRST_FORCING: f64 = 0.01;
 
 /// Upper limit of later values of η.
@@ -73,8 +73,8 @@ const LEAST_INTACT: f64 = 1e-3;
 /// State of Newton's method between iterations; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonState {
-    /// Number of force evaluations of the present load step (with any method), or of the present time step in
-    /// explicit stages.
+    /// Number of force evaluations of the present load step, by relaxation or by Newton's method. In explicit
+    /// stages, the number of force evaluations of the present time step.
     pub evaluations: u64,
     /// η of the next solution of a linear problem.
     forcing: f64,
@@ -281,8 +281,8 @@ impl<const D: usize> Vectors<D> {
         simulation.progress.newton.adapt(linear, force);
     }
 
-    /// Store the total forces at the base u. Set the residual of the linear problem to these forces, and to 0
-    /// where the inverse diagonal is 0.
+    /// Store the total forces at the displacements u in `base`. Set the residual of the linear problem to
+    /// these forces, and to 0 where the inverse diagonal is 0.
     fn note_force(&mut self, simulation: &Simulation<'_, D>) {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {
@@ -618,7 +618,8 @@ impl<const D: usize> Simulation<'_, D> {
         self.progress.newton.left *= 2;
     }
 
-    /// Count a finished load step. At the end of the original load step, restore the original size.
+    /// Count a finished load step. If load steps have been halved, restore the original size at the end of
+    /// the load step that was halved first.
     fn end_halves(&mut self) {
         self.progress.newton.left -= 1;
         if self.progress.newton.left > 0 {

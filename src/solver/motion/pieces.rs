@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::comm::{Found, least, total};
 use crate::solver::Simulation;
 
-/// Data of the piece of each local point; the same at all points of a piece.
+/// Data of the piece to which each local point belongs. All points of a piece have the same data.
 pub(super) struct Pieces<const D: usize> {
     /// Smallest point id of the piece.
     first: Vec<f64>,
@@ -26,8 +26,8 @@ pub(super) struct Piece {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a column per component over the local points: 0 for points that can move and have a nonzero
-    /// load, otherwise 1.
+    /// Return a column per component over the local points. An entry is 0 if the point can move and this
+    /// component of its load is not 0, otherwise 1.
     pub(super) fn unloaded_points(&self) -> [Vec<f64>; D] {
         let mut all = std::array::from_fn(|_| vec![1.0; self.model.volume.len()]);
         // A point that has never had an intact bond does not move in load steps, so its loads are ignored.

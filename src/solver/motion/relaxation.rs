@@ -10,11 +10,11 @@
 //! c ← 2 √(u̇·¹K u̇ / u̇·ρ u̇),   ¹K u̇ = −(f_new − f_old)
 //! ```
 //!
-//! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1, times a reserve. ρ follows
-//! from the largest eigenvalue of the matrix D of each point. c is the critical damping of the present
-//! motion. The quotient under the root is a Rayleigh quotient of the tangent stiffness ¹K. It uses u̇ rather
-//! than u, because differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the result is bitwise
-//! independent of ranks and threads.
+//! ρ is the product of a reserve factor and the density for which the bound of [`super::stable_step`] gives
+//! Δt = 1. ρ follows from the largest eigenvalue of the matrix D of each point. c is the critical damping of
+//! the present motion. The quotient under the root is a Rayleigh quotient of the tangent stiffness ¹K. It
+//! uses u̇ rather than u, because differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the
+//! result is bitwise independent of ranks and threads.
 //!
 //! [`super::load_step`] defines the equilibrium and when bonds break.
 //!
@@ -57,8 +57,8 @@ struct Before {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Make one iteration towards the equilibrium of the load step. If the last load step is finished, begin
-    /// the next one. Collective.
+    /// Make one iteration towards the equilibrium of the present load step. If this load step is already
+    /// settled, begin the next load step. Collective.
     fn relax(&mut self, rule: &Relaxation) {
         let (start, forces) = (Instant::now(), self.times.forces.whole());
         let before = if self.progress.load_step.is_settled {
@@ -96,7 +96,8 @@ impl<const D: usize> Simulation<'_, D> {
         velocity.for_each(|component| component.fill(0.0));
     }
 
-    /// Move the points by one iteration. Returns the sums with the new velocities and the old forces.
+    /// Move the points by one iteration. Returns the sums of [`Before`], with the velocities of this
+    /// iteration and the forces before it.
     fn drift(&mut self) -> Before {
         self.progress.load_step.iterations += 1;
         self.progress.load_step.since_breaking += 1;

@@ -43,7 +43,7 @@ pub struct Part<'a, const D: usize> {
     bond_inputs: BondInputs<'a, D>,
 }
 
-/// One component of the motion of the points of a part, and of the forces on them.
+/// One component of the displacements, velocities, force densities and reactions of the points of a part.
 pub struct Moving<'a> {
     /// Displacements, m.
     pub displacement: &'a mut [f64],
@@ -94,7 +94,8 @@ impl<'a, const D: usize> Part<'a, D> {
         &self.model.block[self.first..self.first + self.count()]
     }
 
-    /// Return the entries of the part's points from a field over all owned points.
+    /// Return the entries of `field` that belong to the points of this part. `field` has entries for all
+    /// owned points.
     pub fn of<'f>(&self, field: &'f [Vec<f64>; D]) -> [&'f [f64]; D] {
         (field.each_ref()).map(|column| &column[self.first..self.first + self.count()])
     }
@@ -180,7 +181,8 @@ pub fn parts(owned: usize) -> usize {
     owned.div_ceil(PART)
 }
 
-/// One or several adjacent parts, and their entries of the argument `each` of [`walk`]: one entry per part.
+/// One or several adjacent parts, with their entries in `each`, an argument of [`walk`]. Each part has one
+/// entry.
 type Parts<'a, C, const D: usize> = (Part<'a, D>, &'a mut [C]);
 
 /// Split several parts into two halves; a single part is not split.

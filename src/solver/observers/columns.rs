@@ -35,7 +35,7 @@ pub struct GlobalState {
     pub force_evaluations: u64,
     /// Number of steps rolled back so far.
     pub undone_steps: u64,
-    /// Largest number of broken bonds of one point in one step; only steps since the last row count.
+    /// Largest number of bonds of one point that broke in one step, over the steps since the last row.
     pub most_broken: u64,
     /// Energy added by changes of the density scale, J.
     pub density_scale_energy: f64,

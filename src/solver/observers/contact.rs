@@ -3,9 +3,10 @@
 //! spacing of the two points: the mean of the edges of their cells. For bodies whose common bonds have
 //! broken, the limit is half the spacing. [`Contact`] states the exact limits.
 //!
-//! If the bounding boxes of two bodies overlap or nearly touch, the points in this region are distributed to
-//! the ranks by spatial cells. Each rank then compares the points of its cells. A point of the second body
-//! may be too near to points of the first body in several cells. It is sent to the ranks of all these cells.
+//! If the bounding boxes of two bodies overlap or nearly touch, a third box is computed. It contains all
+//! points of each body that are near the other body. The points in this box are distributed to the ranks by
+//! spatial cells. Each rank then compares the points of its cells. A point of the second body may be too near
+//! to points of the first body in several cells. It is sent to the ranks of all these cells.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -16,16 +17,17 @@ use crate::points::distance_squared;
 use crate::solver::Simulation;
 use crate::solver::model::Model;
 
-/// Edge of a cell divided by [`Meeting::radius`]. Large cells have fewer points near their borders, so fewer
-/// points are sent to several ranks.
+/// Edge of a cell divided by [`Meeting::radius`]. If cells are large, fewer points in total lie near the
+/// border of a cell, so fewer points are sent to several ranks.
 const CELL: f64 = 8.0;
 
-/// Two points of bodies that no bond joins are too near only if their distance is below this fraction of
-/// their initial distance.
+/// If no bond joins two bodies, a point of one body and a point of the other body are too near only if their
+/// distance is below this fraction of their initial distance.
 const NEARER: f64 = 0.9;
 
-/// Two points of bodies that bonds joined are too near if their distance is below this fraction of both their
-/// spacing and their initial distance. Compression alone rarely reaches this distance.
+/// If bonds joined two bodies at the start of the run, a point of one body and a point of the other body are
+/// too near if their distance is below this fraction of both their spacing and their initial distance.
+/// Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Minimum number of points that one task processes; the last task may have fewer.
@@ -91,7 +93,7 @@ struct Candidate {
 }
 
 impl ContactWatch {
-    /// Find the pairs of bodies to check. Collective.
+    /// Find the pairs of bodies that may come into contact. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let bodies = simulation.problem.bodies.len();
@@ -214,8 +216,9 @@ fn place_of<const D: usize>(
     place
 }
 
-/// Select the owned points in the boxes where bodies may touch. If bonds joined the bodies, select only
-/// points with broken bonds. Returns the points as bytes, one buffer for each receiving rank.
+/// Select the owned points in the boxes where bodies may touch. If bonds joined two bodies at the start of
+/// the run, select only those of their points that have broken bonds. Returns the points as bytes, one buffer
+/// for each receiving rank.
 fn candidates<const D: usize>(
     simulation: &Simulation<'_, D>,
     meetings: &[Meeting],

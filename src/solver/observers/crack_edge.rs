@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 type Vector = Vector3<f64>;
 
-/// Threshold of a distance, in horizons. The distance is measured in the plane of the crack, from the mean
-/// position of the damaged points around a point to the mean position of the point's family. A point can be
-/// on the front only if its distance exceeds the threshold. The distance is 0.4 on a straight front, and 0.05
-/// at an edge of the body.
+/// Threshold of a distance, in horizons. Each damaged point has such a distance. In the plane of the crack,
+/// it is measured from the mean position of the damaged points around the point to the mean position of the
+/// point's family. A point can be on the front only if its distance exceeds the threshold. The distance is
+/// 0.4 on a straight front, and 0.05 at an edge of the body.
 const ONE_SIDED: f64 = 0.2;
 
 /// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged
@@ -37,8 +37,8 @@ impl Edge {
     /// [`Moments::mean`](crate::solver::bonds::Moments::mean) for the point, m. `radius` is the radius of the
     /// family, m.
     ///
-    /// At the edge, the damaged points lie on one side of the family, and no damaged point lies in the cone
-    /// ahead.
+    /// The point is at the edge if two conditions are met. The damaged points lie on one side of the point's
+    /// family (see `ONE_SIDED`). The cone ahead of the point contains no damaged point (see `CONE`).
     pub fn find(
         radius: f64,
         bonds: &[Vector],
@@ -72,7 +72,7 @@ impl Edge {
         bond.dot(&self.ahead) > CONE * bond.norm()
     }
 
-    /// Whether a bond lies in the cone ahead and close to the plane of the crack.
+    /// Whether a bond lies in the cone ahead and is close to the plane of the crack.
     pub fn is_ahead(&self, bond: &Vector) -> bool {
         self.is_in_cone(bond) && bond.dot(&self.normal).abs() <= IN_PLANE * bond.norm()
     }

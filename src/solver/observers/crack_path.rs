@@ -10,8 +10,8 @@ use crate::solver::Simulation;
 use super::centre_line::{Branch, Damaged, Reach, branches};
 use super::crack_points::{link, points_of, spacings};
 
-/// Lower limit of the distance up to which damaged points are connected, in spacings. With this limit,
-/// diagonal neighbours are connected for any horizon.
+/// Lower limit of the connection distance, in spacings. Two damaged points are connected if they are at most
+/// the connection distance apart. With this limit, diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.5;
 
 /// A crack whose path is tracked.

@@ -134,13 +134,13 @@ impl HistoryRow {
 struct Sums(Vec<ExactSum>);
 
 impl Sums {
-    /// Add a sum and return its position.
+    /// Append a sum and return its position.
     fn push(&mut self, sum: ExactSum) -> usize {
         self.0.push(sum);
         self.0.len() - 1
     }
 
-    /// Add several sums and return their positions.
+    /// Append several sums and return their positions.
     fn extend(&mut self, sums: impl IntoIterator<Item = ExactSum>) -> Range<usize> {
         let start = self.0.len();
         self.0.extend(sums);
@@ -154,8 +154,10 @@ impl HistoryObserver {
     /// # Errors
     /// - If a set is empty.
     /// - If no point lies along the line of a front.
-    /// - If all points of the set of a crack tip lie behind the start of the line.
-    /// - If the box of a J integral contains no point, or is too near to the end of the bodies.
+    /// - If all points in the set of a crack tip lie behind the start of the tip's line.
+    /// - If the box of a J integral contains no point.
+    /// - If the crack of a J integral grows along an axis, but the bodies end less than one horizon beyond
+    ///   the box along this axis.
     /// - If no body lies on the line that approximates the crack front of a J integral.
     ///
     /// The error is the same on all ranks.
@@ -438,7 +440,7 @@ impl HistoryObserver {
         }
     }
 
-    /// Collect the values of the probes on all ranks. Collective.
+    /// Return the values of each probe. The result is the same on all ranks. Collective.
     fn probe_values<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

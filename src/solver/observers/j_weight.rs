@@ -117,7 +117,8 @@ fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
 }
 
 /// Return the range of a (m) in which the cell of the point at `position` (m) covers the line
-/// {a · `direction`}. `None` if the point is more than one edge away from the line.
+/// {a · `direction`}. `None` if the distance of the point from the line exceeds the edge of the cell
+/// (`edges[0]`).
 fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
     let across = (0..3).map(|d| (position[d] - along * direction[d]).powi(2));
@@ -125,11 +126,12 @@ fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (across.sum::<f64>() <= edges[0].powi(2)).then_some(along - half..along + half)
 }
 
-/// Integrate q along a line from one end of the bodies to the other, m. Gaps along the line are included. The
-/// line passes through the centre of the box in the direction `front`. Collective.
+/// Return the integral of q along a line, m. The line passes through the centre of the box in the direction
+/// `front`. The integral extends from the first to the last position at which a body lies on the line. Gaps
+/// along the line are included. Collective.
 ///
 /// # Errors
-/// If no body lies on the line in the box. The error is the same on all ranks.
+/// If no body lies on the part of the line that is inside the box. The error is the same on all ranks.
 pub fn front_length<const D: usize>(
     simulation: &Simulation<'_, D>,
     rule: &JIntegral,

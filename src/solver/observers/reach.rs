@@ -1,4 +1,5 @@
-//! The farthest position along a line at which values exceed a threshold, interpolated to the threshold.
+//! The farthest position along a line at which values exceed a threshold. The values are interpolated between
+//! points to find the position where they equal the threshold.
 
 use nalgebra::Vector3;
 
@@ -60,16 +61,16 @@ impl Course {
         total(comm, self.points.len() as u64) == 0
     }
 
-    /// Find how far the points whose `value` exceeds the threshold extend along the line. `value` returns the
-    /// value of a point, given its local index. The result is `None` if no value exceeds the threshold. The
-    /// result is bitwise the same for any number of ranks. Collective.
+    /// Find the farthest position along the line at which the values of the points exceed the threshold.
+    /// `value` returns the value of a point, given its local index. The result is `None` if no value exceeds
+    /// the threshold. The result is bitwise the same for any number of ranks. Collective.
     ///
     /// The search starts at the farthest point above the threshold; if several are equally far, at the
-    /// one with the smallest id. The next points lie ahead of this point and within one horizon of it, and are the
-    /// nearest such points along the line. The values are interpolated linearly between
-    /// the farthest and the next points to find the threshold. If several points are equally far along the
-    /// line, the largest of their values is used. When values grow, the result therefore moves along the line
-    /// without jumps, even when the next point exceeds the threshold.
+    /// one with the smallest id. The next points are the nearest points along the line that lie ahead of this
+    /// point and within one horizon of it. The values are interpolated linearly between the farthest and the
+    /// next points to find the threshold. If several points are equally far along the
+    /// line, the largest of their values is used. While values grow, the result therefore moves along the
+    /// line without jumps, also when the value of a next point begins to exceed the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

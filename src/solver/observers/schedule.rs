@@ -28,8 +28,8 @@ impl Schedule {
         }
     }
 
-    /// Whether output is due: at the start, at the end of a stage, and in the first step that reaches a
-    /// multiple of the interval or a given time, up to round-off.
+    /// Whether output is due. Output is due at the start and at the end of a stage. Output is also due in the
+    /// first step that reaches, up to round-off, a multiple of the interval or a given time.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;

@@ -225,8 +225,9 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     rows
 }
 
-/// Stretch ratio (deformed over reference length) of an owned point perpendicular to the plane or bar, for
-/// this deformation gradient. The ratio is 1 in plane strain, under uniaxial strain, and in 3-D.
+/// Stretch ratio (deformed over reference length) perpendicular to the plane or bar. `gradient` is the
+/// deformation gradient of the owned point `point`. The ratio is 1 in plane strain, under uniaxial
+/// strain, and in 3-D.
 fn out_of_plane_stretch<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
@@ -260,9 +261,9 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
     simulation.problem.block(block).body.material.elastic
 }
 
-/// Trace of the 3-D strain of an owned point, from `in_plane`, the trace in the plane or along the bar. In
-/// plane stress, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx. Thermal
-/// strain is added.
+/// Trace of the 3-D strain of an owned point. `in_plane` is the trace in the plane, or the strain along the
+/// bar. In plane stress, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
+/// Thermal strain is added.
 fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_plane: f64) -> f64 {
     let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
@@ -282,9 +283,9 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_plane:
 }
 
 /// Thermal stretch of an owned point in 3-D, in plane stress, or in a bar that can expand sideways; 0 without
-/// temperatures. Under plane or uniaxial strain, the result is 0. The stretch perpendicular to the plane or
-/// bar is then 1, so the determinant of F is also the determinant of the 3-D deformation. No thermal
-/// correction is needed.
+/// temperatures. Under plane or uniaxial strain, the result is 0. The stretch ratio perpendicular to the
+/// plane or bar is then 1, so the determinant of F is also the determinant of the 3-D deformation gradient.
+/// No thermal correction is needed.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],

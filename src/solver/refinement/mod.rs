@@ -65,10 +65,11 @@ impl Refined {
     }
 }
 
-/// State of the points of new grids, from the state before the change of grids. Each rank has the points in
-/// its range of ids.
+/// State of the points of new grids, computed from the state before the change of grids. Each rank has the
+/// points in its range of ids.
 struct GridState {
-    /// State of the points, one row per point. The last number of a row is the previous block.
+    /// State of the points, one row per point. The last number of a row is the block of the point before the
+    /// refinement, or [`NOWHERE`] if the point did not exist.
     rows: Vec<f64>,
     /// Length of a row.
     width: usize,
@@ -102,9 +103,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if, for at
-    /// least the time `coarsen_after`, it has been outside the horizons of triggering points and of points
-    /// with broken bonds. Return the numbers of created and removed points; `None` if the grids do not
+    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened after a time
+    /// of at least `coarsen_after` outside the horizons of triggering points and of points with broken bonds.
+    /// Return the numbers of created and removed points; `None` if the grids do not
     /// change. Collective.
     ///
     /// # Errors
@@ -165,8 +166,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
-    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
-    /// are freed.
+    /// memory for its bonds. The error is the same on all ranks. After an error, the run cannot continue,
+    /// because its points have been freed.
     fn regrid(&mut self, grids: Grids<'a>, removed: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -233,8 +234,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// Compute the state of the points of new grids from the present state. `pieces` are the points of the
-    /// new grids that this rank creates, and `removed` are the present nodes that are removed. Collective.
+    /// Compute the state of the points of new grids from the present state. `pieces` are the points that this
+    /// rank creates on the new grids. `removed` are the present nodes that the new grids no longer have.
+    /// Collective.
     fn state_on(&mut self, grids: &Grids<'_>, removed: &[NodeKey], pieces: &[Point]) -> GridState {
         let comm = self.comm;
         let past = Past::new(self, grids, removed);

@@ -7,7 +7,7 @@ use crate::refine::{GridIndex, Grids, NodeKey};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
-/// Previous block of a point that did not exist before a refinement.
+/// Value that replaces the previous block of a point that did not exist before a refinement.
 pub const NOWHERE: f64 = -1.0;
 
 /// State of the local points, including ghosts, before a refinement. Energies are stored as densities. The
@@ -16,8 +16,8 @@ pub struct Past {
     pub columns: Vec<Vec<f64>>,
     /// For each column, the rule by which new points get their values.
     births: Vec<Birth>,
-    /// Local index by body and grid index (in steps of the finest level). The map contains only points in the
-    /// level-0 cells that [`Grids::changed`] returns for the grids before or after the refinement.
+    /// Local index by body and grid index (in spacings of the finest level). The map contains only points in
+    /// the level-0 cells that [`Grids::changed`] returns for the grids before or after the refinement.
     at: FxHashMap<(usize, GridIndex), usize>,
     /// Whether each local point is removed.
     is_removed: Vec<bool>,

@@ -152,7 +152,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
 const FAST_PATH_BACKOFF: usize = 7;
 
 /// Choice between the fast path and the full loop for the next lane group. Lists have no fast path, because
-/// loading points j takes most of the time.
+/// their loops spend most of the time on loading points j.
 struct FastPathGate {
     /// Whether the fast path is allowed: the kernel may skip its criterion, and it removes no thermal
     /// stretches from the bonds.

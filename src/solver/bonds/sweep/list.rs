@@ -115,7 +115,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
     }
 }
 
-/// The kernel of breaking bonds and the points of a list.
+/// The kernel [`BreakingBonds`], and the points of a list in the form that this kernel reads.
 struct BreakingInRows<'a, const D: usize> {
     kernel: &'a BreakingBonds,
     points: ListPoints<'a, BreakingBonds, D>,

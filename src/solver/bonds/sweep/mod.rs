@@ -45,7 +45,7 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// Columns over the points. A kernel adds its sums to these columns.
+/// Columns with one entry per point. A kernel adds its sums to these columns.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// A part of the bonds of two blocks.
@@ -65,7 +65,7 @@ trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
     /// Run the kernel over a part; `base` is the local index of the point to which the first entry of the
-    /// results belongs. Return the sums over breaking bonds, by ascending point.
+    /// results belongs. Return the sums over breaking bonds, in ascending order of the points.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -108,7 +108,7 @@ pub fn sweep_from<K: Kernel<D>, const D: usize>(
 }
 
 /// Same as [`sweep`], for a kernel that breaks bonds. Clear the intact bits of the bonds that break, and
-/// return the sums of `breaking` over these bonds, by ascending point.
+/// return the sums of `breaking` over these bonds, in ascending order of the points.
 pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
@@ -120,8 +120,8 @@ pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
     sweep_if_exists(bonds, points, 0, results, (kernel, Some(breaking)), source)
 }
 
-/// Run a kernel that is implemented in `D` dimensions. `kernels` are this kernel and, if it breaks bonds, the
-/// kernel of breaking bonds.
+/// Run a kernel that is implemented in `D` dimensions. `kernels` are this kernel and the kernel that sums
+/// over breaking bonds. The latter is `None` if this kernel breaks no bonds.
 fn sweep_if_exists<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
