@@ -80,11 +80,47 @@ impl Constants {
         })
     }
 
+    /// Return the node of a constant in the table of a material. `key` is the key in the new deck.
+    pub fn node<'n>(material: &'n Node, key: &str) -> Option<&'n Node> {
+        let mut names = NAMES.iter().filter(|(_, known)| *known == key);
+        names.find_map(|(name, _)| material.get(name))
+    }
+
     /// Write the first two constants.
     pub fn write_two(&self, section: &mut Section) {
         for (key, _, value) in self.given.iter().take(2) {
             section.set(*key, value.clone());
         }
+    }
+
+    /// Keep the first two of the constants, in the order of `precedence`. Return the keys of the constants that
+    /// are removed.
+    pub fn keep_two(&mut self, precedence: &[&str]) -> Vec<&'static str> {
+        let rank = |key: &str| precedence.iter().position(|known| *known == key);
+        self.given.sort_by_key(|(key, ..)| rank(key));
+        let kept = self.given.len().min(2);
+        let removed = self.given.drain(kept..);
+        removed.map(|(key, ..)| key).collect()
+    }
+
+    /// Write Young's modulus of a bond-based law of PeriLab, which uses one constant and a fixed Poisson ratio
+    /// `ratio`. Return the key of this constant: the bulk modulus if given, or else the shear modulus, or else
+    /// Young's modulus. Return `None` if none of them is given.
+    pub fn write_young(&self, section: &mut Section, ratio: f64) -> Option<&'static str> {
+        let factors = [
+            ("bulk_modulus", 3.0 * (1.0 - 2.0 * ratio)),
+            ("shear_modulus", 2.0 * (1.0 + ratio)),
+        ];
+        for (key, factor) in factors {
+            if let Some(modulus) = self.get(key) {
+                section.set("youngs_modulus", Value::number(factor * modulus));
+                return Some(key);
+            }
+        }
+        let mut given = self.given.iter();
+        let (key, _, value) = given.find(|(key, ..)| *key == "youngs_modulus")?;
+        section.set(*key, value.clone());
+        Some(key)
     }
 
     /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return false if

@@ -41,6 +41,8 @@ pub struct Entry {
     pub fate: Fate,
     /// The key in the new deck, or the reason why the key is approximated or left out.
     pub note: String,
+    /// Whether the key is an initial value, a load or a support that is left out.
+    pub is_lost_load: bool,
 }
 
 impl fmt::Display for Entry {
@@ -52,6 +54,7 @@ impl fmt::Display for Entry {
             value,
             fate,
             note,
+            is_lost_load: _,
         } = self;
         write!(formatter, "{line:>5}  {fate:<12}  {key}")?;
         if !value.is_empty() {
@@ -61,17 +64,24 @@ impl fmt::Display for Entry {
     }
 }
 
-/// Styles of LAMMPS fixes that are loads or supports.
-pub(super) const LOADS_OF_SCRIPTS: [&str; 8] = [
-    "addforce", "aveforce", "efield", "gravity", "indent", "move", "setforce", "spring",
-];
-
 /// Log note for a damage model that no block uses.
 pub(super) const UNUSED_DAMAGE: &str = "no block uses this damage model";
 
 /// Log note for columns of a point file that PeriLab reads in place of constants of the deck.
 pub(super) const UNUSED_COLUMNS: &str =
     "the new deck has the constants of the source deck, not those in columns of the file";
+
+/// Log note for a node set with numbers that no point has.
+pub(super) const DROPPED_NUMBERS: &str =
+    "PeriLab drops the numbers of this node set above the number of the last point";
+
+/// Log note for a key that scales the coordinates in the neighbour search.
+pub(super) const UNSCALED_FAMILIES: &str =
+    "families are not scaled: a family has the points within the horizon";
+
+/// Log note for the first `run` of a script in which no fix integrates the motion of atoms.
+pub(super) const NO_INTEGRATION: &str =
+    "no `fix nve` acts in the first run, so no atom moves in LAMMPS; points of the new deck move";
 
 /// Log note for an influence function without a counterpart.
 pub(super) const OTHER_INFLUENCE: &str =
@@ -80,8 +90,8 @@ pub(super) const OTHER_INFLUENCE: &str =
 /// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
-/// Line numbers of the losses that change the results. A loss is a key that is left out, or a file that is
-/// read in part.
+/// Line numbers of the losses that change the results. A loss is a key that is left out, a file that is read in
+/// part, or a command or key with another effect in the new deck.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.
@@ -94,34 +104,42 @@ pub struct Losses {
     pub influence: Vec<usize>,
     /// Lines of point files with constants of materials in their columns.
     pub columns: Vec<usize>,
+    /// Lines of node sets with numbers that no point has.
+    pub dropped_numbers: Vec<usize>,
+    /// Lines of keys that scale the families.
+    pub scaled_families: Vec<usize>,
+    /// Line of the first `run` of a script in which no fix integrates the motion of atoms.
+    pub unmoved: Vec<usize>,
 }
 
 impl Losses {
     /// Collect the losses of a deck.
     pub(super) fn of(entries: &[Entry]) -> Self {
         let mut losses = Self::default();
-        let pointwise = entries
-            .iter()
-            .filter(|entry| entry.note.contains(UNUSED_COLUMNS));
-        losses.columns.extend(pointwise.map(|entry| entry.line));
+        for entry in entries {
+            if entry.is_lost_load {
+                losses.conditions.push(entry.line);
+            }
+            for (note, lines) in [
+                (UNUSED_COLUMNS, &mut losses.columns),
+                (DROPPED_NUMBERS, &mut losses.dropped_numbers),
+                (UNSCALED_FAMILIES, &mut losses.scaled_families),
+                (NO_INTEGRATION, &mut losses.unmoved),
+            ] {
+                if entry.note.contains(note) {
+                    lines.push(entry.line);
+                }
+            }
+        }
         let lost = entries
             .iter()
             .filter(|entry| entry.fate == Fate::LeftOut && entry.note != UNUSED_DAMAGE);
         for entry in lost {
-            // The first three arguments of a LAMMPS fix are id, group and style.
-            let style = entry.value.split_whitespace().nth(2).unwrap_or("");
-            if entry.key == "fix" && LOADS_OF_SCRIPTS.contains(&style) {
-                losses.conditions.push(entry.line);
-            }
             let words: Vec<&str> = entry.key.split(" > ").collect();
             let below = |table: &str| {
                 let at = words.iter().position(|word| *word == table)?;
                 Some(words.len() - 1 - at)
             };
-            // A node set among the conditions has a value; a condition is a table.
-            if below("Boundary Conditions") == Some(1) && entry.value.is_empty() {
-                losses.conditions.push(entry.line);
-            }
             let last = words[words.len() - 1];
             let is_criterion = ["Critical Stretch", "Critical Value"].contains(&last);
             match below("Damage Models") {
@@ -184,8 +202,13 @@ impl fmt::Display for Losses {
         for line in &self.influence {
             parts.push(format!("the influence function is left out: line {line}"));
         }
-        for line in &self.columns {
-            parts.push(format!("{UNUSED_COLUMNS}: line {line}"));
+        for (note, lines) in [
+            (UNUSED_COLUMNS, &self.columns),
+            (DROPPED_NUMBERS, &self.dropped_numbers),
+            (UNSCALED_FAMILIES, &self.scaled_families),
+            (NO_INTEGRATION, &self.unmoved),
+        ] {
+            parts.extend(lines.iter().map(|line| format!("{note}: line {line}")));
         }
         formatter.write_str(&parts.join("; "))
     }
@@ -197,6 +220,8 @@ pub(super) struct Log {
     fates: RefCell<HashMap<usize, (Fate, String)>>,
     /// Tables whose outcome holds for all their keys.
     whole_tables: RefCell<HashSet<usize>>,
+    /// Initial values, loads and supports that are left out.
+    lost_loads: RefCell<HashSet<usize>>,
 }
 
 impl Log {
@@ -251,6 +276,12 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
+    /// Log that the new deck lacks an initial value, a load or a support (`node`).
+    pub(super) fn lose_load(&self, node: &Node, note: impl Into<String>) {
+        self.left_out(node, note);
+        self.lost_loads.borrow_mut().insert(node.id);
+    }
+
     /// Return the outcomes of all keys of a tree, in the order of the text. A value or an empty table without
     /// a note has the outcome `LeftOut`. Any other table without a note is not listed, but its keys are.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
@@ -282,6 +313,7 @@ impl Log {
             value: value(node),
             fate,
             note,
+            is_lost_load: self.lost_loads.borrow().contains(&node.id),
         });
         // A table that is left out completely is one entry.
         if fate != Fate::LeftOut && !self.whole_tables.borrow().contains(&node.id) {

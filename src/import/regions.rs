@@ -27,8 +27,8 @@ pub enum Region {
 /// returns a region by its name.
 ///
 /// # Errors
-/// If the style or a region of a union is unknown, an argument is missing or not a number, or the region is
-/// everything outside of a surface (`side out`).
+/// If the style or a region of a union is unknown, an argument is missing or not a number, the region is
+/// everything outside of a surface (`side out`), or the region moves.
 pub fn region(
     variables: &Variables,
     arguments: &[&str],
@@ -43,6 +43,9 @@ pub fn region(
     };
     if option("side") == Some("out") {
         return Err("what lies outside of a region has no shape".to_owned());
+    }
+    if rest.contains(&"move") || rest.contains(&"rotate") {
+        return Err("a region that moves has no fixed shape".to_owned());
     }
     let unit = if option("units") == Some("box") {
         1.0
@@ -161,6 +164,37 @@ impl Region {
             Self::Sphere(..) => self.clone(),
             Self::Union(parts) => Self::Union(all(parts)),
             Self::Difference(parts) => Self::Difference(all(parts)),
+        }
+    }
+
+    /// Return the region of the points that are in this region and in another one.
+    pub fn intersection(self, other: Self) -> Self {
+        let outside = Self::Difference(vec![self.clone(), other]);
+        Self::Difference(vec![self, outside])
+    }
+
+    /// Test whether the shape of the region, enlarged by `MARGIN` times the spacing, contains a point.
+    pub fn contains(&self, point: [f64; 3], spacing: f64) -> bool {
+        let margin = MARGIN * spacing;
+        let is_between = |k: usize, lower: f64, upper: f64| {
+            (lower - margin..=upper + margin).contains(&point[k])
+        };
+        let contains = |part: &Self| part.contains(point, spacing);
+        match self {
+            Self::Block(lower, upper) => (0..3).all(|k| is_between(k, lower[k], upper[k])),
+            Self::Sphere(centre, radius) => {
+                let square: f64 = (0..3).map(|k| (point[k] - centre[k]).powi(2)).sum();
+                square.sqrt() <= radius + margin
+            }
+            Self::Cylinder(axis, centre, radius, ends) => {
+                let [a, b] = others(*axis);
+                (point[a] - centre[0]).hypot(point[b] - centre[1]) <= radius + margin
+                    && is_between(*axis, ends[0], ends[1])
+            }
+            Self::Union(parts) => parts.iter().any(contains),
+            Self::Difference(parts) => parts
+                .split_first()
+                .is_some_and(|(first, rest)| contains(first) && !rest.iter().any(contains)),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::draft::{Section, Value};
 use super::expression::Dialect;
 use super::files::PointFile;
+use super::log::DROPPED_NUMBERS;
 use super::translation::Translation;
 use super::tree::{Content, Node, is_key};
 use crate::error::{Result, excerpt};
@@ -28,6 +29,8 @@ pub struct Sets<'n> {
     /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set. `None` if
     /// an element belongs to a set when at least one of its nodes is in the set.
     ids_by_name: Option<Vec<(String, Vec<u64>)>>,
+    /// Number of the last point if larger numbers in node sets have no effect, as in PeriLab.
+    last_number: Option<u64>,
 }
 
 impl<'n> Sets<'n> {
@@ -39,6 +42,7 @@ impl<'n> Sets<'n> {
             of_mesh: Vec::new(),
             mesh_prefix,
             ids_by_name: None,
+            last_number: None,
         }
     }
 
@@ -47,6 +51,12 @@ impl<'n> Sets<'n> {
     /// set that is not in `sets` is written as a set of the mesh and logged as approximated.
     pub fn set_ids_by_name(&mut self, sets: Vec<(String, Vec<u64>)>) {
         self.ids_by_name = Some(sets);
+    }
+
+    /// Store the number of the last point. Call this function for PeriLab, which drops larger numbers from node
+    /// sets.
+    pub fn set_last_number(&mut self, last: u64) {
+        self.last_number = Some(last);
     }
 
     /// Add a node set of the source deck. `is_declared` says whether Peridigm or PeriLab treats the entry as
@@ -76,7 +86,7 @@ impl<'n> Sets<'n> {
             if let Some(written) = &set.written {
                 return Ok(written.clone());
             }
-            let written = define(translation, &set.name, set.node)?;
+            let written = define(translation, &set.name, set.node, self.last_number)?;
             if !set.is_declared {
                 let note = "a node set by its use; Peridigm wants `Node Set` in its name";
                 translation.log.taken(set.node, note);
@@ -138,13 +148,17 @@ impl<'n> Sets<'n> {
         }
         let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
         let text = set_text(set.node)?;
-        match numbers(&text) {
-            Some(ids) => Some(ids.len() as u64),
-            None => {
-                let ids = crate::points::id_file::read(&translation.path(&text), 1).ok()?;
-                Some(ids.len() as u64)
-            }
-        }
+        let numbers = match numbers(&text) {
+            Some(numbers) => numbers,
+            None => numbers_of_file(translation, &text)?,
+        };
+        let exist = numbers.iter().filter(|number| self.has_point(**number));
+        Some(exist.count() as u64)
+    }
+
+    /// Test whether a point may have this number.
+    fn has_point(&self, number: u64) -> bool {
+        self.last_number.is_none_or(|last| number <= last)
     }
 
     /// Log the declared node sets that nothing uses. Unused entries that are not declared as node sets stay
@@ -160,8 +174,22 @@ impl<'n> Sets<'n> {
     }
 }
 
-/// Write the definition of a node set; return its name.
-fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<String> {
+/// Read the numbers of points in a file; `None` if the file cannot be read.
+fn numbers_of_file(translation: &Translation, file: &str) -> Option<Vec<u64>> {
+    let mut ids = crate::points::id_file::read(&translation.path(file), 1).ok()?;
+    for id in &mut ids {
+        *id += 1;
+    }
+    Some(ids)
+}
+
+/// Write the definition of a node set; return its name. With `last`, drop the numbers above it.
+fn define(
+    translation: &mut Translation,
+    name: &str,
+    node: &Node,
+    last: Option<u64>,
+) -> Result<String> {
     let Some(text) = set_text(node) else {
         let message = format!("`{name}` must be a file, numbers of points or a condition");
         return Err(translation.error(node.line, message));
@@ -184,18 +212,39 @@ fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<Stri
         );
         return Err(translation.error(node.line, message));
     }
-    if let Some(ids) = numbers(&text) {
-        if let Some(zero) = ids.iter().position(|id| *id == 0) {
-            let message = format!(
-                "`{name}`: number {} is 0, but the first point has the number 1",
-                zero + 1
-            );
+    let listed = match numbers(&text) {
+        Some(numbers) => {
+            if let Some(zero) = numbers.iter().position(|number| *number == 0) {
+                let message = format!(
+                    "`{name}`: number {} is 0, but the first point has the number 1",
+                    zero + 1
+                );
+                return Err(translation.error(node.line, message));
+            }
+            Some(numbers)
+        }
+        // The numbers of a file are listed only if some of them are dropped.
+        None => last.and_then(|last| {
+            let numbers = numbers_of_file(translation, &text)?;
+            let is_short = numbers.len() as u64 <= MOST_NUMBERS;
+            (is_short && numbers.iter().any(|number| *number > last)).then_some(numbers)
+        }),
+    };
+    if let Some(mut numbers) = listed {
+        let count = numbers.len();
+        numbers.retain(|number| last.is_none_or(|last| *number <= last));
+        if let (Some(last), true) = (last, numbers.is_empty()) {
+            let message =
+                format!("`{name}`: all its numbers are above {last}, the number of the last point");
             return Err(translation.error(node.line, message));
         }
-        section.set("ids", Value::Ids(ids.iter().map(|id| id - 1).collect()));
-        translation
-            .log
-            .taken(node, format!("{header} ids; the first point has the id 0"));
+        let note = format!("{header} ids; the first point has the id 0");
+        translation.log.taken(node, note);
+        if numbers.len() < count {
+            translation.log.taken(node, DROPPED_NUMBERS);
+        }
+        let ids = numbers.iter().map(|number| number - 1);
+        section.set("ids", Value::Ids(ids.collect()));
     } else if text.contains(['<', '>', '=']) {
         let condition = translation
             .expression(&text, false)

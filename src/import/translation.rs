@@ -236,7 +236,7 @@ impl<'a> Translation<'a> {
 
     /// Leave out an initial value, load or support, and write a comment in its place.
     pub fn leave_out_load(&mut self, node: &Node, section: &str, name: &str, why: &str) {
-        self.log.left_out(node, why);
+        self.log.lose_load(node, why);
         let header = format!("{section}.{}", slug(name));
         self.draft.leave_out(&header, why);
     }

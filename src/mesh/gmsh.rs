@@ -296,13 +296,16 @@ impl File<'_> {
     fn read_nodes_2(&mut self) -> Result<()> {
         let count = self.cursor.count_line()?;
         for _ in 0..count {
-            let tag = self.cursor.int()?;
+            let tag = self.cursor.int()? as u64;
+            let line = self.cursor.line;
             let place = [
                 self.cursor.real()?,
                 self.cursor.real()?,
                 self.cursor.real()?,
             ];
-            self.add_node(tag as u64, place)?;
+            self.cursor.is_on_line(line, "node", tag)?;
+            self.cursor.end_of_line("node", tag)?;
+            self.add_node(tag, place)?;
         }
         Ok(())
     }
@@ -323,16 +326,16 @@ impl File<'_> {
                 tags.push(self.cursor.size()?);
             }
             for tag in &tags {
-                let place = [
-                    self.cursor.real()?,
-                    self.cursor.real()?,
-                    self.cursor.real()?,
-                ];
+                let x = self.cursor.real()?;
+                let line = self.cursor.line;
+                let place = [x, self.cursor.real()?, self.cursor.real()?];
                 if is_parametric {
                     for _ in 0..dimension {
                         self.cursor.real()?;
                     }
                 }
+                self.cursor.is_on_line(line, "node", *tag)?;
+                self.cursor.end_of_line("node", *tag)?;
                 self.add_node(*tag, place)?;
             }
         }
@@ -390,6 +393,7 @@ impl File<'_> {
         let mut types = FxHashMap::default();
         while read < count {
             let mut number = if is_binary { 0 } else { self.cursor.int()? };
+            let line = self.cursor.line;
             let type_number = self.cursor.int()?;
             let following = if is_binary { self.cursor.int()? } else { 1 };
             let tags = self.cursor.int()?;
@@ -418,8 +422,10 @@ impl File<'_> {
                 nodes.clear();
                 for _ in 0..found.0.nodes {
                     let tag = self.cursor.int()?;
+                    self.cursor.is_on_line(line, "element", number as u64)?;
                     nodes.push(self.node(number as u64, tag as u64)?);
                 }
+                self.cursor.end_of_line("element", number as u64)?;
                 if !self.repeats_last_element(found, &nodes) {
                     self.add_element(found, number as u64, &nodes);
                 }
@@ -456,11 +462,14 @@ impl File<'_> {
             let physical = physical.unwrap_or_default();
             for _ in 0..count {
                 let number = self.cursor.size()?;
+                let line = self.cursor.line;
                 nodes.clear();
                 for _ in 0..found.0.nodes {
                     let tag = self.cursor.size()?;
+                    self.cursor.is_on_line(line, "element", number)?;
                     nodes.push(self.node(number, tag)?);
                 }
+                self.cursor.end_of_line("element", number)?;
                 self.add_element(&found, number, &nodes);
                 self.add_to_groups(found.0.dimension(), tag, &physical);
             }
@@ -547,6 +556,28 @@ impl<'a> Cursor<'a> {
         }
         self.at += token.len();
         std::str::from_utf8(token).map_err(|_| self.fault("is not UTF-8 text"))
+    }
+
+    /// Return an error unless the last word is on the line `line`, on which the node or element `number` begins.
+    /// `what` is the kind of this entry. In binary files, the line number does not change.
+    fn is_on_line(&self, line: u64, what: &str, number: u64) -> Result<()> {
+        if self.line == line {
+            return Ok(());
+        }
+        let message = format!("{what} {number}: its line has too few numbers");
+        Err(fault(self.path, line, message))
+    }
+
+    /// Return an error if further words follow on the line of the node or element `number`. `what` is the kind
+    /// of this entry. Binary files have no lines.
+    fn end_of_line(&self, what: &str, number: u64) -> Result<()> {
+        let is_text = matches!(self.encoding, Encoding::Text);
+        let mut rest = self.bytes[self.at..].iter();
+        let next = rest.find(|byte| **byte == b'\n' || !byte.is_ascii_whitespace());
+        if is_text && next.is_some_and(|byte| *byte != b'\n') {
+            return Err(self.fault(format!("{what} {number}: its line has too many numbers")));
+        }
+        Ok(())
     }
 
     /// Read the rest of the line, without the line break.

@@ -129,6 +129,17 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     Ok(mesh)
 }
 
+/// Compare an attribute of a piece, if it is given, with the number of entries in the arrays.
+fn has_count(piece: Node, attribute: &str, count: usize) -> Fault<()> {
+    match piece.attribute(attribute) {
+        Some(given) if given.trim().parse() != Ok(count) => Err(format!(
+            "{attribute} of a piece is {}, but its arrays have {count}",
+            excerpt(given)
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Members of groups, by kind (true for nodes, false for elements), name of the array, and value.
 type Groups = IndexMap<(bool, String, i64), Runs>;
 
@@ -181,6 +192,8 @@ impl File<'_> {
             mesh.nodes
                 .push(place.map_err(|message| format!("point {number}: {message}"))?);
         }
+        let count = points.len() / 3;
+        has_count(piece, "NumberOfPoints", count)?;
         let cells = child(piece, "Cells").ok_or("a piece has no Cells")?;
         let named = |name: &str| {
             let array = arrays(cells).find(|array| array.attribute("Name") == Some(name));
@@ -199,7 +212,7 @@ impl File<'_> {
             );
             return Err(message);
         }
-        let count = (points.len() / 3) as u64;
+        has_count(piece, "NumberOfCells", types.len())?;
         let mut start = 0;
         for (cell, (end, number)) in offsets.iter().zip(&types).enumerate() {
             let Some((kind, order)) = kind(*number) else {
@@ -221,7 +234,7 @@ impl File<'_> {
             };
             if let Some(node) = nodes
                 .iter()
-                .find(|node| u64::try_from(**node).is_ok_and(|node| node >= count) || **node < 0)
+                .find(|node| usize::try_from(**node).is_ok_and(|node| node >= count) || **node < 0)
             {
                 return Err(format!("cell {cell}: there is no point {node}"));
             }
@@ -245,10 +258,7 @@ impl File<'_> {
             mesh.elements.push(kind, (number, 0), indices);
             start += kind.nodes;
         }
-        let counts = [
-            (false, "CellData", types.len()),
-            (true, "PointData", points.len() / 3),
-        ];
+        let counts = [(false, "CellData", types.len()), (true, "PointData", count)];
         for (of_nodes, section, count) in counts {
             let first = if of_nodes { first_node } else { first_element };
             for array in child(piece, section).into_iter().flat_map(arrays) {

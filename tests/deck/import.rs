@@ -405,18 +405,138 @@ PeriLab:
         Temperature: True
 "#;
 
-/// PeriLab uses a Poisson's ratio of 1/3 in plane strain too, so the bulk modulus equals Young's modulus.
+/// PeriLab computes Young's modulus of bonds from one constant and a fixed Poisson's ratio: 1/3 in plane stress
+/// and plane strain, 1/4 in 3-D.
 #[test]
-fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
-    let folder = Folder::strip("bulk");
-    let constants = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
-    let deck = STRIP
-        .replacen(constants, "        Bulk Modulus: 7.0e+4\n", 1)
-        .replacen("plane stress", "plane strain", 1);
-    let imported = folder.import("bulk.yaml", &deck).unwrap();
-    for line in ["dimension = \"plane-strain\"", "youngs_modulus = 70000.0"] {
+fn bonds_of_perilab_have_a_fixed_poisson_ratio() {
+    let folder = Folder::strip("fixed-ratio");
+    let given = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
+    let with = |constants: &[(&str, f64)], model: &str, symmetry: &str| {
+        let lines = constants.iter();
+        let lines = lines.map(|(key, value)| format!("        {key}: {value}\n"));
+        let deck = STRIP
+            .replacen(given, &lines.collect::<String>(), 1)
+            .replacen("Bond-based Elastic", model, 1)
+            .replacen("plane stress", symmetry, 1);
+        folder.import("fixed.yaml", &deck).unwrap()
+    };
+    let (k, g, e, nu) = (
+        "Bulk Modulus",
+        "Shear Modulus",
+        "Young's Modulus",
+        "Poisson's Ratio",
+    );
+    for (constants, young) in [
+        (&[(k, 7e4)][..], 7e4),
+        (&[(k, 7e4), (nu, 0.3)], 7e4),
+        (&[(g, 3e4)], 8e4),
+        (&[(g, 3e4), (nu, 0.25)], 8e4),
+        (&[(k, 7e4), (g, 3e4)], 7e4),
+        (&[(e, 5e4), (g, 3e4)], 8e4),
+        (&[(e, 5e4), (k, 7e4)], 7e4),
+        (&[(e, 5e4), (nu, 0.34)], 5e4),
+    ] {
+        for symmetry in ["plane stress", "plane strain"] {
+            let imported = with(constants, "Bond-based Elastic", symmetry);
+            folder.problem(&imported);
+            let found = imported.text.lines();
+            let mut found = found.filter_map(|line| line.strip_prefix("youngs_modulus = "));
+            let found = found.next().and_then(|number| number.parse::<f64>().ok());
+            assert_eq!(found, Some(young), "{constants:?}");
+        }
+    }
+    let key = |name: &str| format!("PeriLab > Models > Material Models > Alu > {name}");
+    let ignored = "PeriLab computes it from the other constants";
+    let imported = with(&[(k, 7e4), (g, 3e4)], "Bond-based Elastic", "plane stress");
+    let note = "youngs_modulus of the material, for a Poisson's ratio of 1/3";
+    assert_eq!(fate(&imported, &key(k)), (Fate::Taken, note));
+    assert_eq!(fate(&imported, &key(g)), (Fate::LeftOut, ignored));
+    // In 3-D, E = 3 (1 − 2/4) K and E = 2 (1 + 1/4) G.
+    folder.write(
+        "strip.txt",
+        "header: x y z block_id volume\n0 0 0 1 0.5\n1 0 0 1 0.5\n",
+    );
+    for (constant, young) in [(k, "105000.0"), (g, "175000.0")] {
+        let imported = with(&[(constant, 7e4)], "Bond-based Elastic", "3D");
+        let line = format!("youngs_modulus = {young}");
+        assert!(imported.text.contains(&line), "{}", imported.text);
+    }
+    // Other laws have two constants: those of the highest precedence.
+    let all = [(e, 5e4), (nu, 0.3), (k, 7e4), (g, 3e4)];
+    let imported = with(&all, "PD Solid Elastic", "3D");
+    let line = "bulk_modulus = 70000\npoisson_ratio = 0.3\n";
+    assert!(imported.text.contains(line), "{}", imported.text);
+    for constant in [e, g] {
+        assert_eq!(fate(&imported, &key(constant)), (Fate::LeftOut, ignored));
+    }
+}
+
+/// PeriLab calls no function that applies conditions of the type Neumann.
+#[test]
+fn conditions_of_perilab_of_the_type_neumann_have_no_effect() {
+    let folder = Folder::strip("neumann");
+    let line = 1 + STRIP[..STRIP.find("    Hold:").unwrap()]
+        .matches('\n')
+        .count();
+    let of_type = |kind: &str| {
+        let text = STRIP.replacen(
+            "Value: 0\n      Type: Dirichlet",
+            &format!("Value: 0\n      Type: {kind}"),
+            1,
+        );
+        folder.import("strip.yaml", &text).unwrap()
+    };
+    let imported = of_type("Neumann");
+    let note = "PeriLab applies no condition of the type Neumann";
+    let key = "PeriLab > Boundary Conditions > Hold";
+    assert_eq!(fate(&imported, key), (Fate::LeftOut, note));
+    assert!(imported.losses().conditions.contains(&line));
+    assert!(
+        !imported.text.contains("[condition.hold]\nset"),
+        "{}",
+        imported.text
+    );
+    // An unknown type is one of Dirichlet.
+    let imported = of_type("neumann");
+    assert_eq!(
+        fate(&imported, &format!("{key} > Type")).0,
+        Fate::Approximated
+    );
+    assert!(
+        imported.text.contains("[condition.hold]\nset"),
+        "{}",
+        imported.text
+    );
+}
+
+/// PeriLab drops the numbers of a node set above that of the last point.
+#[test]
+fn numbers_of_perilab_without_a_point_are_dropped() {
+    let folder = Folder::strip("dropped");
+    folder.write("ends.txt", "header: global_id\n1\n2\n3\n9\n");
+    let text = STRIP.replacen("Left: 1\n", "Left: 1 7\n", 1);
+    let imported = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&imported);
+    for line in [
+        "[set.left]\nids = [0]\n",
+        "[set.ends]\nids = [0, 1]\n",
+        "force = [0, \"2*(-3*t)\"]",
+    ] {
         assert!(imported.text.contains(line), "{line}\n{}", imported.text);
     }
+    assert_eq!(imported.losses().dropped_numbers, [7, 9]);
+    let warning =
+        "PeriLab drops the numbers of this node set above the number of the last point: line 7";
+    assert!(
+        imported.losses().to_string().contains(warning),
+        "{}",
+        imported.losses()
+    );
+    let text = STRIP.replacen("Left: 1\n", "Left: 3 4\n", 1);
+    let error = folder.import("strip.yaml", &text).unwrap_err();
+    let message =
+        "strip.yaml:7:7: `Left`: all its numbers are above 2, the number of the last point";
+    assert_eq!(error.lines().next(), Some(message));
 }
 
 /// PeriLab rejects a plane material without plane stress or plane strain. The import assumes plane stress,
@@ -549,7 +669,7 @@ fn a_bond_of_lammps_has_its_force() {
     // factor 1 + (δ − 1 − 2)/2 (`vfrac_scale` of `pair_peri_pmb`).
     for (horizon, share) in [(3.5, 1.0), (2.5, 0.75)] {
         let pair = format!(
-            "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 0 0 0\ncreate_box 1 r\n\
+            "units si\natom_style peri\nlattice sc 2.0\nregion r block 0 1 0 0 0 0\ncreate_box 1 r\n\
              create_atoms 1 region r\npair_style peri/pmb\npair_coeff * * 3.0e4 {horizon} 0.1 0.0\n\
              set type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n"
         );
@@ -576,7 +696,7 @@ fn state_based_laws_of_lammps_have_their_influence_function() {
         ("eps", " 1e6", false),
     ] {
         let script = format!(
-            "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 1 0 1\ncreate_box 1 r\n\
+            "units si\natom_style peri\nlattice sc 2.0\nregion r block 0 1 0 1 0 1\ncreate_box 1 r\n\
              create_atoms 1 region r\npair_style peri/{style}\n\
              pair_coeff * * 3.0e4 2.0e4 5.0 0.1 0.0{more}\nset type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n"
         );
@@ -1003,6 +1123,12 @@ fn what_perilab_would_read_otherwise_is_named() {
     let constant = influence.replace("1/xi^2", "1");
     let losses = folder.import("strip.yaml", &constant).unwrap().losses();
     assert!(losses.influence.is_empty(), "{losses}");
+    for (scaling, lines) in [("1.0", &[][..]), ("0.5", &[6])] {
+        let text = format!("    Horizon Mesh Scaling X: {scaling}\n    Node Sets:\n");
+        let text = STRIP.replace("    Node Sets:\n", &text);
+        let losses = folder.import("strip.yaml", &text).unwrap().losses();
+        assert_eq!(losses.scaled_families, lines, "{losses}");
+    }
     folder.write(
         "strip.txt",
         "header: x y block_id volume Bulk_Modulus\n0 0 1 0.5 2\n1 0 1 0.5 3\n",
@@ -1505,7 +1631,8 @@ fn what_is_left_out_has_a_comment_and_what_is_unused_no_warning() {
 }
 
 /// Twelve points of LAMMPS; the four points with x = 2 are the group `top`.
-const BLOCK: &str = "atom_style peri
+const BLOCK: &str = "units si
+atom_style peri
 lattice sc 1.0
 region r block 0 2 0 1 0 1
 region high block 1.5 2 INF INF INF INF
@@ -1524,10 +1651,25 @@ fn block(folder: &Folder, commands: &str) -> Import {
     imported.unwrap_or_else(|error| panic!("{commands}{error}"))
 }
 
-/// Return the lines of an imported deck without comments.
+/// Return the lines of an imported deck without comments and blank lines.
 fn lines(imported: &Import) -> Vec<&str> {
     let lines = imported.text.lines();
-    lines.filter(|line| !line.starts_with('#')).collect()
+    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines.collect()
+}
+
+/// Return the positions of the lattice sites of [`BLOCK`] that are in a set of the imported deck.
+fn sites(problem: &Problem, set: &str) -> Vec<[f64; 3]> {
+    let set = problem.sets.iter().find(|own| own.name == set);
+    let set = set.unwrap_or_else(|| panic!("{:?}", problem.sets));
+    let mut sites = Vec::new();
+    for site in 0..12 {
+        let site = [site % 3, site / 3 % 2, site / 6].map(f64::from);
+        if set::contains(set, 1.0, 0, site, 0) {
+            sites.push(site);
+        }
+    }
+    sites
 }
 
 #[test]
@@ -1641,6 +1783,179 @@ fn fixes_of_lammps_that_do_not_act_are_left_out() {
     assert_eq!(lines(&replaced), lines(&block(&folder, last)));
 }
 
+/// A load or support of LAMMPS acts on the atoms of its group that are in its region.
+#[test]
+fn fixes_of_lammps_act_in_their_region() {
+    let folder = Folder::new("region");
+    let groups = "region front block INF INF INF 0.5 INF INF\nregion far block 7 9 INF INF INF INF\n\
+                  group front region front\ngroup one type 1\ngroup odd id 1 3\nfix 9 all nve\n";
+    let high: &[[f64; 3]] = &[
+        [2.0, 0.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [2.0, 0.0, 1.0],
+        [2.0, 1.0, 1.0],
+    ];
+    for (fix, set, expected) in [
+        (
+            "all addforce 1 0 0 region high every 1",
+            "region_high",
+            high,
+        ),
+        ("all setforce NULL 0 NULL region high", "region_high", high),
+        ("one setforce 0 0 0 region high", "one_in_high", high),
+        (
+            "front addforce 1 0 0 energy v_e region high",
+            "front_in_high",
+            &[[2.0, 0.0, 0.0], [2.0, 0.0, 1.0]],
+        ),
+    ] {
+        let imported = block(&folder, &format!("{groups}fix 1 {fix}\nrun 1\n"));
+        let problem = folder.problem(&imported);
+        assert_eq!(sites(&problem, set), expected, "{fix}\n{}", imported.text);
+        assert_eq!(problem.conditions.len(), 1, "{fix}");
+        let last = imported.entries.iter().rfind(|entry| entry.key == "fix");
+        let note = "; on the points that are in the region at the start";
+        assert!(last.unwrap().note.ends_with(note), "{fix}: {last:?}");
+        assert!(imported.losses().is_empty(), "{fix}");
+    }
+    let line = (BLOCK.lines().count() + groups.lines().count()) + 1;
+    for (fix, note) in [
+        (
+            "all addforce 1 0 0 every 10",
+            "the force does not act in every step",
+        ),
+        ("all addforce 1 0 0 often", "the word `often` is not read"),
+        ("all setforce 0 0 0 region", "the word `region` is not read"),
+        ("all setforce 0 0 0 every 1", "the word `every` is not read"),
+        (
+            "all move linear 1 0 0 region high",
+            "the word `region` is not read",
+        ),
+        (
+            "all move variable NULL v_d NULL v_v NULL NULL",
+            "a component has only a velocity, and another one has a displacement",
+        ),
+        ("all addforce 1 0 0 region low", "its region has no shape"),
+        (
+            "odd addforce 1 0 0 region high",
+            "its group is no body or region",
+        ),
+        (
+            "all addforce 1 0 0 region far",
+            "no atom of its group is in its region at the start",
+        ),
+        (
+            "all indent 1e9 sphere 0 9 0 3 soft",
+            "the word `soft` is not read",
+        ),
+    ] {
+        let imported = block(&folder, &format!("{groups}fix 1 {fix}\nrun 1\n"));
+        assert!(folder.problem(&imported).conditions.is_empty(), "{fix}");
+        let last = imported.entries.iter().rfind(|entry| entry.key == "fix");
+        assert_eq!(last.map(|entry| &*entry.note), Some(note), "{fix}");
+        assert_eq!(imported.losses().conditions, [line], "{fix}");
+    }
+    // A region that moves has no fixed points.
+    let moving = "region slider block 0 1 0 1 0 1 move v_x NULL NULL\nfix 1 all addforce 1 0 0 region slider\n";
+    let imported = block(&folder, &format!("{groups}{moving}run 1\n"));
+    assert_eq!(imported.losses().conditions, [line + 1]);
+    // A displacement that is NULL leaves its component to the velocity.
+    let imported = block(
+        &folder,
+        "variable v equal 3\nfix 1 top move variable NULL NULL NULL v_v NULL NULL\nrun 1\n",
+    );
+    assert!(
+        imported
+            .text
+            .contains("velocity = [3.0, \"free\", \"free\"]"),
+        "{}",
+        imported.text
+    );
+}
+
+/// Atoms that no fix integrates do not move in LAMMPS.
+#[test]
+fn points_of_no_integrator_of_lammps_are_held() {
+    let folder = Folder::new("held");
+    let groups = "region low block INF 0.5 INF INF INF INF\ngroup low region low\ngroup one type 1\n\
+                  region all block INF INF INF INF INF INF\ngroup every region all\n\
+                  group odd id 1 3\nvelocity all set 1 0 0\n";
+    for (fixes, held) in [
+        ("fix 1 top nve\n", Some(8)),
+        ("fix 1 top nve/omp\nfix 2 low move linear 0 0 1\n", Some(4)),
+        ("fix 1 top nve\nfix 2 low nve\n", Some(4)),
+        ("fix 1 top nve\nfix 2 all nve/limit 0.1\n", None),
+        ("fix 1 all nve\nfix 2 top setforce 0 0 0\n", None),
+        ("fix 1 one nve\n", None),
+        ("fix 1 every nve\n", None),
+        ("fix 1 top nve\nunfix 1\nfix 1 all nve\n", None),
+    ] {
+        let imported = block(&folder, &format!("{groups}{fixes}run 3\n"));
+        let problem = folder.problem(&imported);
+        let is_held = problem.sets.iter().any(|set| set.name == "held");
+        assert_eq!(is_held, held.is_some(), "{fixes}{}", imported.text);
+        assert!(imported.losses().is_empty(), "{fixes}{}", imported.losses());
+        let Some(count) = held else { continue };
+        let sites = sites(&problem, "held");
+        assert_eq!(sites.len(), count, "{fixes}{sites:?}");
+        with::<3, _>(&problem, |mut simulation| {
+            while simulation.clock.number() < simulation.clock.last() {
+                simulation.advance();
+            }
+            for point in 0..12 {
+                let position = simulation.model.position(point);
+                let is_held = sites.contains(&position);
+                let moved = simulation
+                    .fields
+                    .displacement
+                    .iter()
+                    .any(|u| u[point] != 0.0);
+                assert_eq!(moved, !is_held, "{fixes}{position:?}");
+            }
+        });
+    }
+    let imported = block(&folder, &format!("{groups}fix 1 odd nve\nrun 3\n"));
+    folder.problem(&imported);
+    let note = "velocity Verlet; its group is no body or region; points outside of it do not move in LAMMPS";
+    assert_eq!(fate(&imported, "fix"), (Fate::LeftOut, note));
+    assert_eq!(imported.losses().conditions, [20]);
+    let imported = block(&folder, "run 3\n");
+    assert_eq!(
+        imported.losses().to_string(),
+        "no `fix nve` acts in the first run, so no atom moves in LAMMPS; points of the new deck move: line 13"
+    );
+}
+
+#[test]
+fn loads_of_lammps_that_are_left_out_are_losses() {
+    let folder = Folder::new("losses");
+    for command in [
+        "velocity all create 300 12345",
+        "velocity all ramp vx 0 5 y 5 25",
+        "displace_atoms top move 0 0 1e-4 units box",
+        "set type 1 vx 3",
+        "fix 1 all wall/reflect xlo EDGE",
+        "fix 1 all nve/noforce",
+        "fix 1 top spring/self 10",
+        "fix 1 all gravity/kk 9.81 vector 0 0 -1",
+    ] {
+        let imported = block(&folder, &format!("fix 9 all nve\n{command}\nrun 1\n"));
+        folder.problem(&imported);
+        let warning = "1 load or support is left out: line 14";
+        assert_eq!(imported.losses().to_string(), warning, "{command}");
+        assert!(imported.text.contains("\n# left out: ["), "{command}");
+        let imported = block(&folder, &format!("fix 9 all nve\nrun 1\n{command}\n"));
+        let is_lost = !command.starts_with("set");
+        assert_eq!(imported.losses().is_empty(), !is_lost, "{command}");
+    }
+    // A fix that does not act is no loss.
+    let imported = block(
+        &folder,
+        "fix 9 all nve\nfix 1 top addforce 1 0 0\nunfix 1\nfix 2 top setforce NULL NULL NULL\nrun 1\n",
+    );
+    assert!(imported.losses().is_empty(), "{}", imported.losses());
+}
+
 #[test]
 fn a_run_of_lammps_ends_at_a_step() {
     let folder = Folder::new("upto");
@@ -1654,7 +1969,7 @@ fn a_run_of_lammps_ends_at_a_step() {
     }
     let wrong = format!("{BLOCK}run 10\nrun 5 upto\n");
     let error = folder.import("deck", &wrong).unwrap_err();
-    let message = "deck:13:1: run: the last step 5 is before the step 10";
+    let message = "deck:14:1: run: the last step 5 is before the step 10";
     assert_eq!(error.lines().next(), Some(message));
 }
 
@@ -1739,6 +2054,18 @@ fn a_wrong_deck_names_file_and_line() {
         (
             lammps("run             200", "run             soon"),
             "28:1: run: must be a number, is `soon`",
+        ),
+        (
+            lammps("units           si", "units           lj"),
+            "2:1: units: the scale of a lattice is a density in the units `lj`; convert the script to si, cgs, micro or nano",
+        ),
+        (
+            lammps("units           si", "units           metal"),
+            "2:1: units: the units `metal` are no consistent system; convert the script to si, cgs, micro or nano",
+        ),
+        (
+            lammps("units           si\n", ""),
+            "1:1: the script has no `units`, so LAMMPS uses the default `lj`: the scale of a lattice is a density",
         ),
         (
             lammps("$(10*v_a)", "${b}"),

@@ -792,6 +792,13 @@ const ABAQUS: &str = "\
  2,
 *Surface, type=ELEMENT, name=Right
 Second, S4
+*Surface, name=Sides, combine=union
+Right,
+BODY,Right
+*Surface, type=NODE, name=Edge
+Face
+*Surface, name=Edges, combine=union
+Edge
 *Solid Section, elset=BODY, material=Steel
 ,
 *End Part
@@ -832,6 +839,8 @@ fn parts_instances_and_sets_of_abaqus() {
         "Nested",
         "Corner",
         "BODY",
+        "left.sides",
+        "Edges",
     ];
     let problem = solid(&path, &sets);
     let found = points(&problem);
@@ -853,6 +862,8 @@ fn parts_instances_and_sets_of_abaqus() {
         ("Nested", &[0, 1, 3]),
         ("Corner", &[0, 3]),
         ("BODY", &[0, 1, 2, 3]),
+        ("left.sides", &[0, 1]),
+        ("Edges", &[0, 2]),
     ] {
         assert_eq!(ids(&problem, set), expected, "{set}");
     }
@@ -1056,6 +1067,44 @@ fn damaged_lines_of_abaqus_have_their_message() {
         ),
         ("NODES", "a.inp: has no elements"),
         (
+            "*ASSEMBLY, NAME=a\n",
+            "a.inp:1: *ASSEMBLY has no *END ASSEMBLY; is the file complete?",
+        ),
+        (
+            "*ASSEMBLY, NAME=a\n*ASSEMBLY, NAME=b\n",
+            "a.inp:2: *ASSEMBLY within another *ASSEMBLY",
+        ),
+        (
+            "*END ASSEMBLY\n",
+            "a.inp:1: *END ASSEMBLY without *ASSEMBLY",
+        ),
+        (
+            "*PART, NAME=p\n*ASSEMBLY, NAME=a\n",
+            "a.inp:2: *ASSEMBLY within `p`, which has no end",
+        ),
+        (
+            "*ASSEMBLY, NAME=a\n*INSTANCE, NAME=i\n*END ASSEMBLY\n",
+            "a.inp:3: *END ASSEMBLY within `i`, which has no end",
+        ),
+        (
+            "*SURFACE, NAME=a\n, S1\n",
+            "a.inp:2: *SURFACE: a line must begin with an element, a node or a set; a blank entry, which stands \
+             for the whole model, is not supported",
+        ),
+        (
+            "*SURFACE, NAME=a, COMBINE=difference\nb, c\n",
+            "a.inp:1: *SURFACE: COMBINE=DIFFERENCE is not supported, only COMBINE=UNION is; list the elements of \
+             the surface",
+        ),
+        (
+            "*SURFACE, NAME=a, CROP\nb\n",
+            "a.inp:1: *SURFACE: CROP is not supported; list the elements of the surface",
+        ),
+        (
+            "NODES*SURFACE, NAME=a, COMBINE=UNION\nb, c\n",
+            "a.inp:5: set `a`: there is no element set `b` before it",
+        ),
+        (
             "*INCLUDE, INPUT=nothing.txt\n",
             "a.inp:1: cannot read nothing.txt: No such file or directory (os error 2)",
         ),
@@ -1146,6 +1195,28 @@ fn survives_mutants(name: &str, bytes: &[u8], seed: u64) {
 fn damaged_files_of_gmsh_are_errors() {
     for ((_, bytes), seed) in two_cubes().all().iter().zip(1..) {
         survives_mutants("two.msh", bytes, seed);
+    }
+}
+
+/// A node or an element is one line of a text file. A number too many or too few would shift all numbers after
+/// it.
+#[test]
+fn lines_of_gmsh_have_their_numbers() {
+    for bytes in [two_cubes().version_2(None), two_cubes().version_4(None)] {
+        let text = String::from_utf8(bytes).unwrap();
+        // A blank line is before the end of a section, and the last but one entry is two lines before it.
+        for (end, name) in [("$EndNodes", "node 11"), ("$EndElements", "element 5")] {
+            let at = text.lines().position(|line| line == end).unwrap() - 3;
+            let line = text.lines().nth(at).unwrap();
+            let (short, _) = line.trim_end().rsplit_once(' ').unwrap();
+            for (changed, what) in [(format!("{line} 1"), "many"), (short.to_owned(), "few")] {
+                let mut lines: Vec<&str> = text.lines().collect();
+                lines[at] = &changed;
+                let error = parse("a.msh", lines.join("\n")).unwrap_err();
+                let message = format!("a.msh:{}: {name}: its line has too {what} numbers", at + 1);
+                assert_eq!(error, message, "{text}");
+            }
+        }
     }
 }
 
@@ -1441,6 +1512,16 @@ fn damaged_grids_have_their_message() {
             "Name=\"types\"",
             "Name=\"kinds\"",
             "Cells: needs whole numbers `types`",
+        ),
+        (
+            "NumberOfCells=\"2\"",
+            "NumberOfCells=\"3\"",
+            "NumberOfCells of a piece is `3`, but its arrays have 2",
+        ),
+        (
+            "NumberOfPoints=\"12\"",
+            "NumberOfPoints=\"x\"",
+            "NumberOfPoints of a piece is `x`, but its arrays have 12",
         ),
         (
             "version=\"1.0\" byte",

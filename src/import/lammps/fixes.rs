@@ -1,16 +1,89 @@
 //! Fixes of LAMMPS: loads, supports, damping, indenters.
 
-use super::run::set;
+use super::groups::{NO_SET, set, set_in_region};
 use super::{Model, wrong};
-use crate::error::Result;
+use crate::error::{Result, excerpt};
 use crate::import::draft::{Section, Value};
-use crate::import::log::{Fate, LOADS_OF_SCRIPTS};
+use crate::import::log::Fate;
 use crate::import::regions::{Region, others};
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
 
 /// Name of the rigid body of an indenter.
 const INDENTER: &str = "indenter";
+
+/// Fix styles that are loads or supports, without the part of a style after `/`, as in `wall/reflect`.
+const LOADS: [&str; 18] = [
+    "addforce",
+    "addtorque",
+    "aveforce",
+    "deform",
+    "drag",
+    "efield",
+    "enforce2d",
+    "freeze",
+    "gravity",
+    "indent",
+    "lineforce",
+    "move",
+    "planeforce",
+    "rigid",
+    "setforce",
+    "smd",
+    "spring",
+    "wall",
+];
+
+/// Test whether a fix style is a load or a support.
+pub(super) fn is_load(style: &str) -> bool {
+    style == "nve/noforce" || LOADS.contains(&style.split('/').next().unwrap_or(""))
+}
+
+/// Return a fix style without the suffix of an accelerated variant.
+pub(super) fn without_suffix(style: &str) -> &str {
+    let suffixes = ["/gpu", "/intel", "/kk", "/omp", "/opt"];
+    let mut plain = suffixes
+        .iter()
+        .filter_map(|suffix| style.strip_suffix(suffix));
+    plain.next().unwrap_or(style)
+}
+
+/// Keyword of a fix, and its values.
+type Setting<'w> = (&'w str, &'w [&'w str]);
+
+/// Split the words after the arguments of a fix into keywords and their values. `known` has the keywords, each
+/// with the number of its values. `Err` holds the first word that is unknown or has too few values.
+fn settings<'w>(
+    words: &'w [&'w str],
+    known: &[(&str, usize)],
+) -> std::result::Result<Vec<Setting<'w>>, &'w str> {
+    let mut found = Vec::new();
+    let mut rest = words;
+    while let [word, after @ ..] = rest {
+        let keyword = known.iter().find(|(keyword, _)| keyword == word);
+        let values = keyword.and_then(|(_, count)| after.get(..*count));
+        let values = values.ok_or(*word)?;
+        found.push((*word, values));
+        rest = &after[values.len()..];
+    }
+    Ok(found)
+}
+
+/// Return the number of arguments of a fix before its keywords, and the keywords that the import reads. Return
+/// `None` for a fix without a counterpart.
+fn form(style: &str, first: Option<&str>) -> Option<(usize, &'static [(&'static str, usize)])> {
+    let of_load: &[_] = &[("region", 1), ("every", 1), ("energy", 1)];
+    let of_support: &[_] = &[("region", 1)];
+    let of_motion: &[_] = &[("units", 1)];
+    match (style, first) {
+        ("addforce", _) => Some((3, of_load)),
+        ("setforce", _) => Some((3, of_support)),
+        ("move", Some("linear")) => Some((4, of_motion)),
+        ("move", Some("wiggle")) => Some((5, of_motion)),
+        ("move", Some("variable")) => Some((7, of_motion)),
+        _ => None,
+    }
+}
 
 /// Translate a fix.
 pub(super) fn fix(
@@ -32,7 +105,8 @@ pub(super) fn fix(
     let spacing = model.spacing.unwrap_or(1.0);
     let is_box = rest.windows(2).any(|pair| pair == ["units", "box"]);
     let unit = if is_box { 1.0 } else { spacing };
-    match *style {
+    let style = without_suffix(style);
+    match style {
         "nve" => {
             translation.log.taken(node, "velocity Verlet");
             return Ok(());
@@ -60,7 +134,35 @@ pub(super) fn fix(
     };
     let volume = spacing.powi(3);
     let name = format!("fix {id}");
-    let made = match (*style, rest.first().copied()) {
+    let Some((count, keywords)) = form(style, rest.first().copied()) else {
+        let note = format!("fix {style} has no counterpart");
+        if is_load(style) {
+            translation.leave_out_load(node, "condition", &name, &note);
+        } else {
+            translation.log.left_out(node, note);
+        }
+        return Ok(());
+    };
+    let settings = match settings(rest.get(count..).unwrap_or(&[]), keywords) {
+        Ok(settings) => settings,
+        Err(word) => {
+            let note = format!("the word {} is not read", excerpt(word));
+            translation.leave_out_load(node, "condition", &name, &note);
+            return Ok(());
+        }
+    };
+    let setting = |keyword: &str| {
+        let found = settings.iter().find(|(known, _)| *known == keyword);
+        found.map(|(_, values)| values[0])
+    };
+    if let Some(steps) = setting("every")
+        && variables.number(steps) != Ok(1.0)
+    {
+        let note = "the force does not act in every step";
+        translation.leave_out_load(node, "condition", &name, note);
+        return Ok(());
+    }
+    let made = match (style, rest.first().copied()) {
         ("setforce", _) => {
             let zero =
                 |k: usize| rest.get(k).and_then(|word| variables.number(word).ok()) == Some(0.0);
@@ -95,9 +197,21 @@ pub(super) fn fix(
             "velocity",
         )),
         ("move", Some("variable")) => {
-            let displacement =
-                vector(&rest[1..], 1.0).map_err(|m| wrong(translation, command, m))?;
-            Some(("displacement", displacement, "displacement"))
+            // Three displacements, then three velocities. A velocity matters only if the displacement of its
+            // component is NULL.
+            let is_null = |k: usize| rest.get(k) == Some(&"NULL");
+            let (key, first) = if (0..3).all(|k| !is_null(1 + k) || is_null(4 + k)) {
+                ("displacement", 1)
+            } else if (0..3).all(|k| is_null(1 + k)) {
+                ("velocity", 4)
+            } else {
+                let note = "a component has only a velocity, and another one has a displacement";
+                translation.leave_out_load(node, "condition", &name, note);
+                return Ok(());
+            };
+            let components = vector(rest.get(first..).unwrap_or(&[]), 1.0);
+            let components = components.map_err(|m| wrong(translation, command, m))?;
+            Some((key, components, key))
         }
         ("move", Some("wiggle")) => {
             let period = rest.get(4).and_then(|word| variables.number(word).ok());
@@ -133,12 +247,8 @@ pub(super) fn fix(
         _ => None,
     };
     let Some((key, value, note)) = made else {
-        let note = format!("fix {style} has no counterpart");
-        if LOADS_OF_SCRIPTS.contains(style) {
-            translation.leave_out_load(node, "condition", &name, &note);
-        } else {
-            translation.log.left_out(node, note);
-        }
+        let note = "its period is not a number";
+        translation.leave_out_load(node, "condition", &name, note);
         return Ok(());
     };
     let vector: Vec<Value> = value;
@@ -149,10 +259,17 @@ pub(super) fn fix(
         translation.log.left_out(node, "prescribes nothing");
         return Ok(());
     }
-    let Some(set) = set(translation, model, bodies, group) else {
-        let note = "its group is no body or region";
-        translation.leave_out_load(node, "condition", &name, note);
-        return Ok(());
+    let region = setting("region");
+    let set = match region {
+        None => set(translation, model, bodies, group).ok_or(NO_SET),
+        Some(region) => set_in_region(translation, model, group, region),
+    };
+    let set = match set {
+        Ok(set) => set,
+        Err(note) => {
+            translation.leave_out_load(node, "condition", &name, note);
+            return Ok(());
+        }
     };
     let written = translation.name("condition", &name);
     let mut section = Section::new(format!("condition.{written}"));
@@ -160,9 +277,14 @@ pub(super) fn fix(
         .set("set", Value::text(set))
         .set(key, Value::List(vector));
     translation.add(section);
-    translation
-        .log
-        .taken(node, format!("[condition.{written}] {note}"));
+    let note = format!("[condition.{written}] {note}");
+    match region {
+        None => translation.log.taken(node, note),
+        Some(_) => {
+            let note = note + "; on the points that are in the region at the start";
+            translation.log.approximated(node, note);
+        }
+    }
     Ok(())
 }
 
@@ -265,6 +387,11 @@ fn indent(
             return Ok(());
         }
     };
+    if let Err(word) = settings(behind, &[("side", 1), ("units", 1), ("vel", 3)]) {
+        let note = format!("the word {} is not read", excerpt(word));
+        translation.leave_out_load(node, "rigid", INDENTER, &note);
+        return Ok(());
+    }
     // An older form of the command gives the velocity of the centre.
     if let Some(at) = behind.iter().position(|word| *word == "vel") {
         for (k, component) in motion.iter_mut().enumerate() {
@@ -301,5 +428,10 @@ fn indent(
         "[rigid.{written}]: a layer of the points' material in place of the force K (r − R)² on each atom"
     );
     translation.log.note(node, Fate::Approximated, note);
+    if arguments[1] != "all" {
+        translation
+            .log
+            .approximated(node, "it acts on all points, not only on its group");
+    }
     Ok(())
 }

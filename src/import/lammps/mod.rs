@@ -1,6 +1,8 @@
 //! Input scripts of LAMMPS with `atom_style peri`.
 
 mod fixes;
+mod groups;
+mod integration;
 mod materials;
 mod run;
 mod setup;
@@ -10,9 +12,11 @@ use crate::import::regions::Region;
 use crate::import::script::{Command, Script, Variables};
 use crate::import::translation::Translation;
 use crate::import::tree::{Content, Node};
+use groups::Group;
+use integration::hold;
 use materials::{Coefficients, write_bodies};
 use run::{Run, follow, simulate};
-use setup::{Group, setup};
+use setup::{UNITS_LJ, setup};
 use std::collections::HashMap;
 
 /// Atoms that one command creates.
@@ -36,6 +40,8 @@ struct Velocity {
 /// Data of the atoms, collected from the script before the new deck is written.
 #[derive(Default)]
 struct Model {
+    /// Whether the script has a `units` command.
+    has_units: bool,
     spacing: Option<f64>,
     origin: [f64; 3],
     regions: Vec<(String, Region, Node)>,
@@ -90,10 +96,16 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
             None => setup(translation, &variables, &mut model, command)?,
         }
     }
+    if !model.has_units {
+        let message =
+            format!("the script has no `units`, so LAMMPS uses the default `lj`: {UNITS_LJ}");
+        return Err(translation.error(1, message));
+    }
     let bodies = write_bodies(translation, &mut model)?;
     let mut run = Run::default();
     // LAMMPS evaluates the variables of fixes and outputs at the start of a run, so fixes and outputs are
     // translated after all definitions.
+    let mut fixes = Vec::new();
     for command in before {
         if !without.contains_key(&command.node.id) {
             simulate(
@@ -104,8 +116,12 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
                 &mut run,
                 command,
             )?;
+            if command.name() == "fix" {
+                fixes.push(command);
+            }
         }
     }
+    hold(translation, &model, &fixes, after.first());
     for command in after {
         read(translation, &mut variables, command)?;
         follow(translation, &variables, &mut run, command)?;

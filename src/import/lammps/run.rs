@@ -1,10 +1,11 @@
 //! Runs of LAMMPS: their time steps, outputs and initial velocities.
 
-use super::fixes::fix;
-use super::setup::{Group, ignored};
+use super::fixes::{fix, is_load, without_suffix};
+use super::groups::{NO_SET, set};
+use super::setup::ignored;
 use super::{Model, NO_STEP, Velocity, makes_no_step, wrong};
 use crate::error::Result;
-use crate::import::draft::{Section, Value};
+use crate::import::draft::Value;
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
 
@@ -75,52 +76,6 @@ pub(super) struct Run {
     history: Option<u64>,
 }
 
-/// Return the name of the set that replaces a group in the new deck. Write the set if the new deck does not
-/// have it yet. Return `None` if the group has no counterpart.
-pub(super) fn set(
-    translation: &mut Translation,
-    model: &Model,
-    bodies: &[(u32, String, String)],
-    name: &str,
-) -> Option<String> {
-    let group = match name {
-        "all" => Group::All,
-        name => {
-            let found = model.groups.iter().find(|(other, ..)| other == name);
-            found.map(|(_, group, _)| group.clone())?
-        }
-    };
-    match group {
-        Group::All => Some("all".to_owned()),
-        Group::Type(kind) => {
-            let mut of_type = bodies.iter().filter(|(of, ..)| *of == kind);
-            match (of_type.next(), of_type.next()) {
-                (Some((.., body)), None) => Some(body.clone()),
-                _ => None,
-            }
-        }
-        Group::Region(region) => {
-            let (_, region, _) = model.regions.iter().find(|(other, ..)| *other == region)?;
-            let region = model
-                .bounds
-                .map_or(region.clone(), |bounds| region.within(bounds));
-            let taken = bodies.iter().any(|(.., body)| body == name);
-            let wanted = if taken {
-                format!("group {name}")
-            } else {
-                name.to_owned()
-            };
-            let written = translation.name("set", &wanted);
-            if !translation.draft.has(&format!("set.{written}")) {
-                let mut section = Section::new(format!("set.{written}"));
-                section.set("shape", region.shape(model.spacing?));
-                translation.add(section);
-            }
-            Some(written)
-        }
-    }
-}
-
 /// Read a number of steps from the argument with the index `k`. The number must be at least `least`.
 fn steps(
     translation: &Translation,
@@ -155,7 +110,7 @@ fn reset(
 /// Read the first `run` command, or a command after it. Commands after the first `run` matter only if they
 /// change the end of the run.
 pub(super) fn follow(
-    translation: &Translation,
+    translation: &mut Translation,
     variables: &Variables,
     run: &mut Run,
     command: &Command,
@@ -195,7 +150,18 @@ pub(super) fn follow(
         name => {
             let reason = ignored(name);
             let reason = reason.unwrap_or("changes after the first `run` are not followed");
-            translation.log.left_out(node, reason);
+            let arguments = command.arguments();
+            let style = arguments.get(2).map_or("", |style| without_suffix(style));
+            match name {
+                "fix" if is_load(style) => {
+                    let name = format!("fix {}", arguments[0]);
+                    translation.leave_out_load(node, "condition", &name, reason);
+                }
+                "velocity" | "displace_atoms" => {
+                    translation.leave_out_load(node, "initial", name, reason);
+                }
+                _ => translation.log.left_out(node, reason),
+            }
         }
     }
     Ok(())
@@ -248,6 +214,10 @@ pub(super) fn simulate(
             }
         }
         "velocity" => initial(translation, model, bodies, command),
+        "displace_atoms" => {
+            let note = "points start on the lattice";
+            translation.leave_out_load(node, "initial", "displace_atoms", note);
+        }
         "fix" => fix(translation, variables, model, bodies, command)?,
         "unfix" => translation.log.taken(node, "its fix is left out"),
         "uncompute" => translation
@@ -275,6 +245,8 @@ fn initial(
     let name = arguments.first().copied().unwrap_or("");
     let mut velocities = model.velocities.iter();
     let Some(at) = velocities.position(|velocity| velocity.node == command.node.id) else {
+        let note = "velocities are set by components only";
+        translation.leave_out_load(&command.node, "initial", "velocity", note);
         return;
     };
     let components = |velocity: &Velocity| velocity.components.map(|v| v.unwrap_or(0.0));
@@ -284,9 +256,7 @@ fn initial(
         return;
     }
     let Some(set) = set(translation, model, bodies, name) else {
-        translation
-            .log
-            .left_out(&command.node, "its group is no body or region");
+        translation.leave_out_load(&command.node, "initial", "velocity", NO_SET);
         return;
     };
     let written = translation.new_name("initial", &set);

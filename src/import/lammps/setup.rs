@@ -1,5 +1,7 @@
 //! Commands before the first run that define atoms and their properties.
 
+use super::fixes::without_suffix;
+use super::groups::Group;
 use super::materials::Coefficients;
 use super::run::WORKINGS;
 use super::{Atoms, Model, Velocity, wrong};
@@ -8,13 +10,12 @@ use crate::import::regions::{Region, region};
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
 
-/// Selection of a group.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Group {
-    All,
-    Type(u32),
-    Region(String),
-}
+/// Reason for rejecting the units `lj`, and what to do.
+pub(super) const UNITS_LJ: &str = "the scale of a lattice is a density in the units `lj`; convert the script to si, cgs, \
+                                   micro or nano";
+
+/// Keys of `set` that move atoms or set their velocity.
+const INITIAL_VALUES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
 
 /// Read a command that defines atoms or their properties.
 pub(super) fn setup(
@@ -33,10 +34,23 @@ pub(super) fn setup(
     };
     let number = |k: usize| variables.number(argument(k)?).map_err(fail);
     match command.name() {
-        "units" => match argument(0)? {
-            "si" => log.taken(node, "SI units"),
-            _ => log.approximated(node, "numbers stay as they are, in the units of the script"),
-        },
+        "units" => {
+            match argument(0)? {
+                "si" => log.taken(node, "SI units"),
+                "cgs" | "micro" | "nano" => {
+                    log.approximated(node, "numbers stay as they are, in the units of the script")
+                }
+                "lj" => return Err(fail(UNITS_LJ.to_owned())),
+                name => {
+                    let message = format!(
+                        "the units {} are no consistent system; convert the script to si, cgs, micro or nano",
+                        excerpt(name)
+                    );
+                    return Err(fail(message));
+                }
+            }
+            model.has_units = true;
+        }
         "dimension" => match argument(0)? {
             "3" => log.taken(node, "dimension = \"3d\""),
             _ => log.approximated(node, "the problem becomes one in space"),
@@ -190,9 +204,12 @@ pub(super) fn setup(
         }
         "velocity" => velocity(translation, variables, model, command)?,
         "variable" => log.taken(node, "its value where it is used"),
-        "fix" if arguments.get(2) == Some(&"viscous") => {
+        "fix" if arguments.get(2).map(|style| without_suffix(style)) == Some("viscous") => {
             let drag = number(3)?;
             match argument(1)? {
+                "all" if arguments.len() > 4 => {
+                    log.left_out(node, "damping is equal for all types of atoms")
+                }
                 "all" => {
                     model.drag = Some(drag);
                     log.taken(
@@ -229,14 +246,22 @@ pub(super) fn ignored(name: &str) -> Option<&'static str> {
 
 /// Read `set`: densities and volumes.
 fn properties(
-    translation: &Translation,
+    translation: &mut Translation,
     variables: &Variables,
     model: &mut Model,
     command: &Command,
 ) -> Result<()> {
-    let log = &translation.log;
     let node = &command.node;
     let arguments = command.arguments();
+    let mut initial = arguments.iter().skip(2).step_by(2);
+    if let Some(key) = initial.find(|key| INITIAL_VALUES.contains(key)) {
+        let note = format!(
+            "{} is not set; points start on the lattice, with the velocities of `velocity`",
+            excerpt(key)
+        );
+        translation.leave_out_load(node, "initial", "set", &note);
+    }
+    let log = &translation.log;
     let kind = match arguments[..] {
         ["group", "all", ..] => None,
         ["type", kind, ..] => match kind.parse::<u32>() {
@@ -282,6 +307,7 @@ fn properties(
                     )
                 }
             }
+            key if INITIAL_VALUES.contains(&key) => {}
             key => log.left_out(node, format!("{} is no property of points", excerpt(key))),
         }
         rest = others;
@@ -289,7 +315,7 @@ fn properties(
     Ok(())
 }
 
-/// Read `velocity … set`. Other styles of `velocity` are left out.
+/// Read `velocity … set`. Other styles of `velocity` are not read.
 fn velocity(
     translation: &Translation,
     variables: &Variables,
@@ -299,7 +325,6 @@ fn velocity(
     let log = &translation.log;
     let arguments = command.arguments();
     let [group, "set", vx, vy, vz, options @ ..] = &arguments[..] else {
-        log.left_out(&command.node, "velocities are set by components only");
         return Ok(());
     };
     let is_box = options.windows(2).any(|pair| pair == ["units", "box"]);

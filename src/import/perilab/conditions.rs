@@ -23,11 +23,16 @@ pub(super) fn conditions(
         .flat_map(Node::tables)
     {
         let what = format!("the condition `{name}`");
-        let variable = translation.required(table, "Variable", &what)?;
-        let text = translation.text(variable, "Variable")?;
         let kind = table.get("Type");
         let kind_name = kind.and_then(Node::text).unwrap_or("Dirichlet");
-        let is_initial = is_key(kind_name, "Initial");
+        if kind_name == "Neumann" {
+            let note = "PeriLab applies no condition of the type Neumann";
+            translation.leave_out_load(table, "condition", name, note);
+            continue;
+        }
+        let is_initial = kind_name == "Initial";
+        let variable = translation.required(table, "Variable", &what)?;
+        let text = translation.text(variable, "Variable")?;
         let is = |names: &[&str]| names.iter().any(|name| is_key(text, name));
         let quantity = if is(&["Displacements", "Displacement"]) {
             Some(if is_initial {
@@ -64,7 +69,12 @@ pub(super) fn conditions(
         };
         translation.log.taken(variable, "the condition's key");
         if let Some(kind) = kind {
-            translation.log.taken(kind, "[initial] or [condition]");
+            if is_initial || kind_name == "Dirichlet" {
+                translation.log.taken(kind, "[initial] or [condition]");
+            } else {
+                let note = "[condition]: PeriLab reads an unknown type as Dirichlet";
+                translation.log.approximated(kind, note);
+            }
         }
         let mut steps = Vec::new();
         if let Some(node) = table.get("Step ID") {

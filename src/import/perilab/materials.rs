@@ -4,6 +4,7 @@ use crate::error::{Result, excerpt};
 use crate::import::bodies::{Criterion, DamageModel};
 use crate::import::draft::{Section, Value};
 use crate::import::elastic::Constants;
+use crate::import::log::Fate;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
@@ -24,6 +25,17 @@ const MATERIALS: [(&str, &str, &str); 9] = [
     ("correspondence umat", "", ""),
     ("correspondence vumat", "", ""),
 ];
+
+/// Elastic constants by precedence. If more than two are given, PeriLab computes the moduli from the first two.
+const PRECEDENCE: [&str; 4] = [
+    "bulk_modulus",
+    "poisson_ratio",
+    "shear_modulus",
+    "youngs_modulus",
+];
+
+/// Log note for an elastic constant that PeriLab ignores.
+const IGNORED: &str = "PeriLab computes it from the other constants";
 
 /// Constants of an orthotropic solid: name, key in the new deck, and whether plane problems use the
 /// constant.
@@ -103,7 +115,14 @@ pub(super) fn read_materials<'n>(
                 .log
                 .approximated(model, format!("the law {law}: {difference}"))
         }
-        let constants = Constants::read(translation, table)?;
+        let mut constants = Constants::read(translation, table)?;
+        if law != "pmb" {
+            for key in constants.keep_two(&PRECEDENCE) {
+                if let Some(node) = Constants::node(table, key) {
+                    translation.log.replace(node, Fate::LeftOut, IGNORED);
+                }
+            }
+        }
         materials.push(Model {
             name,
             node: table,
@@ -130,18 +149,7 @@ pub(super) fn write_material(
     let is_correspondence = model.law.contains("correspondence");
     let anisotropic = anisotropic(translation, table, is_correspondence, &mut section)?;
     let enough = match model.law {
-        "pmb" => {
-            if let (Some(node), true) = (table.get("Poisson's Ratio"), model.constants.count() > 1)
-            {
-                translation
-                    .log
-                    .approximated(node, "the law has the Poisson's ratio of bonds");
-            }
-            // PeriLab uses a Poisson ratio ν of 1/3 in plane stress and in plane strain. Young's modulus
-            // E = 3 (1 − 2ν) K is therefore equal to the bulk modulus K.
-            let factor = (translation.dimension == 2).then_some(1.0);
-            model.constants.write_one(&mut section, factor)
-        }
+        "pmb" => write_bonds(translation, model, &mut section),
         _ if anisotropic => true,
         _ => {
             model.constants.write_two(&mut section);
@@ -201,6 +209,38 @@ pub(super) fn write_material(
     }
     translation.add(section);
     Ok(())
+}
+
+/// Write Young's modulus of a bond-based law. Return false if there is no constant to compute it from.
+///
+/// PeriLab uses a Poisson ratio of 1/3 in plane stress and in plane strain, and of 1/4 in 3-D.
+fn write_bonds(translation: &Translation, model: &Model, section: &mut Section) -> bool {
+    let (ratio, fraction) = match translation.dimension {
+        2 => (1.0 / 3.0, "1/3"),
+        _ => (0.25, "1/4"),
+    };
+    let Some(used) = model.constants.write_young(section, ratio) else {
+        return false;
+    };
+    for key in PRECEDENCE {
+        let Some(node) = Constants::node(model.node, key) else {
+            continue;
+        };
+        match key {
+            "poisson_ratio" => {
+                let note = format!("the law has the Poisson's ratio of bonds, {fraction}");
+                translation.log.replace(node, Fate::Approximated, note);
+            }
+            "youngs_modulus" if key == used => {}
+            _ if key == used => {
+                let note =
+                    format!("youngs_modulus of the material, for a Poisson's ratio of {fraction}");
+                translation.log.replace(node, Fate::Taken, note);
+            }
+            _ => translation.log.replace(node, Fate::LeftOut, IGNORED),
+        }
+    }
+    true
 }
 
 /// Write the entries of Hooke's matrix or the constants of an orthotropic solid, if given. Return whether

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::import::bodies::note_unused_damages;
 use crate::import::bond_filters::bond_filters;
 use crate::import::draft::Value;
-use crate::import::log::OTHER_INFLUENCE;
+use crate::import::log::{OTHER_INFLUENCE, UNSCALED_FAMILIES};
 use crate::import::outputs::Outputs;
 use crate::import::sets::Sets;
 use crate::import::solver;
@@ -45,6 +45,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
         bond_filters(translation, filters)?;
     }
     note_influence(translation, discretization, materials)?;
+    note_scaling(translation, discretization)?;
     let read = read_materials(translation, materials)?;
     let is_damage_enabled = stages.iter().any(|stage| stage.is_damage_enabled);
     let damages = damages(translation, models, is_damage_enabled)?;
@@ -82,7 +83,13 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
             }
             sets
         }
-        Points::File(..) => Sets::new(None),
+        Points::File(_, file) => {
+            let mut sets = Sets::new(None);
+            if let Some(file) = file {
+                sets.set_last_number(file.rows);
+            }
+            sets
+        }
     };
     if let Some(node_sets) = discretization.get("Node Sets") {
         for (name, node) in node_sets.entries() {
@@ -135,6 +142,22 @@ fn note_influence(
         translation.log.left_out(node, note);
     } else {
         translation.log.left_out(node, OTHER_INFLUENCE);
+    }
+    Ok(())
+}
+
+/// Log the outcome of the keys that scale the coordinates in PeriLab's neighbour search.
+fn note_scaling(translation: &Translation, discretization: &Node) -> Result<()> {
+    for axis in ["X", "Y", "Z"] {
+        let key = format!("Horizon Mesh Scaling {axis}");
+        let Some(node) = discretization.get(&key) else {
+            continue;
+        };
+        if translation.number(node, &key)? == 1.0 {
+            translation.log.taken(node, "families are not scaled");
+        } else {
+            translation.log.left_out(node, UNSCALED_FAMILIES);
+        }
     }
     Ok(())
 }

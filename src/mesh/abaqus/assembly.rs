@@ -45,6 +45,8 @@ pub(super) struct Set {
     pub(super) names: Vec<String>,
     /// Whether the set consists of all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
+    /// Whether the set is a union of surfaces, which consists of nodes if the surfaces in `names` do.
+    pub(super) is_union: bool,
     pub(super) place: Place,
 }
 
@@ -122,11 +124,14 @@ impl Reader {
         let own = self.placed.len() - 1;
         let mut known: FxHashMap<(MemberKind, String), Runs> = FxHashMap::default();
         let mut order = Vec::new();
-        for set in &part.sets {
-            let members = self.members(set, own, &known)?;
+        for mut set in part.sets {
+            if set.is_union {
+                set.of = self.kind_of_union(&set, &known);
+            }
+            let members = self.members(&set, own, &known)?;
             let key = (set.of, set.name.to_ascii_uppercase());
             if !known.contains_key(&key) {
-                order.push((key.clone(), set.name.clone()));
+                order.push((key.clone(), set.name));
             }
             let all = known.entry(key).or_default();
             *all = Runs::union([&*all, &members].map(|runs| (runs.ranges(), 0)).into_iter());
@@ -259,6 +264,26 @@ impl Reader {
         Ok(Runs::new(members))
     }
 
+    /// Return the kind of the members of a union of surfaces.
+    fn kind_of_union(
+        &self,
+        union: &Set,
+        known: &FxHashMap<(MemberKind, String), Runs>,
+    ) -> MemberKind {
+        let has_surface = |of: MemberKind| {
+            let mut names = union.names.iter();
+            names.any(|name| {
+                self.find_set(of, name, union.instance.as_deref(), known)
+                    .is_some()
+            })
+        };
+        if has_surface(MemberKind::Nodes) && !has_surface(MemberKind::Elements) {
+            MemberKind::Nodes
+        } else {
+            MemberKind::Elements
+        }
+    }
+
     /// Find the members of a set by its name, in `known` or among the groups of the mesh. With `instance`,
     /// find the set of this instance: a group of the mesh with a name such as `INSTANCE.NAME`.
     fn find_set(
@@ -291,6 +316,9 @@ impl Reader {
         if let Some(open) = &self.current {
             let message = format!("part or instance {} has no end", excerpt(&open.name));
             return Err(fault(path, 0, message));
+        }
+        if let Some(place) = &self.assembly {
+            return Err(place.fault("*ASSEMBLY has no *END ASSEMBLY; is the file complete?"));
         }
         if self.placed.is_empty() && !self.parts.is_empty() && self.model.elements.is_empty() {
             return Err(fault(path, 0, "has parts but no *INSTANCE of one"));

@@ -61,6 +61,8 @@ enum Data {
         is_generated: bool,
     },
     Surface,
+    /// Names of surfaces.
+    Surfaces,
     Position,
 }
 
@@ -73,6 +75,8 @@ struct Reader {
     /// The part or instance that is being read.
     current: Option<Part>,
     instance: Option<Instance>,
+    /// Position of `*ASSEMBLY` while the assembly is being read.
+    assembly: Option<Place>,
     placed: Vec<Placed>,
     data: Data,
     /// Number of the element that is being read, followed by the numbers of its nodes that have been read.
@@ -214,9 +218,50 @@ impl Reader {
                     "NODE" => MemberKind::Nodes,
                     _ => return Ok(()),
                 };
-                if let Some(set) = keyword.get("NAME") {
-                    self.begin_set(of, set, keyword);
-                    self.data = Data::Surface;
+                let Some(set) = keyword.get("NAME") else {
+                    return Ok(());
+                };
+                if keyword.get("CROP").is_some() {
+                    let message =
+                        "*SURFACE: CROP is not supported; list the elements of the surface";
+                    return Err(self.fault(message));
+                }
+                self.begin_set(of, set, keyword);
+                self.data = match keyword
+                    .get("COMBINE")
+                    .map(str::to_ascii_uppercase)
+                    .as_deref()
+                {
+                    None => Data::Surface,
+                    Some("UNION") => {
+                        self.last_set().is_union = keyword.get("TYPE").is_none();
+                        Data::Surfaces
+                    }
+                    Some(other) => {
+                        let message = format!(
+                            "*SURFACE: COMBINE={} is not supported, only COMBINE=UNION is; list the elements of \
+                             the surface",
+                            excerpt(other).trim_matches('`')
+                        );
+                        return Err(self.fault(message));
+                    }
+                };
+            }
+            "ASSEMBLY" => {
+                if let Some(open) = &self.current {
+                    return Err(self.within(name, &open.name));
+                }
+                if self.assembly.is_some() {
+                    return Err(self.fault("*ASSEMBLY within another *ASSEMBLY"));
+                }
+                self.assembly = Some(self.place.clone());
+            }
+            "END ASSEMBLY" => {
+                if let Some(open) = &self.current {
+                    return Err(self.within(name, &open.name));
+                }
+                if self.assembly.take().is_none() {
+                    return Err(self.fault("*END ASSEMBLY without *ASSEMBLY"));
                 }
             }
             "PART" => {
@@ -283,14 +328,16 @@ impl Reader {
 
     fn begin(&mut self, part: Part, keyword: &str) -> Result<()> {
         if let Some(open) = &self.current {
-            let message = format!(
-                "*{keyword} within {}, which has no end",
-                excerpt(&open.name)
-            );
-            return Err(self.fault(message));
+            return Err(self.within(keyword, &open.name));
         }
         self.current = Some(part);
         Ok(())
+    }
+
+    /// Return an error for a keyword within the part or instance `open`.
+    fn within(&self, keyword: &str, open: &str) -> Error {
+        let open = excerpt(open);
+        self.fault(format!("*{keyword} within {open}, which has no end"))
     }
 
     /// Begin the data lines of a set. Return the index of these lines in `Part::sets`.
@@ -303,6 +350,7 @@ impl Reader {
             ranges: Vec::new(),
             names: Vec::new(),
             is_nodes_of_elements: false,
+            is_union: false,
             place: self.place.clone(),
         };
         let sets = &mut self.part().sets;
@@ -368,17 +416,20 @@ impl Reader {
                 }
                 self.last_set().ranges.push([first, last, step]);
             }
-            Data::Set { .. } => {
+            Data::Set { .. } | Data::Surfaces => {
                 for entry in entries() {
                     self.add_to_set(entry);
                 }
             }
             // Only the first entry is used. The second entry names the face, or is an area.
-            Data::Surface => {
-                if let Some(entry) = entries().next() {
-                    self.add_to_set(entry);
+            Data::Surface => match line.split(',').next().map_or("", str::trim) {
+                "" => {
+                    let message = "*SURFACE: a line must begin with an element, a node or a set; a blank entry, which \
+                                   stands for the whole model, is not supported";
+                    return Err(self.fault(message));
                 }
-            }
+                entry => self.add_to_set(entry),
+            },
             Data::Position => self.read_position(line)?,
         }
         Ok(())

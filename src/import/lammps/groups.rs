@@ -1,0 +1,152 @@
+//! Groups of LAMMPS: their regions, and their sets in the new deck.
+
+use super::Model;
+use crate::import::draft::Section;
+use crate::import::regions::Region;
+use crate::import::translation::Translation;
+
+/// Largest number of lattice sites that are tested for atoms.
+const MOST_SITES: f64 = 1e7;
+
+/// Reason for leaving out a command whose group has no counterpart.
+pub(super) const NO_SET: &str = "its group is no body or region";
+
+/// Selection of a group.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Group {
+    All,
+    Type(u32),
+    Region(String),
+}
+
+/// Return the selection of a group by its name; `None` for an unknown group.
+fn find(model: &Model, name: &str) -> Option<Group> {
+    if name == "all" {
+        return Some(Group::All);
+    }
+    let mut groups = model.groups.iter();
+    let found = groups.find(|(other, ..)| other == name);
+    found.map(|(_, group, _)| group.clone())
+}
+
+/// Return a region by its name, with bounds of the box in place of infinite bounds. Return `None` for a region
+/// without a shape.
+fn named_region(model: &Model, name: &str) -> Option<Region> {
+    let mut regions = model.regions.iter();
+    let (_, region, _) = regions.find(|(other, ..)| other == name)?;
+    let region = region.clone();
+    Some(match model.bounds {
+        Some(bounds) => region.within(bounds),
+        None => region,
+    })
+}
+
+/// Return a region that contains the atoms of a group and no other atoms. Return `None` if the group has no
+/// counterpart or no atoms.
+pub(super) fn region_of(model: &Model, name: &str) -> Option<Region> {
+    let kind = match find(model, name)? {
+        Group::All => None,
+        Group::Type(kind) => Some(kind),
+        Group::Region(region) => return named_region(model, &region),
+    };
+    let is_in = |of: u32| kind.is_none_or(|kind| kind == of);
+    let atoms = model.atoms.iter().filter(|atoms| is_in(atoms.kind));
+    let mut parts: Vec<Region> = atoms.map(|atoms| atoms.region.clone()).collect();
+    match parts.len() {
+        0 | 1 => parts.pop(),
+        _ => Some(Region::Union(parts)),
+    }
+}
+
+/// Return the name of the set that replaces a group in the new deck. Write the set if the new deck does not
+/// have it yet. Return `None` if the group has no counterpart.
+pub(super) fn set(
+    translation: &mut Translation,
+    model: &Model,
+    bodies: &[(u32, String, String)],
+    name: &str,
+) -> Option<String> {
+    match find(model, name)? {
+        Group::All => Some("all".to_owned()),
+        Group::Type(kind) => {
+            let mut of_type = bodies.iter().filter(|(of, ..)| *of == kind);
+            match (of_type.next(), of_type.next()) {
+                (Some((.., body)), None) => Some(body.clone()),
+                _ => None,
+            }
+        }
+        Group::Region(region) => {
+            let region = named_region(model, &region)?;
+            let taken = bodies.iter().any(|(.., body)| body == name);
+            let wanted = if taken {
+                format!("group {name}")
+            } else {
+                name.to_owned()
+            };
+            Some(write_set(translation, model, &wanted, &region))
+        }
+    }
+}
+
+/// Return the name of a set with the points of a group that are in a region at the start. Write the set if the
+/// new deck does not have it yet. `Err` holds the reason why there is no such set.
+pub(super) fn set_in_region(
+    translation: &mut Translation,
+    model: &Model,
+    group: &str,
+    region: &str,
+) -> Result<String, &'static str> {
+    let shape = named_region(model, region).ok_or("its region has no shape")?;
+    let (wanted, shape) = match group {
+        "all" => (format!("region {region}"), shape),
+        group => {
+            let of_group = region_of(model, group).ok_or(NO_SET)?;
+            (format!("{group} in {region}"), of_group.intersection(shape))
+        }
+    };
+    if !has_atoms(model, &shape) {
+        return Err("no atom of its group is in its region at the start");
+    }
+    Ok(write_set(translation, model, &wanted, &shape))
+}
+
+/// Write a set with the points of a region unless the new deck has the set already. Return its name. `wanted`
+/// identifies the set.
+pub(super) fn write_set(
+    translation: &mut Translation,
+    model: &Model,
+    wanted: &str,
+    region: &Region,
+) -> String {
+    let written = translation.name("set", wanted);
+    let header = format!("set.{written}");
+    if !translation.draft.has(&header) {
+        let mut section = Section::new(header);
+        section.set("shape", region.shape(model.spacing.unwrap_or(1.0)));
+        translation.add(section);
+    }
+    written
+}
+
+/// Test whether a region has an atom at the start. The result is also true if the region has too many lattice
+/// sites for a test.
+pub(super) fn has_atoms(model: &Model, region: &Region) -> bool {
+    let spacing = model.spacing.unwrap_or(1.0);
+    let bounds = region.bounds();
+    let index = |corner: usize, k: usize| bounds[corner][k] / spacing - model.origin[k];
+    let first = [0, 1, 2].map(|k| index(0, k).floor());
+    let last = [0, 1, 2].map(|k| index(1, k).ceil());
+    let sites: f64 = (0..3).map(|k| last[k] - first[k] + 1.0).product();
+    if !(0.0..=MOST_SITES).contains(&sites) {
+        return true;
+    }
+    let sites = |k: usize| {
+        let site = move |n: i64| (n as f64 + model.origin[k]) * spacing;
+        (first[k] as i64..=last[k] as i64).map(site)
+    };
+    let is_atom = |point: [f64; 3]| {
+        let mut atoms = model.atoms.iter();
+        region.contains(point, spacing) && atoms.any(|atoms| atoms.region.contains(point, spacing))
+    };
+    sites(0).any(|x| sites(1).any(|y| sites(2).any(|z| is_atom([x, y, z]))))
+}
