@@ -78,7 +78,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     /// Factor on the micromodulus.
     type Point = [Lanes; 1];
     type BondHistory = [Lanes; 0];
-    /// Σ ω|ξ| Ṽ.
+    /// With surface correction, Σ c ω|ξ| Ṽ/(4 W₁). Bonds to other blocks can have another c and another W₁.
     type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 0];
     type Force = Along;
@@ -89,14 +89,17 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
 
     #[inline(always)]
     fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; 1] {
-        let length = bond.length;
-        [length]
+        let factor = match self.corrected_to {
+            Some(energy) => self.micromodulus / (4.0 * energy),
+            None => 0.0,
+        };
+        [bond.length * factor]
     }
 
-    /// Set the factor to 1, or to the surface correction 4 W₁ / (c Σ ω|ξ| Ṽ).
+    /// Set the factor to 1, or to the surface correction, the inverse of the sum.
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         numbers[0] = match self.corrected_to {
-            Some(energy) if sums[0] > 0.0 => 4.0 * energy / (self.micromodulus * sums[0]),
+            Some(_) if sums[0] > 0.0 => 1.0 / sums[0],
             _ => 1.0,
         };
     }

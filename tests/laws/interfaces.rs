@@ -3,6 +3,7 @@
 
 use crate::support::{displace, largest_force, simulate, simulate_on};
 use fissure::solver::Simulation;
+use fissure::solver::observers::Snapshot;
 
 /// Return the micromodulus of a bar under uniaxial strain, 12E/(5δ²A), N/m⁶.
 fn micromodulus(modulus: f64, horizon: f64) -> f64 {
@@ -101,6 +102,70 @@ fn bodies_with_the_rule_none_do_not_feel_each_other() {
         assert!(force(family, none) < 1e-14);
         let bonded = format!("{none}\n{}", pair("['middle', 'left']"));
         assert!(force(family, &bonded) > 1e-3);
+    }
+}
+
+/// Return the smallest and the largest strain energy density of points near the interface of two bodies,
+/// under a uniform strain, divided by the energy density of the solid. The bodies have different spacings and
+/// horizons.
+fn corrected_energies(law: &str, rule: &str, strain: [f64; 3]) -> [f64; 2] {
+    let text = format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3 }}
+        interface.rule = '{rule}'
+        material.solid.{law}
+        body.coarse = {{ material = 'solid', shape.box = {{ lower = [-9, -7], upper = [0, 7] }} }}
+        body.fine = {{ material = 'solid', spacing = 0.5, horizon = 1.5, shape.box = {{ lower = [0, -7], upper = [9, 7] }} }}
+        time.end = 1
+        "
+    );
+    let [xx, yy, xy] = strain;
+    // λ = μ = 3E/8 in plane stress with ν = 1/3, and E = 5.
+    let shear = 3.0 / 8.0 * 5.0;
+    let exact = shear * (0.5 * (xx + yy).powi(2) + xx * xx + yy * yy + 2.0 * xy * xy);
+    simulate::<2, _>(&text, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| {
+            [x + xx * x + xy * y, y + xy * x + yy * y, z]
+        });
+        let snapshot = Snapshot::new(&mut simulation);
+        let model = &simulation.model;
+        let near = |k: &usize| {
+            let [x, y, _] = model.position(*k);
+            x.abs() < 4.0 && y.abs() < 2.0
+        };
+        let ratios = (0..model.owned()).filter(near);
+        let ratios = ratios.map(|k| snapshot.stored.energy[k] / exact);
+        ratios.fold([f64::MAX, 0.0], |[least, most], ratio| {
+            [least.min(ratio), most.max(ratio)]
+        })
+    })
+}
+
+#[test]
+fn surface_corrections_hold_at_interfaces_with_every_rule() {
+    let isotropic = [1e-6, 1e-6, 0.0];
+    let sheared = [2e-6, -1e-6, 1e-6];
+    let law = |name: &str, correction: &str| {
+        format!(
+            "{name} = {{ density = 1, youngs_modulus = 5, surface_correction = '{correction}' }}"
+        )
+    };
+    for (law, strain, range) in [
+        (law("pmb", "energy"), isotropic, 1.0 - 1e-9..1.0 + 1e-9),
+        (
+            law("linear_microelastic", "energy"),
+            isotropic,
+            1.0 - 1e-9..1.0 + 1e-9,
+        ),
+        (law("pmb", "tensor"), isotropic, 0.997..1.001),
+        (law("pmb", "tensor"), sheared, 0.94..1.03),
+        (law("proportional", "directional"), isotropic, 0.95..1.02),
+    ] {
+        for rule in ["own", "average", "minimum"] {
+            let found = corrected_energies(&law, rule, strain);
+            let is_near = found.iter().all(|ratio| range.contains(ratio));
+            assert!(is_near, "{law}, {rule}, {strain:?}: {found:?}");
+        }
     }
 }
 

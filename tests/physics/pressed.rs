@@ -1,9 +1,9 @@
-//! Contact in relaxations: closed-form reactions, energies, and equal bits on any number of ranks and after a
-//! restart.
+//! Contact in relaxations: closed-form reactions, energies, thermal expansion, and equal bits on any number
+//! of ranks and after a restart.
 
 use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
-use crate::support::{problem, simulate, simulate_on};
+use crate::support::{displace, largest_force, problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
@@ -117,6 +117,116 @@ fn two_blocks_pressed_together_and_pulled_apart() {
     assert_balance(&rows[..3], 3, rows[0][4].abs());
 }
 
+/// Return the deck [`bars`] in which every point has the thermal stretch 1e-6 t.
+fn heated_bars(bodies: &str) -> String {
+    let expands = "youngs_modulus = 5, thermal_expansion = 1e-6 }";
+    let text = bars(bodies).replace("youngs_modulus = 5 }", expands);
+    format!("{text}\ncondition.heat = {{ set = 'all', temperature = 't' }}\n")
+}
+
+#[test]
+fn heated_bars_between_supports_press_on_each_other() {
+    let deck = heated_bars(
+        "contact.pair.hit.bodies = ['left', 'right']
+        body.left = { material = 'rubber', shape.box = { lower = [0], upper = [20] } }
+        body.right = { material = 'rubber', shape.box = { lower = [20], upper = [50] } }
+        set = { first.where = 'x < 1', last.where = 'x > 49' }
+        condition.hold = { set = 'first', displacement = [0] }
+        condition.stop = { set = 'last', displacement = [0] }",
+    );
+    // The contact distance expands like the 48 bonds.
+    let stiffness = 1.0 / (1.0 / LAYER + 48.0 / BOND);
+    for row in load_steps::<1>(&deck, &["time", "contact_hit_force_x"]) {
+        let force = stiffness * 49.0 * 1e-6 * row[0];
+        assert!((row[1] / force + 1.0).abs() < 1e-5, "{row:?} for {force}");
+    }
+}
+
+#[test]
+fn a_heated_bar_presses_on_rigid_plates() {
+    let deck = heated_bars(
+        "rigid.floor.half_space = { through = [0], normal = [1] }
+        rigid.plate.half_space = { through = [40], normal = [-1] }
+        body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [40] } }",
+    );
+    let stiffness = 1.0 / (1.0 / LAYER + 39.0 / BOND);
+    for row in load_steps::<1>(&deck, &["time", "rigid_plate_force_x"]) {
+        let force = stiffness * 40.0 * 1e-6 * row[0];
+        assert!((row[1] / force - 1.0).abs() < 1e-5, "{row:?} for {force}");
+    }
+}
+
+/// Set the thermal stretch of all points, and evaluate the forces at the present positions `map`.
+fn heat<const D: usize>(
+    simulation: &mut Simulation<D>,
+    stretch: f64,
+    map: impl Fn([f64; 3]) -> [f64; 3],
+) {
+    let column = simulation.fields.thermal_stretch.as_mut().unwrap();
+    column.fill(stretch);
+    displace(simulation, map);
+}
+
+#[test]
+fn free_expansion_of_a_cracked_body_causes_no_contact() {
+    for model in ["penalty", "short-range"] {
+        let deck = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            contact.model = '{model}'
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5, thermal_expansion = 1e-5 }}
+            body.block = {{ material = 'rubber', shape.box = {{ lower = [-8, -8], upper = [8, 8] }} }}
+            crack.edge.segment = {{ from = [-8, 0], to = [0, 0] }}
+            condition.heat = {{ set = 'all', temperature = 0 }}
+            time.end = 1
+            "
+        );
+        simulate::<2, _>(&deck, |mut simulation| {
+            for thermal in [-0.01, 0.01, 0.3] {
+                heat(&mut simulation, thermal, |place| place);
+                let scale = largest_force(&simulation);
+                let free = |place: [f64; 3]| place.map(|x| (1.0 + thermal) * x);
+                heat(&mut simulation, thermal, free);
+                let force = largest_force(&simulation);
+                assert!(
+                    force < 1e-10 * scale,
+                    "{model}, {thermal}: {force} of {scale}"
+                );
+            }
+        });
+    }
+}
+
+#[test]
+fn heat_alone_brings_points_into_contact() {
+    // The bars are 0.6 m farther apart than their contact distance. The search in the cold bars does not find
+    // pairs with such a gap.
+    let deck = "
+        dimension = '1d'
+        grid = { spacing = 1, horizon = 1.5, volume_correction = 'none' }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5, thermal_expansion = 1e-5 }
+        contact.pair.hit.bodies = ['left', 'right']
+        body.left = { material = 'rubber', shape.box = { lower = [0], upper = [20] } }
+        body.right = { material = 'rubber', shape.box = { lower = [20], upper = [40] } }
+        condition.heat = { set = 'all', temperature = 0 }
+        time.end = 1
+        ";
+    for ranks in [1, 2] {
+        let found = simulate_on::<1, _>(ranks, deck, |mut simulation| {
+            let mut touching = |thermal: f64| {
+                let apart = |[x, y, z]: [f64; 3]| [if x > 20.0 { x + 0.6 } else { x }, y, z];
+                heat(&mut simulation, thermal, apart);
+                let force = &simulation.fields.contact_force.as_ref().unwrap()[0];
+                let owned = &force[..simulation.model.owned()];
+                owned.iter().filter(|force| **force != 0.0).count()
+            };
+            [0.0, 0.59, 0.61, 0.3].map(&mut touching)
+        });
+        let all = [0, 1, 2, 3].map(|k| found.iter().map(|counts| counts[k]).sum::<usize>());
+        assert_eq!(all, [0, 0, 2, 0], "{ranks} ranks");
+    }
+}
+
 /// Return the deck of a block with a crack through it, whose halves are pressed together.
 fn cracked_block(contact: &str) -> String {
     format!(
@@ -170,10 +280,24 @@ const INDENTED: &str = "
     time = { end = 6, method = 'relaxation', relaxation = { load_steps = 6, tolerance = 1e-4 } }
     ";
 
+/// Return the deck [`INDENTED`] with temperatures that increase with time and along x.
+fn heated_and_indented() -> String {
+    let expands = "youngs_modulus = 5, thermal_expansion = 1e-3 }";
+    let text = INDENTED.replace("youngs_modulus = 5 }", expands);
+    format!("{text}\ncondition.heat = {{ set = 'all', temperature = '0.3*x*t' }}\n")
+}
+
 #[test]
 fn ranks_do_not_change_a_bit_of_pressed_bodies() {
+    for deck in [INDENTED, &heated_and_indented()] {
+        check_ranks(deck);
+    }
+}
+
+/// Check that a run has the same bits on one, two and three ranks.
+fn check_ranks(deck: &str) {
     let run = |ranks: usize| {
-        let parts = simulate_on(ranks, INDENTED, |mut simulation: Simulation<2>| {
+        let parts = simulate_on(ranks, deck, |mut simulation: Simulation<2>| {
             while !simulation.is_over() {
                 simulation.advance();
                 simulation.check().unwrap_or_else(|error| panic!("{error}"));
@@ -197,7 +321,14 @@ fn ranks_do_not_change_a_bit_of_pressed_bodies() {
 
 #[test]
 fn pressed_bodies_go_on_from_within_a_load_step_to_the_same_bits() {
-    let problem = problem(INDENTED);
+    for deck in [INDENTED, &heated_and_indented()] {
+        check_restarts(deck);
+    }
+}
+
+/// Check that a run that is restored at several times has the bits of a run without interruption.
+fn check_restarts(deck: &str) {
+    let problem = problem(deck);
     let run = |stop: usize| {
         let parts = threads::run(2, |comm: &dyn Communicator| {
             let mut simulation = Simulation::<2>::new(&problem, comm).unwrap();

@@ -262,6 +262,43 @@ fn patches_lose_less_with_bonds_of_mean_horizons() {
     assert!((0.78..0.9).contains(&mean), "{mean}");
 }
 
+#[test]
+fn surface_corrections_hold_between_levels() {
+    let extremes = |correction: &str, bonds: &str| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.glass.pmb = {{ density = 1, youngs_modulus = 5, surface_correction = '{correction}' }}
+            body.plate = {{ material = 'glass', shape.box = {{ lower = [-12, -9], upper = [12, 9] }} }}
+            refinement = {{ levels = 1, bonds = '{bonds}', region.half.where = 'x > 0' }}
+            time.end = 1"
+        );
+        simulate::<2, _>(&text, |mut simulation| {
+            displace(&mut simulation, |place| place.map(|x| (1.0 + 1e-6) * x));
+            let snapshot = Snapshot::new(&mut simulation);
+            let model = &simulation.model;
+            let near = |k: &usize| {
+                let [x, y, _] = model.position(*k);
+                x.abs() < 5.0 && y.abs() < 2.0
+            };
+            // E ε²/(1 − ν) with ν = 1/3.
+            let exact = 5.0 * 1.5 * 1e-12;
+            let ratios = (0..model.owned()).filter(near);
+            let ratios = ratios.map(|k| snapshot.stored.energy[k] / exact);
+            ratios.fold([f64::MAX, 0.0], |[least, most], ratio| {
+                [least.min(ratio), most.max(ratio)]
+            })
+        })
+    };
+    for (correction, range) in [("tensor", 0.998..1.001), ("directional", 0.97..1.02)] {
+        for bonds in ["own", "average"] {
+            let found = extremes(correction, bonds);
+            let is_near = found.iter().all(|ratio| range.contains(ratio));
+            assert!(is_near, "{correction}, {bonds}: {found:?}");
+        }
+    }
+}
+
 /// A notched plate that tears, and is refined where its strain energy is largest: in three places at the end.
 const TORN: &str = "dimension = 'plane-stress'
     thickness = 1e-3

@@ -1,5 +1,6 @@
 //! The function h as the radius of an ellipsoid. The semi-axes are fitted to the energy densities at unit
-//! extension along each axis a. These energy densities are half of the components aaaa of the elastic tensor.
+//! extension along each axis a. These energy densities are half of the components aaaa of the elastic tensor,
+//! which is 3μ in the solid.
 
 use nalgebra::SMatrix;
 
@@ -15,11 +16,7 @@ pub struct Directional;
 
 impl Form for Directional {
     /// Return the tensor of the ellipsoid with the radius ½ h.
-    fn fit<const D: usize>(
-        sums: &[f64],
-        micromodulus: f64,
-        shear_modulus: f64,
-    ) -> SMatrix<f64, D, D> {
+    fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
         let found: [f64; D] = std::array::from_fn(|a| {
             // n_a⁴ = n_a⁴ n·n, a sum of monomials of degree 6.
             let terms = (0..D).map(|b| {
@@ -28,12 +25,12 @@ impl Form for Directional {
                 exponents[b] += 2;
                 sums[index_of(exponents)]
             });
-            0.5 * micromodulus * terms.sum::<f64>()
+            0.5 * terms.sum::<f64>()
         });
         if found.iter().all(|found| *found == 0.0) {
             return SMatrix::identity() * ellipsoid::WITHOUT_BONDS;
         }
-        let semi_axes = found.map(|found| ellipsoid::semi_axis(3.0 * shear_modulus, found));
+        let semi_axes = found.map(|found| ellipsoid::semi_axis(3.0, found));
         ellipsoid::tensor(semi_axes, 0.5)
     }
 
@@ -50,7 +47,7 @@ mod tests {
 
     #[test]
     fn a_point_without_bonds_has_no_share() {
-        let tensor = Directional::fit::<3>(&[0.0; MONOMIALS], 1.0, 1.0);
+        let tensor = Directional::fit::<3>(&[0.0; MONOMIALS]);
         let wanted = SMatrix::<f64, 3, 3>::identity() * ellipsoid::WITHOUT_BONDS;
         assert!(tensor == wanted, "{tensor}");
     }

@@ -3,9 +3,13 @@
 //!
 //! The micromodulus of an end is c h(n), with the micromodulus c of an untruncated family and the direction n
 //! of the bond. A [`Form`] defines the function h, and fits the elastic tensor of the family to that of the
-//! solid. The elastic tensor of a family is ½ c Σ |ξ| h(n) n⊗n⊗n⊗n Ṽ. The elastic tensor of a bond-based
+//! solid. The elastic tensor of a family is ½ Σ c |ξ| h(n) n⊗n⊗n⊗n Ṽ. The elastic tensor of a bond-based
 //! solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the number of dimensions d
 //! and the energy density W₁ at unit isotropic stretch.
+//!
+//! Bonds of a point to other blocks can have another c and another μ, computed with the mean of two horizons
+//! and of two moduli. The fit therefore uses c/μ of each bond, which depends on the horizon only. If all
+//! bonds of a point have the same μ, the elastic tensor is fitted to that of the solid with this μ.
 //!
 //! The micromodulus c_ij(n) of a bond is the mean of the micromoduli of points i and j. A critical stretch
 //! s_c that follows from a fracture energy is scaled to s_c √(c/c_ij). Breaking the bond then takes the same
@@ -33,13 +37,9 @@ const MONOMIALS: usize = 28;
 
 /// Form of the function h.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Return the tensor of a point that determines ½ h, from c, μ and `sums`: the sums of |ξ| Ṽ times the
-    /// monomials of degree 6 of n.
-    fn fit<const D: usize>(
-        sums: &[f64],
-        micromodulus: f64,
-        shear_modulus: f64,
-    ) -> SMatrix<f64, D, D>;
+    /// Return the tensor of a point that determines ½ h, from the sums of |ξ| Ṽ c/μ times the monomials of
+    /// degree 6 of n.
+    fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D>;
 
     /// Return ½ h of eight bonds.
     fn half<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes;
@@ -56,8 +56,8 @@ pub type DirectionalPmb = SurfacePmb<Directional>;
 pub struct SurfacePmb<F> {
     /// Micromodulus c of an untruncated family, N/m⁶.
     micromodulus: f64,
-    /// Shear modulus μ of the solid, Pa.
-    shear_modulus: f64,
+    /// c/μ with the shear modulus μ of the solid, 1/m⁴.
+    micromodulus_over_shear: f64,
     /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with the
     /// micromodulus.
     is_scaled: bool,
@@ -69,9 +69,10 @@ impl<F: Form> SurfacePmb<F> {
     pub(super) fn of(given: &Given) -> Self {
         let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
         let d = given.dimension.count() as f64;
+        let micromodulus = Pmb::of(given).micromodulus;
         Self {
-            micromodulus: Pmb::of(given).micromodulus,
-            shear_modulus: 2.0 * energy / (d * (d + 2.0)),
+            micromodulus,
+            micromodulus_over_shear: micromodulus * d * (d + 2.0) / (2.0 * energy),
             is_scaled: given.from_fracture_energy,
             form: PhantomData,
         }
@@ -100,7 +101,7 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
     /// The tensor that determines ½ h.
     type Point = Symmetric<D>;
     type BondHistory = [Lanes; 0];
-    /// Sums of |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
+    /// Sums of |ξ| Ṽ c/μ times the monomials of degree 6 of n.
     type ReferenceSum = [Lanes; MONOMIALS];
     type Sum = [Lanes; 0];
     type Force = Along;
@@ -112,13 +113,13 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
     fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; MONOMIALS] {
         let mut sums = [Lanes::splat(0.0); MONOMIALS];
         let directions = bond.reference.map(|xi| xi * bond.inverse);
-        write_monomials(6, directions, bond.length, &mut sums);
+        let factor = bond.length * self.micromodulus_over_shear;
+        write_monomials(6, directions, factor, &mut sums);
         sums
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
-        let tensor = F::fit::<D>(sums, self.micromodulus, self.shear_modulus);
-        to_entries(&tensor, numbers);
+        to_entries(&F::fit::<D>(sums), numbers);
     }
 
     #[inline(always)]

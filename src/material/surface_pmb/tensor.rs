@@ -32,12 +32,8 @@ pub struct Tensor;
 
 impl Form for Tensor {
     /// Return ½ H.
-    fn fit<const D: usize>(
-        sums: &[f64],
-        micromodulus: f64,
-        shear_modulus: f64,
-    ) -> SMatrix<f64, D, D> {
-        limited(fit::<D>(sums, micromodulus, shear_modulus)) * 0.5
+    fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
+        limited(fit::<D>(sums)) * 0.5
     }
 
     #[inline(always)]
@@ -58,9 +54,9 @@ fn isotropic(exponents: [usize; 3]) -> f64 {
 }
 
 /// Fit H of a point in `D` dimensions: the least-squares solution of
-/// ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc).
-/// `sums` are the sums of |ξ| Ṽ times the monomials of degree 6 of n.
-fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> SMatrix<f64, D, D> {
+/// ½ Σ (c/μ) |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc.
+/// `sums` are the sums of |ξ| Ṽ c/μ times the monomials of degree 6 of n.
+fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
@@ -70,10 +66,10 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
         let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
         let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();
-        0.5 * micromodulus * sums[index_of(both)] * weight
+        0.5 * sums[index_of(both)] * weight
     });
     let wanted = DVector::from_fn(rows.len(), |r, _| {
-        shear_modulus * isotropic(rows[r]) * multiplicity(rows[r]).sqrt()
+        isotropic(rows[r]) * multiplicity(rows[r]).sqrt()
     });
     let Some(solution) = least_squares(matrix, &wanted, RANK) else {
         return SMatrix::zeros();
@@ -112,8 +108,8 @@ fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
 mod tests {
     use super::*;
 
-    /// Return H of a point with neighbours of unit volume at these offsets. With the constants of this test,
-    /// H in the middle of a disc with a radius of 3 is of the order of I.
+    /// Return H of a point with neighbours of unit volume at these offsets, for c/μ = 1/5. H in the middle of
+    /// a disc with a radius of 3 is then of the order of I.
     fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
         let mut sums = [0.0; super::super::MONOMIALS];
         for [x, y] in offsets {
@@ -121,11 +117,11 @@ mod tests {
             for (sum, [a, b, c]) in sums.iter_mut().zip(exponents(6)) {
                 if c == 0 {
                     let power = |value: f64, n: usize| (value / length).powi(n as i32);
-                    *sum += length * power(*x, a) * power(*y, b);
+                    *sum += 0.2 * length * power(*x, a) * power(*y, b);
                 }
             }
         }
-        limited(fit::<2>(&sums, 1.0, 5.0))
+        limited(fit::<2>(&sums))
     }
 
     #[test]

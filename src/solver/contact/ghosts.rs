@@ -49,41 +49,50 @@ pub(super) struct Ghosts<const D: usize> {
     pub displacement: Vec<Vec<f64>>,
     /// Velocities by component, m/s.
     pub velocity: Vec<Vec<f64>>,
+    /// Thermal stretches; `None` in runs without temperatures.
+    pub thermal_stretch: Option<Vec<f64>>,
     halo: Halo,
 }
 
 impl<const D: usize> Ghosts<D> {
-    /// Find the points of other ranks within `reach` (m) of owned points. Call [`Self::update`] afterwards to
-    /// exchange the motion of these points. Collective.
+    /// Find the points of other ranks within `reach` (m) of owned points. `is_thermal` says whether points
+    /// have thermal stretches. Call [`Self::update`] afterwards to exchange the motion of these points.
+    /// Collective.
     pub fn within(
         comm: &dyn Communicator,
         dimension: Dimension,
         own: &[Ghost],
         reach: f64,
+        is_thermal: bool,
     ) -> Self {
-        let (points, halo) = find(comm, own, reach, D, 2 * D);
+        let width = 2 * D + usize::from(is_thermal);
+        let (points, halo) = find(comm, own, reach, D, width);
         let columns = || vec![vec![0.0; points.len()]; D];
         let edges = points.iter().map(|point| dimension.edge(point.volume));
         Self {
             edges: edges.collect(),
             displacement: columns(),
             velocity: columns(),
+            thermal_stretch: is_thermal.then(|| vec![0.0; points.len()]),
             points,
             halo,
         }
     }
 
-    /// Exchange the motion of the ghosts. Collective.
+    /// Exchange the motion of the ghosts, and their thermal stretches in runs with temperatures. Collective.
     pub fn update(&mut self, comm: &dyn Communicator, fields: &Fields<D>) {
         let column = |k: usize| -> &[f64] {
             match k.checked_sub(D) {
                 None => &fields.displacement[k],
-                Some(k) => &fields.velocity[k],
+                Some(k) if k < D => &fields.velocity[k],
+                Some(_) => fields.thermal_stretch.as_deref().unwrap_or_default(),
             }
         };
-        self.halo.pack((0..2 * D).map(column));
+        let width = 2 * D + usize::from(self.thermal_stretch.is_some());
+        self.halo.pack((0..width).map(column));
         self.halo.exchange(comm, &mut |_| {});
-        let received = self.displacement.iter_mut().chain(&mut self.velocity);
+        let motion = self.displacement.iter_mut().chain(&mut self.velocity);
+        let received = motion.chain(&mut self.thermal_stretch);
         self.halo.unpack(received.map(Vec::as_mut_slice));
     }
 }

@@ -3,9 +3,11 @@
 //! Every owned point has a list of the points that it may touch before the next search. The list is in
 //! ascending order of ids, so the order of the force sum does not depend on the ranks. A pair touches if its
 //! distance is below its contact distance. The lists contain the pairs whose gap (present distance minus
-//! contact distance) is at most the skin. The lists are rebuilt when a point has moved so far that other
-//! pairs may soon touch. The contact distance never exceeds the reference distance, so an undeformed body has
-//! no contact forces. Points on opposite crack faces can touch, because the bonds between them have broken.
+//! contact distance) is at most the skin. The lists are rebuilt when points have moved or expanded so far
+//! that other pairs may soon touch. The contact distance never exceeds the reference distance, so an
+//! undeformed body has no contact forces. Points on opposite crack faces can touch, because the bonds between
+//! them have broken. Contact distances expand with temperature as bonds do, so a body that expands freely has
+//! no contact forces either.
 //!
 //! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so the states of
 //! the bodies are the same on all ranks.
@@ -63,7 +65,7 @@ pub struct Contact<const D: usize> {
     rules: Vec<Option<PairRule>>,
     /// Number of blocks.
     blocks: usize,
-    /// Largest contact distance of any two points, m.
+    /// Largest contact distance of any two points without thermal stretch, m.
     largest: f64,
     /// Edge of a line segment, square or cube with the volume of the point, for each owned point, m.
     edges: Vec<f64>,
@@ -79,6 +81,8 @@ pub struct Contact<const D: usize> {
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
+    /// Thermal stretches of the owned points at the last search; empty in runs without temperatures.
+    searched_stretch: Vec<f64>,
     /// Whether the lists of pairs must be rebuilt, including the flags that mark pairs joined by an intact
     /// bond; the same on all ranks.
     is_stale: bool,
@@ -202,6 +206,7 @@ impl<const D: usize> Contact<D> {
             open: Vec::new(),
             is_open: vec![false; model.owned()],
             searched: std::array::from_fn(|_| Vec::new()),
+            searched_stretch: Vec::new(),
             is_stale: true,
             demand: StepDemand::default(),
             rigid_forces: ExactSum::ZERO,
@@ -239,7 +244,7 @@ impl<const D: usize> Contact<D> {
     /// friction and damping from the velocities in the middle of the step, and record the energy that they
     /// dissipate. At the end of a step, also apply the second half kick of rigid bodies. An evaluation that
     /// does not end a step does not change friction and damping. If points can touch each other and a
-    /// position is not finite, nothing is added. Collective.
+    /// position or a thermal stretch is not finite, nothing is added. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
@@ -406,6 +411,7 @@ impl<const D: usize> Contact<D> {
                         reference: std::array::from_fn(|d| model.reference[d][index]),
                         displacement: std::array::from_fn(|d| fields.displacement[d][index]),
                         velocity: std::array::from_fn(|d| fields.velocity[d][index]),
+                        thermal_stretch: stretch_of(fields.thermal_stretch.as_ref(), index),
                         volume,
                         edge: self.edges[index],
                         mass: model.density[block] * volume,
@@ -422,6 +428,7 @@ impl<const D: usize> Contact<D> {
                         reference: std::array::from_fn(|d| point.reference[d]),
                         displacement: std::array::from_fn(|d| ghosts.displacement[d][index]),
                         velocity: std::array::from_fn(|d| ghosts.velocity[d][index]),
+                        thermal_stretch: stretch_of(ghosts.thermal_stretch.as_ref(), index),
                         volume: point.volume,
                         edge: ghosts.edges[index],
                         mass: model.density[block] * point.volume,
@@ -508,6 +515,11 @@ impl<const D: usize> Contact<D> {
         }
         sum
     }
+}
+
+/// Thermal stretch of the point with this index; 0 in runs without temperatures.
+fn stretch_of(thermal_stretch: Option<&Vec<f64>>, index: usize) -> f64 {
+    thermal_stretch.map_or(0.0, |column| column[index])
 }
 
 impl<const D: usize> PointSum<D> {

@@ -27,7 +27,7 @@ pub(super) struct PairRule {
     radius: Option<f64>,
     edge_share: f64,
     /// Upper limit of the contact distance, as a fraction of the reference distance. With this limit, no
-    /// force acts in the reference positions.
+    /// force acts in the reference positions or after free thermal expansion.
     reference_share: f64,
     stiffness: Stiffness,
     response: Response,
@@ -61,6 +61,8 @@ pub(super) struct ContactPoint<const D: usize> {
     pub displacement: [f64; D],
     /// Velocity, m/s.
     pub velocity: [f64; D],
+    /// Thermal stretch; 0 in runs without temperatures.
+    pub thermal_stretch: f64,
     /// Volume, m³.
     pub volume: f64,
     /// Edge of a line segment, square or cube with the volume of the point, m.
@@ -141,19 +143,21 @@ impl PairRule {
         }
     }
 
-    /// Largest contact distance (m) of points with edges of at most `edge` (m).
+    /// Largest contact distance (m) of points with edges of at most `edge` (m), without thermal stretch.
     pub fn largest_distance(&self, edge: f64) -> f64 {
         self.radius.unwrap_or(self.edge_share * edge)
     }
 
-    /// Contact distance (m) of points with these edges (m) and the reference distance `reference` (m).
+    /// Contact distance (m) of points with these edges (m) and the reference distance `reference` (m),
+    /// without thermal stretch.
     pub fn distance(&self, edges: [f64; 2], reference: f64) -> f64 {
         let distance = self.largest_distance(0.5 * (edges[0] + edges[1]));
         distance.min(self.reference_share * reference)
     }
 
     /// Return three quantities: contact distance minus present distance (m), the present distance (m), and
-    /// the vector from the first to the second point (m).
+    /// the vector from the first to the second point (m). The contact distance is multiplied by 1 + a with
+    /// the mean thermal stretch a of the two points.
     fn overlap<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -164,8 +168,9 @@ impl PairRule {
             reference[d] + (second.displacement[d] - first.displacement[d])
         });
         let apart = norm(vector);
+        let thermal_stretch = 0.5 * (first.thermal_stretch + second.thermal_stretch);
         let distance = self.distance([first.edge, second.edge], norm(reference));
-        (distance - apart, apart, vector)
+        (distance * (1.0 + thermal_stretch) - apart, apart, vector)
     }
 
     /// Contact stiffness of a pair, N/m.

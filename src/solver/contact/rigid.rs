@@ -266,18 +266,17 @@ impl RigidBody {
 
     /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
     /// The overlap is contact distance minus present distance. The contact distance is half the edge of the
-    /// point's cell, or the distance at the start if this distance is smaller. The overlap is set to 0 if the
-    /// point is farther from the surface than half the edge.
+    /// point's cell, or the distance at the start if this distance is smaller, times 1 + a with the thermal
+    /// stretch a of the point. The overlap is set to 0 if the point is farther from the surface than half the
+    /// edge times 1 + a.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.position());
-        let half = 0.5 * point.edge;
-        if apart >= half {
+        let (half, expansion) = (0.5 * point.edge, 1.0 + point.thermal_stretch);
+        if apart >= half * expansion {
             return (0.0, normal);
         }
-        (
-            half.min(self.start_distance(whole(point.reference))) - apart,
-            normal,
-        )
+        let distance = half.min(self.start_distance(whole(point.reference)));
+        (distance * expansion - apart, normal)
     }
 
     /// Distance (m) of a position from the surface at the start of the run; negative inside.
@@ -337,7 +336,7 @@ impl RigidBody {
     /// Contribution of a point to the step limits. The result is `None` if the point does not touch the body
     /// and will not touch the body within a time (s) at its present approach speed. At any velocity, the
     /// result is also `None` if the gap exceeds the edge of the point's cell. The gap is the distance of the
-    /// point from the surface minus half this edge.
+    /// point from the surface minus half this edge times 1 + a, with the thermal stretch a of the point.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -345,7 +344,7 @@ impl RigidBody {
         time: f64,
     ) -> Option<Demand> {
         let (apart, normal) = self.surface(point.position());
-        let gap = apart - 0.5 * point.edge;
+        let gap = apart - 0.5 * point.edge * (1.0 + point.thermal_stretch);
         if gap > point.edge {
             return None;
         }

@@ -22,13 +22,14 @@ const SKIN: f64 = 0.4;
 /// made.
 pub(super) const MOST_GAP: f64 = 0.1;
 
-/// Distance that a point may move between searches, as a fraction of the largest contact distance.
+/// Distance that a point may move between searches, as a fraction of the largest contact distance. Half of
+/// the change of a contact distance by thermal stretches counts as motion of both points.
 const MOVED: f64 = 0.5 * (SKIN - MOST_GAP);
 
 impl<const D: usize> Contact<D> {
-    /// Repeat the search if the lists are stale or if a point has moved by more than [`MOVED`] since the last
-    /// search. Returns whether all positions on all ranks are finite. If a position is not finite, the search
-    /// is not repeated. Collective.
+    /// Repeat the search if the lists are stale, or if points have moved or expanded by more than [`MOVED`]
+    /// since the last search. Returns whether all positions and thermal stretches on all ranks are finite. If
+    /// one of them is not finite, the search is not repeated. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,
@@ -49,33 +50,57 @@ impl<const D: usize> Contact<D> {
                         (displacement[d][point] - before).powi(2)
                     })
                     .sum();
-                if square.is_nan() {
-                    f64::INFINITY
-                } else {
-                    square
-                }
+                finite_or_infinity(square)
             });
-        let mut moved = [moved.reduce(|| 0.0, f64::max)];
-        comm.max(&mut moved);
-        if moved[0].is_infinite() {
+        let moved = moved.reduce(|| 0.0, f64::max);
+        let [expanded, stretch] = self.largest_stretches(model, fields);
+        let mut largest = [moved, expanded, stretch];
+        comm.max(&mut largest);
+        let [moved, expanded, stretch] = largest;
+        if largest.iter().any(|value| value.is_infinite()) {
             return false;
         }
-        if is_stale || moved[0] > (MOVED * self.largest).powi(2) {
-            self.search(comm, model, forces, fields);
+        // A contact distance without thermal stretch is at most `largest`, so it has changed by at most
+        // `largest` times `expanded`.
+        let allowed = MOVED - 0.5 * expanded;
+        if is_stale || allowed < 0.0 || moved > (allowed * self.largest).powi(2) {
+            self.search(comm, model, forces, fields, stretch);
         }
         true
     }
 
-    /// Find the pairs that may touch before the next search. Collective.
+    /// Largest change of the thermal stretch of an owned point since the last search, and the largest thermal
+    /// stretch of an owned point; +∞ for stretches that are not finite. Both are 0 in runs without
+    /// temperatures.
+    fn largest_stretches(&self, model: &Model<D>, fields: &Fields<D>) -> [f64; 2] {
+        let Some(column) = &fields.thermal_stretch else {
+            return [0.0; 2];
+        };
+        let stretches = column[..model.owned()].par_iter().with_min_len(CHUNK);
+        let stretch = stretches
+            .clone()
+            .map(|stretch| finite_or_infinity(*stretch));
+        let stretch = stretch.reduce(|| -1.0, f64::max);
+        if self.is_stale {
+            return [0.0, stretch];
+        }
+        let changes = stretches.zip(&self.searched_stretch);
+        let changes = changes.map(|(now, before)| finite_or_infinity((now - before).abs()));
+        [changes.reduce(|| 0.0, f64::max), stretch]
+    }
+
+    /// Find the pairs that may touch before the next search. `stretch` is the largest thermal stretch of all
+    /// points. Collective.
     fn search(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
         forces: &Forces<D>,
         fields: &mut Fields<D>,
+        stretch: f64,
     ) {
-        let skin = SKIN * self.largest;
-        let reach = self.largest + skin;
+        let (skin, expansion) = (SKIN * self.largest, 1.0 + stretch);
+        let reach = self.largest * expansion + skin;
         let mut all: Vec<Ghost> = (0..model.owned())
             .map(|point| {
                 let reference = model.position(point);
@@ -93,7 +118,8 @@ impl<const D: usize> Contact<D> {
                 }
             })
             .collect();
-        self.ghosts = Ghosts::within(comm, self.dimension, &all, reach);
+        let is_thermal = fields.thermal_stretch.is_some();
+        self.ghosts = Ghosts::within(comm, self.dimension, &all, reach, is_thermal);
         all.extend_from_slice(&self.ghosts.points);
         let positions: Vec<[f64; 3]> = all.iter().map(|point| point.position).collect();
         let cells = Cells::new(&positions, reach, D);
@@ -114,7 +140,7 @@ impl<const D: usize> Contact<D> {
                 };
                 let reference = apart(&here.reference, &there.reference);
                 let distance = rule.distance([edge(point), edge(index)], reference);
-                if apart(&here.position, &there.position) <= distance + skin {
+                if apart(&here.position, &there.position) <= distance * expansion + skin {
                     row.push(FoundPair {
                         id: there.id,
                         other: index as u32,
@@ -150,6 +176,11 @@ impl<const D: usize> Contact<D> {
             self.searched[d].clear();
             self.searched[d].extend_from_slice(&fields.displacement[d][..model.owned()]);
         }
+        if let Some(column) = &fields.thermal_stretch {
+            self.searched_stretch.clear();
+            self.searched_stretch
+                .extend_from_slice(&column[..model.owned()]);
+        }
         self.is_stale = false;
     }
 
@@ -168,6 +199,11 @@ impl<const D: usize> Contact<D> {
             }
         }
     }
+}
+
+/// Return +∞ for NaN, and every other value unchanged.
+fn finite_or_infinity(value: f64) -> f64 {
+    if value.is_nan() { f64::INFINITY } else { value }
 }
 
 /// Set the bonded flags of the pairs of a point.
