@@ -28,7 +28,7 @@ pub mod survey;
 
 pub use run::run;
 
-/// Return the version and, in a release build from a checkout or a published package, the commit.
+/// Return the version. In a release build from a checkout or a published package, append the commit.
 pub fn version() -> String {
     match option_env!("FISSURE_COMMIT") {
         Some(commit) => format!("{} (commit {commit})", env!("CARGO_PKG_VERSION")),

@@ -116,8 +116,8 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 /// force density are read and written. The index of the point's block is read. Displacement is written once
 /// more for the bond loops.
 const MOTION_BYTES: u64 = 170;
-/// Estimate of the minimum memory traffic of a pass over the bonds in 3-D, bytes per point. The stored bonds
-/// are not included. Reference position, displacement and volume are read, and the sums of the pass are read
+/// Estimated minimum memory traffic of a 3-D pass over the bonds, bytes per point. The stored bonds are not
+/// included. Reference position, displacement and volume are read, and the sums of the pass are read
 /// and written. The estimate assumes that these sums are four numbers.
 const PASS_BYTES: u64 = 120;
 

@@ -1,4 +1,4 @@
-//! The figures of `fissure bench`, as a table and as JSON.
+//! The measured figures of `fissure bench`, and their output as a table or as JSON.
 
 use clap::ValueEnum;
 

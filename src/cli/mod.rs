@@ -178,8 +178,8 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 
 /// Validate decks and print their mass, bonds, memory and run time.
 ///
-/// Creates the points and finds the bonds on this machine. If a deck is too large for that, the numbers of
-/// points and bonds are estimated.
+/// Creates the points and finds the bonds on this machine. If a deck is too large to create its
+/// points and bonds, their numbers are estimated.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -54,8 +54,11 @@ pub struct MovieArguments {
 /// Draw the film of a result, or its frames as separate files.
 ///
 /// # Errors
-/// If the file is not a result or has no output, if an argument is wrong, if the field or component is
-/// missing, if no point is drawn, or if a file cannot be written.
+/// - If the file is not a result or has no output.
+/// - If an argument is wrong.
+/// - If the field or component is missing.
+/// - If no point is drawn.
+/// - If a file cannot be written.
 pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     let file = result_file(&arguments.result);
     let result = ResultReader::open(&file)?;

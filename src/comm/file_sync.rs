@@ -24,7 +24,7 @@ pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
 }
 
 /// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition. The
-/// override skips the fsync inside [`without_fsync`].
+/// override skips the fsync while this thread is in a call of [`without_fsync`].
 ///
 /// # Safety
 /// `file` must be open.

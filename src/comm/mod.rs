@@ -101,7 +101,7 @@ pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> 
     bytemuck::pod_collect_to_vec(&comm.all_gather(bytemuck::cast_slice(own)))
 }
 
-/// A candidate of a rank for [`least`].
+/// A candidate for the result of [`least`]; each rank has at most one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found<T, const N: usize = 1> {
     /// Key that is compared first.
@@ -112,9 +112,9 @@ pub struct Found<T, const N: usize = 1> {
     pub payload: T,
 }
 
-/// Find the candidate with the smallest key over all ranks. Among candidates with equal keys, the ids decide,
-/// in lexicographic order. `own` is the candidate of this rank. Return `None` if no rank has a candidate. The
-/// result is the same on all ranks. Collective.
+/// Find the candidate with the smallest key over all ranks. Among candidates with equal keys, the one
+/// with the lexicographically smallest ids is chosen. `own` is the candidate of this rank. Return `None` if
+/// no rank has a candidate. The result is the same on all ranks. Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,

@@ -63,7 +63,8 @@ fn name_and_version(text: &str) -> String {
 
 /// All ranks that `mpirun` started; one rank without `mpirun`.
 ///
-/// `World` is not `Send`, even if all handles of the MPI library are:
+/// `World` is not `Send`, even if all handles of the MPI library are `Send`. Therefore this code does not
+/// compile:
 ///
 /// ```compile_fail,E0277
 /// fn move_to_a_thread<T: Send>() {}

@@ -2,8 +2,8 @@
 //!
 //! A sum of integers does not depend on the order of the terms. It is therefore bitwise the same for any
 //! number of ranks and threads. A rounded sum needs 8 bytes, and an [`ExactSum`](super::ExactSum) needs 552
-//! bytes. The error is at most half a unit per term. Use rounded sums if the sum must be reproducible but
-//! need not be exact.
+//! bytes. The error of a rounded sum is at most half a unit per term. Use rounded sums if the sum must be
+//! reproducible but need not be exact.
 
 /// Number of bits for the magnitude of a sum.
 const BITS: i32 = 62;

@@ -11,7 +11,7 @@ struct Shared {
     slots: Vec<Mutex<Vec<u8>>>,
 }
 
-/// One rank of a group of threads.
+/// One rank of a group of ranks that are threads of one process.
 pub struct ThreadRank {
     rank: usize,
     size: usize,

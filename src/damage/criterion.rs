@@ -39,13 +39,13 @@ pub enum Criterion {
     /// Same as [`Self::Work`], with the shares computed from the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
-    /// stress measures of its acting ends.
+    /// stress measures of the ends that act on the bond.
     Stress(f64, StressRule),
     /// Same as [`Self::Stress`], with the smaller stress threshold of points i and j.
     StressThresholds(StressRule),
 }
 
-/// Factors w_c/w of the critical work at points i and j, as functions of the bond's direction; see
+/// Factors on the critical work at points i and j, which depend on the bond's direction: the factors w_c/w of
 /// [`ToughnessByDirection`]. `None` if the fracture energy of neither body depends on the direction. The
 /// factors multiply work thresholds; their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
@@ -63,8 +63,8 @@ pub type HorizonRatios = [[f64; 2]; 2];
 /// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k, with the critical stretch
 /// t_k of point k and the factor r_ek of [`Self::ratios`].
 ///
-/// The bond breaks when the sum of the energies of the acting ends reaches the sum of their energies at the
-/// stretches m_e. The critical stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
+/// With sums over the acting ends, the bond breaks when Σ ½ k_e s² |ξ| reaches Σ ½ k_e m_e² |ξ|. The critical
+/// stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. r_ek is 1 if
@@ -146,8 +146,8 @@ impl BreakableBonds {
     }
 }
 
-/// Data that criteria read at both ends of eight bonds, in addition to the laws and the numbers
-/// [`Law::Point`].
+/// Data that criteria read at both ends of eight bonds. Criteria also read the laws and the point numbers
+/// ([`Law::Point`]).
 #[derive(Clone, Copy)]
 pub struct Ends<'a> {
     /// Data of points i and j.
@@ -245,8 +245,8 @@ impl Criterion {
         }
     }
 
-    /// Whether every bond that breaks has an |x| above [`Self::limit`]. `scaled` is true for laws that scale
-    /// thresholds.
+    /// Test whether only bonds with |x| above [`Self::limit`] break. x is the relative square extension.
+    /// `scaled` is true for laws that scale thresholds.
     #[inline(always)]
     pub fn marks_all(&self, scaled: bool) -> bool {
         match *self {

@@ -84,8 +84,11 @@ impl CriticalStretch {
     /// The result is the mean of the strains σ/E′ of both bodies in tension along the normal. At the stress
     /// σ, a bond along the normal has this stretch if half of the bond lies in each body.
     ///
-    /// E′ is E in 3-D, plane stress and uniaxial stress, E/(1−ν²) in plane strain, and E(1−ν)/((1+ν)(1−2ν))
-    /// under uniaxial strain.
+    /// E′ is:
+    ///
+    /// - E in 3-D, in plane stress and under uniaxial stress;
+    /// - E/(1−ν²) in plane strain;
+    /// - E(1−ν)/((1+ν)(1−2ν)) under uniaxial strain.
     pub fn from_strength(dimension: Dimension, bodies: [Isotropic; 2], strength: f64) -> f64 {
         let [a, b] = bodies.map(|elastic| strength / Self::tensile_modulus(dimension, elastic));
         0.5 * (a + b)

@@ -5,9 +5,9 @@
 //!
 //! w_c(n) = w (p + q c^k).
 //!
-//! Cracks along a have a normal perpendicular to a; cracks across a have the normal a. w is the critical work
-//! of an isotropic body whose fracture energy equals the fracture energy of cracks along a. If cracks across
-//! a have the larger fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
+//! Cracks along the vector a have a normal perpendicular to this vector. Cracks across a have the normal a. w
+//! is the critical work of an isotropic body whose fracture energy equals the fracture energy of cracks along
+//! a. If cracks across a have the larger fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
 //!
 //! A crack with the normal N breaks all bonds that cross its plane. The fracture energy of this crack is
 //! proportional to a weighted mean of w_c(n): the mean is over all directions n, and the weight of a
@@ -71,9 +71,9 @@ impl ToughnessByDirection {
         is_tough_across: true,
     };
 
-    /// Create the factor in 2 or 3 dimensions from a unit vector a. `ratio` is the fracture energy of cracks
-    /// across a, divided by the fracture energy of cracks along a. `None` if `ratio` is beyond
-    /// [`Self::limits`].
+    /// Create the factor w_c/w in 2 or 3 dimensions. `axis` is the unit vector a. `ratio` is the fracture
+    /// energy of cracks across a, divided by the fracture energy of cracks along a. `None` if `ratio` is
+    /// outside [`Self::limits`].
     pub fn new(dimension: usize, axis: [f64; 3], ratio: f64) -> Option<Self> {
         let is_tough_across = ratio >= 1.0;
         (0..=MOST_SQUARINGS).find_map(|squarings| {
@@ -90,7 +90,8 @@ impl ToughnessByDirection {
         })
     }
 
-    /// Return the smallest and the largest `ratio` for which p is large enough.
+    /// Return the smallest and the largest `ratio` that [`Self::new`] accepts. Beyond these limits, p is
+    /// below its minimum.
     pub fn limits(dimension: usize) -> [f64; 2] {
         [false, true].map(|is_tough_across| {
             let [across, along] = means(dimension, is_tough_across, MOST_SQUARINGS);

@@ -7,15 +7,16 @@
 //! energy is dissipated too. The dilatation θ is a sum over the bonds that are still intact. The sum of these
 //! energies over all bonds across a unit area is G0 = δ s0² (A b + κ τ). The numbers b and τ depend only on
 //! the dimension and the influence function. The symbols d, m, ω, κ and A are those of `ordinary.rs`, see
-//! [`crate::material::Ordinary`]. For the Poisson ratio of bond-based laws κ = 0. With ω = 1/|ξ|, s0 then
-//! equals the critical stretch of the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014, eq. 5).
+//! [`crate::material::Ordinary`]. For the Poisson ratio of bond-based laws, κ is 0. With ω = 1/|ξ|, s0
+//! then equals the critical stretch of the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014,
+//! eq. 5).
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use crate::material::Influence;
 
-/// Number of distances of points from the plane in the quadrature of τ.
+/// Number of distances from a point to the plane, in the quadrature of τ.
 const DISTANCES: u32 = 48;
 
 /// Number of bond lengths per distance in the quadrature of τ.

@@ -142,7 +142,8 @@ pub fn conditions(
 /// Check that a prescribed temperature has an effect.
 ///
 /// # Errors
-/// At the first prescribed temperature, if no material has a coefficient of thermal expansion.
+/// If a temperature is prescribed, but no material has a coefficient of thermal expansion. The error is
+/// located at the first prescribed temperature.
 pub fn temperatures_act<'m>(
     scope: &Scope,
     conditions: &[problem::Condition],

@@ -214,7 +214,7 @@ fn of_crack<'a>(energy: &'a Option<Number>, toughness: &'a Option<Number>) -> [M
     ]
 }
 
-/// Return the toughness. A table without exactly one measure of toughness is an error.
+/// Return the toughness. The table must give exactly one of the measures; otherwise, an error is returned.
 fn measure<T>(
     scope: &Scope,
     table: &Spanned<T>,

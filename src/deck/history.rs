@@ -15,9 +15,9 @@ use crate::problem::{self, Field, Interval};
 /// Validate the content and interval of the history; `horizon` is the horizon of the grid, m.
 ///
 /// # Errors
-/// On an unknown set, field or component, or an invalid position, number or name. On an empty list `of`, and
-/// on an entry that a list names twice. On a missing or surplus `component` or `front`, and on a quantity
-/// that does not exist in this dimension.
+/// On an unknown set, field or component, or an invalid position, number or name. If the list `of` is empty,
+/// or a list names an entry twice. On a missing or surplus `component` or `front`, and on a quantity that
+/// does not exist in this dimension.
 pub fn history(
     scope: &Scope,
     deck: &Deck,

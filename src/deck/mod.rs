@@ -117,13 +117,13 @@ impl Deck {
         &self.source
     }
 
-    /// Add file, line, column and an excerpt to an error about a problem of this deck, if the error has a
-    /// span.
+    /// Add file, line, column and an excerpt to an error about the [`Problem`] of this deck, if the error has
+    /// a span.
     pub fn locate(&self, error: Error) -> Error {
         self.source.locate(error)
     }
 
-    /// Add file and line to a warning about a problem of this deck, if the warning has a span.
+    /// Add file and line to a warning about the [`Problem`] of this deck, if the warning has a span.
     pub fn locate_warning(&self, warning: Warning) -> Warning {
         self.source.locate_warning(warning)
     }

@@ -14,8 +14,8 @@ use crate::problem::{self, RigidMotion, RigidShape, Shape};
 ///
 /// # Errors
 /// On a missing or surplus shape, and on a shape that cannot be rigid. If a driven body has a key that is
-/// only for free bodies, or a free body has the key `motion`. On a free half space, on a free body or
-/// friction in a relaxation, and on numbers out of range.
+/// only for free bodies, or a free body has the key `motion`. If a half space is a free body. If a run with a
+/// relaxation has a free body or friction. On numbers out of range.
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies

@@ -1,4 +1,4 @@
-//! Validation of the time axis of a deck and of the stages of its run.
+//! Validation of the time settings of a deck: `[time]` and the stages.
 
 use super::grammar::{self, Deck, Text};
 use super::number::Number;

@@ -237,7 +237,8 @@ fn label(path: &[String]) -> String {
     [header, keys.to_vec()].concat().join(" ")
 }
 
-/// Return the names of all variants of a grammar enum. A deserialization error lists these names.
+/// Return the names of all variants of a grammar enum. The names are read from the message of a
+/// deserialization error.
 fn kinds<'de, T: Deserialize<'de>>() -> Vec<String> {
     let nameless: StrDeserializer<NameError> = "".into_deserializer();
     let message = T::deserialize(nameless)

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 const ALL: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
 
-/// Parse with the parameters `dx` = 0.5 and `fo` = 3 and all variables.
+/// Parse an expression with the parameters `dx` = 0.5 and `fo` = 3; all variables are allowed.
 fn parse(text: &str) -> Result<Expression, ExpressionError> {
     let parameters = |name: &str| match name {
         "dx" => Some(0.5),

@@ -403,7 +403,7 @@ impl BondLattice {
         filled
     }
 
-    /// Memory without the grid, bytes.
+    /// Memory of the lattice family without the memory of its grid, bytes.
     pub fn bytes(&self) -> usize {
         self.store.bytes() + size_of_val(&self.vectors[..]) + size_of_val(&self.shifts[..])
     }

@@ -2,7 +2,8 @@
 
 use crate::points::distance_squared;
 
-/// An offset of a lattice. Every point with a complete family has one bond with this reference vector.
+/// An offset of a lattice. Every point with a complete family has one bond with this offset as its reference
+/// vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
     /// ξ, m.

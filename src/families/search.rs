@@ -25,7 +25,7 @@ const CHUNK: usize = 512;
 /// memory of buffers.
 const WAVE: usize = 32;
 
-/// The longest bond (m) for a horizon (m).
+/// Return the maximum length (m) of a bond for a horizon (m).
 pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }

@@ -46,7 +46,7 @@ pub struct VectorBonds<'a> {
 pub struct Vectors<'a> {
     pub(super) lattice: LatticeTables<'a>,
     pub(super) vectors: &'a [Vector],
-    /// Index of the first lane group of this range in the lattice.
+    /// Index, in the lattice, of the first lane group of this range.
     pub(super) first: usize,
     pub(super) groups: Groups<'a>,
 }

@@ -80,8 +80,9 @@ impl VolumeFactors {
         factors
     }
 
-    /// Upper limit (m) for the length of bonds with a positive factor. For `exact`, a bond of this length is
-    /// parallel to a diagonal of cell j, and one corner of the cell touches the ball of radius δ.
+    /// Upper limit (m) for the length of bonds with a positive factor. For `exact`, the longest
+    /// such bond is parallel to a diagonal of cell j, and the nearest corner of the cell touches the ball of
+    /// radius δ.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {

@@ -6,8 +6,8 @@ use super::tree::Node;
 use crate::error::Result;
 
 /// Tolerance for the angle between the `Bottom Unit Vector` and the `Normal` of a rectangle. The two vectors
-/// count as perpendicular if |cos| of the angle is at most this value. They count as parallel if its sine is
-/// at most this value.
+/// count as perpendicular if |cos| of the angle is at most this value. They count as parallel if the sine of
+/// the angle is at most this value.
 const SLANT: f64 = 1e-9;
 
 /// Write a pre-crack for each bond filter of a table.
@@ -33,7 +33,8 @@ pub fn bond_filters(translation: &mut Translation, filters: &Node) -> Result<()>
     Ok(())
 }
 
-/// Read the vector of the keys `key X`, `key Y` and `key Z`. In 2-D the last key may be missing.
+/// Read the components of a vector from three keys. Their names are `key` and an axis, such as `Normal X` if
+/// `key` is `Normal`. In 2-D the last key may be missing.
 fn vector(translation: &Translation, filter: &Node, key: &str, note: &str) -> Result<[f64; 3]> {
     let mut vector = [0.0; 3];
     for (k, axis) in ["X", "Y", "Z"].iter().enumerate() {

@@ -24,7 +24,7 @@ pub(super) struct Quantity<'n> {
     variable: &'n str,
 }
 
-/// Outcome of a computed quantity.
+/// Outcome of the translation of a computed quantity.
 pub(super) struct Written {
     pub(super) fate: Fate,
     pub(super) note: String,

@@ -128,7 +128,8 @@ impl Section {
         }
     }
 
-    /// Test whether this section has the header `header` and is written.
+    /// Test whether this section has the header `header`. False if only the comments of the section are
+    /// written.
     fn is(&self, header: &str) -> bool {
         !self.is_left_out && self.header == header
     }
@@ -195,7 +196,7 @@ impl Draft {
         &mut self.sections[index]
     }
 
-    /// Test whether the deck has a section with a header; a section that is left out does not count.
+    /// Test whether the deck has a section with this header; a section that is left out does not count.
     pub fn has(&self, header: &str) -> bool {
         self.sections.iter().any(|section| section.is(header))
     }

@@ -17,7 +17,8 @@ const NAMES: [(&str, &str); 5] = [
 /// The elastic constants of a material.
 #[derive(Debug, Clone, Default)]
 pub struct Constants {
-    /// Per constant: key in the new deck, number, and value to write.
+    /// For each constant: its key in the new deck, its numerical value, and the [`Value`] to write to the new
+    /// deck.
     given: Vec<(&'static str, f64, Value)>,
 }
 

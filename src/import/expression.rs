@@ -346,7 +346,7 @@ impl Rewriter<'_> {
         None
     }
 
-    /// Translate a formula without a choice.
+    /// Translate a formula that contains no choice, neither `if a b else c end` nor `a ? b : c`.
     fn formula(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());

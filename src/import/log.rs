@@ -39,7 +39,7 @@ pub struct Entry {
     pub value: String,
     /// Outcome of the key.
     pub fate: Fate,
-    /// The key in the new deck, or the reason why the key is approximated or left out.
+    /// The corresponding key in the new deck, or the reason why the source key is approximated or left out.
     pub note: String,
     /// Whether the key is an initial value, a load or a support that is left out.
     pub is_lost_load: bool,
@@ -96,13 +96,13 @@ pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 pub struct Losses {
     /// Lines of initial values, loads and supports.
     pub conditions: Vec<usize>,
-    /// Lines of damage models that blocks use, or of their criteria.
+    /// Lines of damage models that blocks use, and lines of the criteria of these models.
     pub damages: Vec<usize>,
-    /// Lines of unknown values of `Omit Bonds Between Blocks`.
+    /// Lines on which `Omit Bonds Between Blocks` has an unknown value.
     pub bonds: Vec<usize>,
-    /// Lines of influence functions.
+    /// Lines of influence functions without a counterpart.
     pub influence: Vec<usize>,
-    /// Lines of point files with constants of materials in their columns.
+    /// Lines that name a point file with columns of material constants.
     pub columns: Vec<usize>,
     /// Lines of node sets with numbers that no point has.
     pub dropped_numbers: Vec<usize>,
@@ -225,8 +225,8 @@ pub(super) struct Log {
 }
 
 impl Log {
-    /// Log the outcome of a node. Notes for the same node are joined, and the first outcome other than
-    /// `Taken` holds.
+    /// Log the outcome of a node. Notes for the same node are joined. If several outcomes are logged for
+    /// the node, the first outcome other than `Taken` is kept.
     pub(super) fn note(&self, node: &Node, fate: Fate, note: impl Into<String>) {
         let mut fates = self.fates.borrow_mut();
         match fates.get_mut(&node.id) {
@@ -250,7 +250,7 @@ impl Log {
         self.fates.borrow().contains_key(&node.id)
     }
 
-    /// Log the outcome of a node and discard earlier notes.
+    /// Log the outcome of a node, and discard the earlier outcome and notes of this node.
     pub(super) fn replace(&self, node: &Node, fate: Fate, note: impl Into<String>) {
         self.fates.borrow_mut().insert(node.id, (fate, note.into()));
     }
@@ -282,8 +282,8 @@ impl Log {
         self.lost_loads.borrow_mut().insert(node.id);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. A value or an empty table without
-    /// a note has the outcome `LeftOut`. Any other table without a note is not listed, but its keys are.
+    /// Return the outcomes of all keys of a tree, in the order of the text. Values and empty tables without
+    /// a note have the outcome `LeftOut`. All other tables without a note are not listed, but their keys are.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);

@@ -149,7 +149,7 @@ enum Kind {
     Other,
 }
 
-/// An interval of the source deck with its node.
+/// An output interval, and the node of the source deck that contains this interval.
 struct Frequency {
     interval: Interval,
     node: Node,

@@ -12,8 +12,8 @@ const MARGIN: f64 = 1e-6;
 pub enum Region {
     /// Lower and upper corner; infinite where the region is unbounded.
     Block([f64; 3], [f64; 3]),
-    /// Direction of the axis (0 to 2 for x to z), the other two coordinates of the axis, radius, lower and
-    /// upper end.
+    /// Direction of the axis (0 to 2 for x to z), coordinates of the axis in the other two directions,
+    /// radius, and the lower and upper end along the axis.
     Cylinder(usize, [f64; 2], f64, [f64; 2]),
     /// Centre and radius.
     Sphere([f64; 3], f64),

@@ -276,7 +276,8 @@ fn set_text(node: &Node) -> Option<String> {
     }
 }
 
-/// Largest number of ids in a range; longer lists would make the new deck unreadable.
+/// Largest number of ids in a range. The new deck lists all ids of a range, so a longer range would make this
+/// deck unreadable.
 const MOST_NUMBERS: u64 = 1_000_000;
 
 /// Read the numbers of a list `1 2 3`, a range `1:27` or a range with a step `1:2:27`.

@@ -24,7 +24,7 @@ pub struct Translation<'a> {
     target: PathBuf,
     /// Language of the expressions.
     pub dialect: Dialect,
-    /// Outcomes of the keys.
+    /// Outcome of each key of the source deck.
     pub log: Log,
     /// The new deck.
     pub draft: Draft,
@@ -34,7 +34,7 @@ pub struct Translation<'a> {
     pub start: f64,
     /// Files that the new deck reads, relative to the working directory or absolute.
     pub files: RefCell<Vec<PathBuf>>,
-    /// Time of the run at which the solver step of the current condition starts, s.
+    /// Start of the first solver step in which the current condition acts, in the time of the run, s.
     pub step_start: f64,
     /// Names of tables: section, name in the source deck, and name in the new deck.
     names: Vec<(&'static str, String, String)>,
@@ -134,7 +134,8 @@ impl<'a> Translation<'a> {
         })
     }
 
-    /// Translate an expression of position and time, or of position only; `Err` holds a message.
+    /// Translate an expression of the position. If `of_time` is true, the expression may also contain the
+    /// time. `Err` holds a message.
     pub fn expression(&self, text: &str, of_time: bool) -> std::result::Result<Value, String> {
         let start = self.start;
         let names = |name: &str| match name {
@@ -160,8 +161,8 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// Translate an expression of position and time, and replace the time by the start of the run. `Err`
-    /// holds a message.
+    /// Translate an expression of position and time for the start of the run: the time is replaced by
+    /// [`Self::start`]. `Err` holds a message.
     pub fn at_start(&self, text: &str) -> std::result::Result<Value, String> {
         let start = self.start;
         let names = |name: &str| (name == "t").then(|| format!("({start:?})"));
@@ -170,8 +171,8 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// Return the name in the new deck for a table of the source deck. The name is unique in its section. The
-    /// same source name always gets the same name.
+    /// Return the name in the new deck for a table of the source deck. The name is unique in its section.
+    /// Calls with the same section and the same source name return the same name.
     pub fn name(&mut self, section: &'static str, name: &str) -> String {
         let same = |(s, read, _): &&(&str, String, String)| *s == section && read == name;
         if let Some((.., written)) = self.names.iter().find(same) {
@@ -210,8 +211,8 @@ impl<'a> Translation<'a> {
         folder.join(file)
     }
 
-    /// Return the path of a file of the source deck, relative to the new deck, and note that the new deck
-    /// reads this file. An absolute path stays absolute.
+    /// Return the path of a file of the source deck, relative to the new deck. An absolute path stays
+    /// absolute. Also add the file to [`Self::files`], because the new deck reads it.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
         self.files.borrow_mut().push(path.clone());

@@ -41,7 +41,7 @@ impl Lanes {
         Self([of(a), of(b), of(c), of(d), of(e), of(f), of(g), of(h)])
     }
 
-    /// Apply a function to each pair of lanes, written out like [`Self::map`].
+    /// Apply a function to each pair of lanes. As in [`Self::map`], the code has one call per pair.
     #[inline(always)]
     fn zip(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         let (a, b) = (self.0, other.0);

@@ -22,7 +22,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
         bits
     }
 
-    /// Take the lanes whose bit is set from `a`, and the other lanes from `otherwise`.
+    /// Return the lanes of `a` whose bit is set, and the lanes of `otherwise` whose bit is not set.
     #[inline(always)]
     fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
         let mut result = otherwise;

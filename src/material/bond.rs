@@ -4,8 +4,8 @@
 //! |Y|² = |ξ|² (1 + x). Laws need two functions of x:
 //!
 //! - the stretch Q(x) = √(1 + x) − 1;
-//! - the extension over the deformed length, P(x) = 1 − (1 + x)^(−½). With the micromodulus c and the stretch
-//!   s, a force c s Y/|Y| is (c/|ξ|) P(x) Y.
+//! - the extension divided by the deformed length, P(x) = 1 − (1 + x)^(−½). With the micromodulus c and the
+//!   stretch s, a force c s Y/|Y| is (c/|ξ|) P(x) Y.
 //!
 //! For |x| ≤ [`NEAR`] both functions are computed as Taylor series. The first omitted term is below 6·10⁻¹⁸
 //! times the result. For larger |x|, the code uses closed forms that avoid cancellation:
@@ -130,7 +130,7 @@ impl Weights {
     }
 }
 
-/// The elastic part of the relative displacement of eight bonds with the thermal stretch a.
+/// Elastic part of the relative displacements of eight bonds. Each bond has its own thermal stretch a.
 #[derive(Debug, Clone, Copy)]
 pub struct Elastic<const D: usize> {
     /// Elastic relative displacement Y/(1 + a) − ξ, m.
@@ -355,7 +355,7 @@ fn series<S: Simd>(simd: S, x: Lanes, coefficients: &[f64; 7]) -> Lanes {
     sum * x
 }
 
-/// Return x = (1 + s)² − 1 of a stretch s. x grows with s, so comparing x compares stretches.
+/// Return x = (1 + s)² − 1 of a stretch s. x grows with s, so two stretches can be compared by their x.
 #[inline(always)]
 pub fn relative_square_extension_of(stretch: f64) -> f64 {
     stretch * (2.0 + stretch)

@@ -20,8 +20,8 @@ use super::Bond;
 use super::symmetric::{Symmetric, quadratic_form};
 use crate::lanes::Lanes;
 
-/// Largest allowed semi-axis. Without this limit, the stiffness of points with few neighbours, nearly in one
-/// plane, would be unbounded.
+/// Largest allowed semi-axis. Without this limit, the stiffness of points whose few neighbours lie nearly in
+/// one plane would be unbounded.
 const LARGEST: f64 = 30.0;
 
 /// Diagonal entry of the tensor of a point that has no bonds within its own horizon. The radii of the

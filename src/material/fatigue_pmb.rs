@@ -2,9 +2,9 @@
 //! bond is used up.
 //!
 //! Silling & Askari 2014, SAND2014-18590. In a cyclic load with the load ratio R, a bond has the stretch s at
-//! the largest load and R s at the smallest load. If one of these two stretches is positive, the cyclic
-//! strain of the bond is ε = (1 − R) |s|; otherwise ε is 0. The remaining life λ begins at 1 and decreases
-//! with the number N of cycles:
+//! the largest load and R s at the smallest load. If at least one of these two stretches is positive, the
+//! cyclic strain of the bond is ε = (1 − R) |s|; otherwise ε is 0. The remaining life λ begins at 1 and
+//! decreases with the number N of cycles:
 //!
 //! dλ/dN = −A (ε − ε∞)^m for ε > ε∞, otherwise 0.
 //!

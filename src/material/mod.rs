@@ -245,8 +245,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Test whether a pass reads the bond history at the end of the step. Otherwise the pass reads the
-    /// history at the start of the step.
+    /// Test whether a pass reads the advanced bond history, which belongs to the end of the step. Otherwise
+    /// the pass reads the history that belongs to the start of the step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }

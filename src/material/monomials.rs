@@ -1,4 +1,5 @@
-//! Monomials of the bond directions, for sums over a family, and solution of linear least-squares problems.
+//! Monomials of the bond directions, for sums over a family. The module also solves linear least-squares
+//! problems.
 
 use nalgebra::{DMatrix, DVector};
 

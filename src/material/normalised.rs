@@ -80,8 +80,8 @@ fn as_printed(given: &Given) -> bool {
     given.values.word(FORM.name) == "diehl2016"
 }
 
-/// Return the micromodulus (N/m⁶) of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/Σ V,
-/// divided by the horizon because the influence function is δ/|ξ|.
+/// Return the micromodulus (N/m⁶) of Diehl & Schweitzer 2016, eq. 15, for an untruncated family. The
+/// influence function δ/|ξ| contains the horizon δ, so the micromodulus is 9K/Σ V divided by δ.
 fn printed_micromodulus(given: &Given) -> f64 {
     let volume = match given.dimension {
         Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),

@@ -7,8 +7,8 @@
 //!
 //! W = ½ κθ² + ½ (A/m) Σ ω (e − e_p)² Ṽ, θ = (d/m) Σ ω|ξ| (e − e_p) Ṽ.
 //!
-//! The deviatoric force is t_d = (A/m) ω e_d. Here e_d is the elastic extension without the mean elastic
-//! stretch of the intact bonds: e_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//! The deviatoric force is t_d = (A/m) ω e_d. Here e_d is the elastic extension minus |ξ| times the mean
+//! elastic stretch of the intact bonds: e_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
 //!
 //! The yield condition of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ and the yield value ψ₀.
 //! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by

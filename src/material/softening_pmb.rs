@@ -294,7 +294,7 @@ fn curve(values: &Values, strength: f64, critical: f64) -> SofteningCurve {
     }
 }
 
-/// Format a number with four digits.
+/// Format a number with four significant digits.
 fn rounded(number: f64) -> String {
     let digits = format!("{number:.3e}");
     digits.parse().map_or(digits, format_number)

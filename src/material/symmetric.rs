@@ -55,7 +55,7 @@ pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f6
     }
 }
 
-/// Return n·T n for eight bonds of direction n.
+/// Return n·T n for the directions n of eight bonds.
 #[inline(always)]
 pub fn quadratic_form<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
     quadratic_form_of(&bond.reference, tensor) * (bond.inverse * bond.inverse)

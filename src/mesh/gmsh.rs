@@ -342,8 +342,8 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Return the element type with this number. For each node in the order of [`super::kind`], also return
-    /// its position in the order of the file.
+    /// Return the element type with this number. Also return, for each node in VTK's order (see
+    /// [`super::kind`]), the position of this node in Gmsh's order.
     fn kind(&self, number: i64) -> Result<(Kind, Vec<usize>)> {
         let Some((kind, order)) = kind(number) else {
             let message = format!(
@@ -436,8 +436,8 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Test whether an element repeats the last element. Version 2 repeats an element under another number
-    /// for each of its physical groups.
+    /// Test whether an element repeats the last element. In version 2 of the format, an element with several
+    /// physical groups occurs once per group, each time under another number.
     fn repeats_last_element(&self, (kind, order): &(Kind, Vec<usize>), nodes: &[u32]) -> bool {
         let elements = &self.mesh.elements;
         let Some(last) = elements.len().checked_sub(1) else {
@@ -677,8 +677,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Read a `size_t`. The number may be a count that is too large. Every entry takes bytes, so reading the
-    /// entries then fails at the end of the file.
+    /// Read a `size_t`. The number may be a count that is too large. In this case, reading the entries fails
+    /// at the end of the file, because every entry takes bytes.
     fn size(&mut self) -> Result<u64> {
         match self.encoding {
             Encoding::Text => {

@@ -107,7 +107,7 @@ impl<'a> Netcdf<'a> {
         }
     }
 
-    /// Read the rows of a variable of characters.
+    /// Read a variable whose rows are texts.
     pub fn texts(&self, name: &str) -> Fault<Vec<String>> {
         let length = self.shape(name)?.last().copied().unwrap_or(0).max(1);
         let bytes = match self {
@@ -192,7 +192,7 @@ fn size_of_kind(kind: u32) -> Fault<usize> {
     }
 }
 
-/// The bytes after the part of the header that has been read.
+/// Read position in the header. `rest` are the bytes after this position.
 struct Cursor<'a> {
     rest: &'a [u8],
     version: u8,

@@ -402,7 +402,7 @@ impl File<'_> {
 struct Source<'a> {
     bytes: &'a [u8],
     is_raw: bool,
-    /// Those decoded bytes of the last base-64 group that were not yet taken, in reverse order.
+    /// Decoded bytes of the last base-64 group that [`Source::take`] has not returned yet, in reverse order.
     decoded: Vec<u8>,
 }
 

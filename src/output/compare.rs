@@ -191,7 +191,7 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// Add the common fields, and the names of the fields that only one result has, to `comparison`. Return one
+/// Add to `comparison` the common fields, and the names of the fields that only one result has. Return one
 /// flag per common field. The flag is true if at least one of the results stores separate values of the field
 /// for each output.
 fn common_fields(

@@ -80,7 +80,7 @@ fn allocate(file: &File, from: u64, length: u64) -> io::Result<()> {
     }
 }
 
-/// Return an error: other systems have no preallocation that keeps the file's length.
+/// Return an error: systems other than Linux have no preallocation that keeps the file's length.
 #[cfg(not(target_os = "linux"))]
 fn allocate(_: &File, _: u64, _: u64) -> io::Result<()> {
     Err(io::Error::from_raw_os_error(libc::EOPNOTSUPP))

@@ -79,7 +79,8 @@ impl SideCar {
         }
     }
 
-    /// Add a step with its time (s) and number of points, and write the side-car if `MIN_INTERVAL` allows.
+    /// Add a step with its time (s) and number of points. Write the side-car, unless the last write is too
+    /// recent (see `MIN_INTERVAL`).
     ///
     /// # Errors
     /// If the side-car cannot be written.

@@ -14,7 +14,7 @@ const SUFFICIENT_PER_RANK: usize = 2000;
 /// all cells, and every rank stores the owners of all cells.
 const LARGE_TOTAL: usize = 4_000_000;
 
-/// Number of cells per rank that an even partition needs.
+/// Minimum number of cells per rank for a balanced partition.
 const MIN_PER_RANK: usize = 64;
 
 /// The maximum number of cells for a number of ranks.

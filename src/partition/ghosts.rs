@@ -81,8 +81,9 @@ pub fn domain(
 }
 
 /// For each other rank, select the points of this rank in cells that are adjacent to cells of the other rank.
-/// Return the bytes of these points by rank, and the indices of all selected points. Only these points can
-/// have ghosts as neighbours. `owned` is sorted by cell.
+/// For each rank, return the selected points as bytes. Also return the indices of all points that are
+/// selected for at least one rank. Only these points can have ghosts as neighbours. `owned` is sorted by
+/// cell.
 fn offers(
     comm: &dyn Communicator,
     cells: &Cells,

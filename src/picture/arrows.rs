@@ -87,7 +87,7 @@ struct Root {
     /// Vector from the tail to the tip of the arrow, in pixels. Components are positive to the right and
     /// downwards.
     arrow: [f64; 2],
-    /// The arrow is cut, because the vector is longer than the vector that the longest arrow represents.
+    /// Whether the vector is longer than the vector that the longest arrow represents. The arrow is then cut.
     is_cut: bool,
     /// Depth of the point, m; points with a larger depth are nearer to the camera. 0 in flat views.
     depth: f64,

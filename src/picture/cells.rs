@@ -159,8 +159,9 @@ fn eighth(along: f64, down: f64) -> u32 {
     }
 }
 
-/// Test whether there are points on all sides: at least one of any three adjacent eighths of a full turn has
-/// a point. Every half turn then has a point, because a half turn contains three whole eighths.
+/// Test whether there are points on all sides. This is true if each group of three adjacent eighths of a
+/// full turn contains at least one point. Every half turn then has a point, because a half turn contains
+/// three whole eighths.
 fn is_surrounded(directions: u8) -> bool {
     let empty = !directions;
     empty & empty.rotate_left(1) & empty.rotate_left(2) == 0

@@ -19,8 +19,8 @@ pub struct Sample {
     pub value: f64,
 }
 
-/// Return the samples that are not covered. A sample that is not covered itself covers all earlier samples
-/// within half its cell edge. Covered samples occur because a slice between two layers of points shows both
+/// Return the samples that are not covered. An uncovered sample covers all earlier samples within half of
+/// its cell edge. Covered samples occur because a slice between two layers of points shows both
 /// layers. Later samples are nearer to the plane of the slice.
 pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
     let largest = samples

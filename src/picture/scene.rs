@@ -299,7 +299,7 @@ impl Marks<'_> {
         self.order.iter().map(|point| self.scene.mark(*point))
     }
 
-    /// Iterate over the points with finite vectors, and these vectors, in painting order.
+    /// Iterate in painting order over the points with finite vectors. Each item is a point and its vector.
     pub fn with_vectors<'b>(
         &'b self,
         vectors: &'b Vectors,

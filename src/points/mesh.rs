@@ -306,7 +306,8 @@ fn bodies_of_elements(
 }
 
 /// Find a part of the mesh that should belong to the body `rest`, but has only single-node elements without a
-/// volume. Return the name of the part; `None` if there is no such part. `rest` is the body without a block.
+/// volume. Return the name of the part; `None` if there is no such part. `rest` is the index of the body that
+/// selects no block.
 ///
 /// If all elements that belong to no other body are such elements, the part is the whole rest of the mesh. In
 /// files of Exodus, the part may also be a block of spheres that no other body selects. In other files,

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-/// Upper limit on the mean number of strips that an edge touches in addition to its first strip.
+/// Upper limit on the mean number of boundaries between strips that an edge crosses.
 const MOST_ENTRIES: f64 = 8.0;
 
 /// Round-off of the distance to an edge, as a fraction of the polygon's extent.
@@ -48,8 +48,8 @@ impl Polygon {
         polygon
     }
 
-    /// Compute the ratio of total edge length to extent along each axis. Build the index along the axis with
-    /// the smaller ratio.
+    /// For each axis, compute the total length of the edges in the direction of the axis, divided by the
+    /// extent of the polygon in this direction. Build the index along the axis with the smaller ratio.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
         // For each axis, the total length of the edges in the direction of this axis, divided by the extent

@@ -43,7 +43,7 @@ struct Span {
     each: u64,
     /// Number of cells of all layers.
     all: u64,
-    /// Spans of each layer in the next lower direction.
+    /// Spans of each layer: along y in a span along z, along x in a span along y; empty in a span along x.
     within: Vec<Span>,
 }
 

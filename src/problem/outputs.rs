@@ -236,7 +236,8 @@ pub enum Field {
     ForceDensity,
     /// Force density of contact, N/m³.
     ContactForceDensity,
-    /// Damage φ: fraction of the family's volume with broken bonds, from 0 to 1.
+    /// Damage φ: volume of the neighbours whose bonds to the point are broken, divided by the volume of all
+    /// neighbours; from 0 to 1.
     Damage,
     /// Strain energy density W, J/m³.
     StrainEnergyDensity,

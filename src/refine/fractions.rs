@@ -24,8 +24,9 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// Return the fraction of a point, given its body, id and reference position (m). `selected` tests
-    /// whether the set contains a body's level-0 point, given the body and the reference position.
+    /// Return the fraction of a point that belongs to the set. The arguments are the body, the id and the
+    /// reference position (m) of the point. `selected` tests whether the set contains a body's level-0 point,
+    /// given the body and the reference position.
     pub fn of(
         &mut self,
         (body, id, position): (usize, u64, [f64; 3]),

@@ -296,9 +296,9 @@ impl<'a> Grids<'a> {
         points.map(unrefined).collect()
     }
 
-    /// The points in the cells of the level-0 points `coarse`. `coarse` has the volumes and blocks without
-    /// refinement. The result begins with the points of `coarse`, with updated volumes and blocks. Finer
-    /// points follow.
+    /// The points in the cells of the level-0 points `coarse`. Each point of `coarse` has the volume and
+    /// block that it has without refinement. The result begins with the points of `coarse`, with updated
+    /// volumes and blocks. Finer points follow.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
         let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
             let grid = grid.as_ref()?;
@@ -390,8 +390,8 @@ impl<'a> Grids<'a> {
         self.problem.block_number(body, node.level, kind)
     }
 
-    /// The level-0 cells of a body whose points may differ from the points without refinement. `None` if the
-    /// body is not on a lattice, or if the problem has no refinement.
+    /// The level-0 cells of a body in which the points may differ from the points without refinement. `None`
+    /// if the body is not on a lattice, or if the problem has no refinement.
     pub fn changed(&self, body: usize) -> Option<GridIndexSet> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.pattern.changed())

@@ -73,7 +73,8 @@ pub struct EnergyWatch {
     gain_of_load_steps: f64,
     /// Whether a warning about an energy gain has been printed.
     warned: bool,
-    /// Largest fracture energy of a row so far, J.
+    /// Largest fracture energy in the rows since the last load step, or since the start if there was no load
+    /// step, J.
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,

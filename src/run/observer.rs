@@ -158,9 +158,9 @@ pub trait RunState {
     /// Return the energies of all points, J. A request needs one or two passes over the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
-    /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. After a request
-    /// in [`Observer::row`], the run stops at this step; otherwise, the run stops up to ten explicit steps or
-    /// iterations of load steps later.
+    /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. If the
+    /// request is made in [`Observer::row`], the run stops at the step of this row. Otherwise, the run stops
+    /// up to ten explicit steps, or up to ten iterations of load steps, later.
     fn stop(&mut self);
 
     /// Return the factor of a load in the next step; 1 unless an observer has set the factor. `None` if no
@@ -173,8 +173,8 @@ pub trait RunState {
     /// counts as external work. Checkpoints contain the factor. All ranks must set the same factor at the
     /// same step.
     ///
-    /// The run soon ends with an error if no load has this name, if the factor is not finite, or if the ranks
-    /// set different factors.
+    /// The run ends with an error if no load has this name, if the factor is not finite, or if the ranks set
+    /// different factors. It ends at the step at which [`Self::stop`] would stop the run.
     fn set_load_factor(&mut self, name: &str, factor: f64);
 }
 
@@ -277,7 +277,7 @@ impl Row<'_> {
         found.map(|position| self.row.values[position])
     }
 
-    /// Return the energies of all bodies, J.
+    /// Return the energies (J), each summed over all bodies.
     pub fn energies(&self) -> Energies {
         self.row.energies
     }

@@ -348,8 +348,8 @@ pub fn reasons_for_new_results<const D: usize>(
 pub enum Continuation {
     /// The existing file is resumed.
     Resume,
-    /// A new file starts. The reason is given if the checkpoint or the folder contains a result of this
-    /// output.
+    /// A new file starts. The text is the reason for the new file; `None` if neither the checkpoint nor
+    /// the folder contains a result of this output.
     New(Option<String>),
 }
 

@@ -1,5 +1,6 @@
-//! Files of an earlier run in the output folder that a new run does not replace. These files are further
-//! results and tables of cracks, if the deck no longer contains the output or the crack.
+//! Files of an earlier run in the output folder that a new run does not replace. Each of these files
+//! is a further result or the table of a crack. The deck no longer contains the output or the crack to which
+//! the file belongs.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};

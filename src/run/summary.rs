@@ -38,13 +38,13 @@ pub struct Summary {
 /// Wall-clock time per phase, s.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Phases {
-    /// Points, partition and bonds.
+    /// Set-up: points, partition, bonds, conditions and the first forces.
     pub set_up: f64,
     /// Loops over bonds.
     pub bonds: f64,
     /// Halo exchange, without the part that overlaps with computation.
     pub halo: f64,
-    /// Search and forces of contact.
+    /// Contact search and contact forces.
     pub contact: f64,
     /// Integration, conditions, and copies of displacements to the arrays of the bond loops.
     pub motion: f64,

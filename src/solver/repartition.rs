@@ -26,8 +26,8 @@ pub struct Repartition {
     pub seconds: f64,
 }
 
-/// Schedule of the checks that compare the computing times of the ranks. Also the time that this rank had
-/// spent on bonds up to the last check.
+/// Schedule of the checks that compare the computing times of the ranks. The watch also stores the time
+/// that this rank had spent on bonds up to the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,

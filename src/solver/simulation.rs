@@ -104,8 +104,8 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// The first point of this rank whose motion, force or reaction is not finite. If several points have such
-/// values first at the same step, this is the one with the smallest id.
+/// The first point of this rank whose motion, force or reaction is not finite. If several points are found at
+/// the same step, this is the one with the smallest id.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,

@@ -9,8 +9,8 @@ use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time
 use super::motion::Clock;
 use super::motion::clock::steps_to;
 
-/// Maximum number of steps of a stage. Much larger numbers are not exact in floating point, and the steps
-/// would be so short that they may not change the time.
+/// Maximum number of steps of a stage. Much larger numbers are not exact in floating point. With
+/// that many steps, a step could be so short that adding it to the time does not change the time.
 const MOST_STEPS: f64 = 1e15;
 
 /// Return the length of the first step of each stage (s), and the number of steps of the stage if no bond

@@ -46,7 +46,8 @@ const NEWTON_VECTORS: usize = 8;
 const FIELD_COPIES: f64 = 3.0;
 
 /// Number of copies of a column during a checkpoint, on one rank and on several ranks. One copy is in the
-/// order of the points in memory, and one in the order of the ids. With several ranks, one is in messages.
+/// order of the points in memory, and one in the order of the ids. With several ranks, a third copy is in
+/// messages.
 const CHECKPOINT_COPIES: [f64; 2] = [2.0, 3.0];
 
 /// Memory of the points and bonds of a process, measured or estimated, bytes.

@@ -35,7 +35,7 @@ use crate::solver::observers::{Nearest, nearest};
 /// half the number of neighbours of a complete family with a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
-/// Common horizons, in spacings.
+/// Usual horizons, in spacings. A warning is printed for all other horizons.
 const USUAL_HORIZONS: std::ops::RangeInclusive<f64> = 1.999..=8.001;
 
 /// Number of steps above which even small runs take days.
@@ -316,8 +316,9 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
     }
 }
 
-/// Return the number of points of each set. Warn of sets selected by position that have fewer points than
-/// there are dimensions. Do not warn if the run has at most 2 points in 1-D, 4 in 2-D or 6 in 3-D.
+/// Return the number of points of each set. Warn of each set that is selected by position and has fewer
+/// points than the problem has dimensions. Do not warn if the run has at most 2 points in 1-D, 4 in 2-D or 6
+/// in 3-D.
 /// Collective.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);

@@ -16,7 +16,7 @@ pub enum Contours {
     Values(Vec<f64>),
 }
 
-/// Largest number of lines that `--contours` accepts as a count.
+/// Largest allowed number of lines, if the argument of `--contours` is a number of lines.
 const MOST_CONTOURS: usize = 100;
 
 impl Contours {

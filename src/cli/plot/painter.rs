@@ -204,7 +204,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Test whether a colour bar with a linear scale starts at 0. This is true for damage, which is never
-    /// negative, and false for a difference of damages and for all other fields.
+    /// negative. It is false for a difference of damages and for all other fields.
     fn starts_at_zero(&self) -> bool {
         self.minus.is_none() && is_damage(&self.quantity.field)
     }

@@ -92,8 +92,8 @@ impl<'a> NearestPoints<'a> {
         }
     }
 
-    /// Continue the search with a block of points, given by reference positions (m), and displacements (m)
-    /// with three components per point.
+    /// Continue the search with more points. `positions` are their reference positions (m). `displacements`
+    /// are their displacements (m), three components per point.
     pub fn search(&mut self, positions: &[[f64; 3]], displacements: &[f64]) {
         let vertices = self.lines.iter().flat_map(|(_, line)| line.iter());
         for (place, nearest) in vertices.zip(&mut self.nearest) {

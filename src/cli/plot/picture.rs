@@ -147,7 +147,7 @@ pub fn check_png(path: &Path) -> Result<()> {
     check_ending(path, &["png"], hint)
 }
 
-/// Return the error for a result without points in any output.
+/// Return the error for a result in which no output has points.
 pub fn nothing_to_draw(file: &Path) -> Error {
     let message = format!("{}: no output has points to draw", file.display());
     Error::input(message)

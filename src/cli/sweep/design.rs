@@ -88,7 +88,7 @@ pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
 /// Combinations of the values of all axes. An axis is a parameter or key with its values.
 pub struct Design {
     pub axes: Vec<Axis>,
-    /// For each row (combination): one index per axis, into the values of this axis.
+    /// For each row (combination), one index per axis. The index selects one of the values of the axis.
     pub rows: Vec<Vec<usize>>,
     zip: bool,
 }

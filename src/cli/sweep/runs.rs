@@ -73,8 +73,8 @@ pub enum State {
 }
 
 impl Run {
-    /// Check that the folder is new or holds this run. With `overwrite`, the folder may hold any run of a
-    /// sweep.
+    /// Check that the folder holds this run, or neither a run of a sweep nor a result. With `overwrite`, the
+    /// folder may hold any run of a sweep.
     ///
     /// # Errors
     /// If the folder holds a result that is not of a sweep. Without `overwrite`, also if the folder holds
@@ -134,7 +134,7 @@ struct Process {
 }
 
 impl<'a> Program<'a> {
-    /// Create the program from this executable and the launcher of the arguments.
+    /// Create the program from the path of this executable and the launcher that `arguments` gives.
     ///
     /// # Errors
     /// If the launcher is empty, or the path of this executable is unknown.

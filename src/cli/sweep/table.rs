@@ -13,7 +13,7 @@ use crate::cli::{file_error, outln};
 /// Width of the pictures in pixels.
 const WIDTH: u32 = 900;
 
-/// Values of all runs, with the data for errors and rates.
+/// Values of all runs, with the data from which errors and rates of convergence are computed.
 pub struct Table<'a> {
     design: &'a Design,
     columns: &'a [Column],

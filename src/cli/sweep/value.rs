@@ -103,7 +103,8 @@ impl Column {
         format!("{}:{}", self.pick_name(), self.name)
     }
 
-    /// Return a name of the value for files and for columns of sweep.csv, such as `max_damage`.
+    /// Return the name of the value, such as `max_damage`. File names and column names of sweep.csv contain
+    /// this name.
     pub fn key(&self) -> String {
         format!("{}_{}", self.pick_name(), self.name)
     }

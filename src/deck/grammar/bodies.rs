@@ -50,9 +50,9 @@ pub struct Points {
     /// Path of the mesh, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Text>,
-    /// Block number of the rows, or group of the elements, that the body uses. If not given, the body uses
-    /// all rows or elements that belong to no other body. A body without `block` must come after the other
-    /// bodies with the same file or mesh.
+    /// Block number in the file, or group in the mesh. The body uses the rows with this number, or the
+    /// elements of this group. If not given, the body uses all rows or elements that belong to no other body.
+    /// A body without `block` must come after the other bodies with the same file or mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
     /// Names of the columns of the file: coordinates, `volume`, `block`, and any other names. These names

@@ -135,7 +135,7 @@ pub struct Pair {
 pub enum Rule {
     /// No bonds.
     None,
-    /// The means of the moduli and of the horizons.
+    /// The mean of the two moduli, and the mean of the two horizons.
     Average,
     /// The smaller of the two moduli, and the smaller of the two horizons.
     Minimum,

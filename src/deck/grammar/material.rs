@@ -237,8 +237,8 @@ pub struct BondEnergy {
     /// 3-D. `"peridigm2021"`: as in Peridigm in 2021, for 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
-    /// Whether only bonds that are longer than initially can break; true if not given. If false, compressed
-    /// bonds break too, as in a shear crack.
+    /// Whether only bonds that are longer than in the undeformed body can break; true if not given. If false,
+    /// compressed bonds break too, as in a shear crack.
     #[serde(default = "yes")]
     pub tension_only: bool,
     /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
@@ -272,7 +272,7 @@ pub struct Stress {
     pub measure: StressMeasure,
     /// Stress at which bonds break, in Pa.
     pub strength: Number,
-    /// Whether only bonds that are longer than initially can break; true if not given.
+    /// Whether only bonds that are longer than in the undeformed body can break; true if not given.
     #[serde(default = "yes")]
     pub tension_only: bool,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not

@@ -54,7 +54,7 @@ pub struct Trigger {
     /// Smallest damage of a trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Number>,
-    /// A condition on the reference position and t that makes a point a trigger.
+    /// A condition on the reference position and t; a point that fulfils the condition is a trigger.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<Number>,
     /// A condition on the reference position and t that every trigger must fulfil.

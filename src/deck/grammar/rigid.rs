@@ -38,13 +38,15 @@ pub struct Rigid {
     /// not given. The layer is half a horizon thick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Coefficient of friction, as in `[contact]`; 0 if not given, even if `[contact]` has a value.
+    /// Coefficient of friction, defined as in `[contact]`. The default is 0, even if `[contact]` has
+    /// this key.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
     /// Coefficient of static friction, as in `[contact]`; `friction` of this body if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// Coefficient of restitution, as in `[contact]`; 1 if not given, even if `[contact]` has a value.
+    /// Coefficient of restitution, defined as in `[contact]`. The default is 1, even if `[contact]` has
+    /// this key.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
 }

@@ -124,7 +124,7 @@ pub struct Adaptive {
     /// repeated with a smaller dt, unless dt is already `smallest`.
     #[serde(default = "default_most_broken")]
     pub most_broken: Count,
-    /// Definition of a calm step: at most this number of bonds of any point break in the step.
+    /// A step is calm if no point loses more bonds than this number in the step.
     #[serde(default = "default_stable_broken")]
     pub stable_broken: Spanned<u64>,
     /// Number of consecutive calm steps after which dt is raised.

@@ -1,4 +1,4 @@
-//! Commands before the first run that define atoms and their properties.
+//! Commands that come before the first run and define atoms and their properties.
 
 use super::fixes::without_suffix;
 use super::groups::Group;

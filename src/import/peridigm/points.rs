@@ -162,7 +162,7 @@ pub(super) fn block_number(block: &str) -> Option<u32> {
     block.rsplit('_').next()?.parse().ok()
 }
 
-/// Return key and value for the points of a block.
+/// Return the key and the value of the new deck that give the points of a block.
 pub(super) fn source(
     translation: &Translation,
     points: &Points,

@@ -8,7 +8,7 @@ use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
 /// Write the initial values, loads, supports and temperatures, then the stages. `has_expansion` says whether
-/// a block has a thermal expansion. Return whether temperatures are prescribed.
+/// any block has a thermal expansion. Return whether temperatures are prescribed.
 pub(super) fn conditions(
     translation: &mut Translation,
     root: &Node,

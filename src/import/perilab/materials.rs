@@ -9,7 +9,7 @@ use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
 /// Material models: text that the name of the model contains, the law, and how the law differs from the
-/// model. The first match is used. A model with an empty law has no counterpart.
+/// model. The first match is used. If the law is empty, the model has no counterpart.
 const MATERIALS: [(&str, &str, &str); 9] = [
     (
         "unified bond-based",

@@ -162,8 +162,8 @@ fn note_scaling(translation: &Translation, discretization: &Node) -> Result<()> 
     Ok(())
 }
 
-/// Return the solver. In a deck with several steps, return the solvers of all steps. Their order is that of
-/// `Step ID`, as in PeriLab.
+/// Return the solver. In a deck with several steps, return the solvers of all steps, sorted by `Step ID` as
+/// in PeriLab.
 ///
 /// # Errors
 /// If the `Step ID` of a step is missing or is not a whole number.

@@ -24,7 +24,8 @@
 //!
 //! Let H_ξ = F_ξ − I. With the largest modulus c of the solid, W ≤ ½ c Σ w |H_ξ|². Here
 //! |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|². With the smallest eigenvalue λ of K, |H|² ≤ Σ ω |η|² Ṽ/λ.
-//! Therefore springs with the constant c (1/λ + 1/(|ξ|² Σ ω Ṽ)) store at least the energy W.
+//! Therefore W is at most ½ Σ ω k |η|² Ṽ, with k = c (1/λ + 1/(|ξ|² Σ ω Ṽ)). This sum is the energy of
+//! springs with the constant ω k per bond.
 
 use nalgebra::SMatrix;
 

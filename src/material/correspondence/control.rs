@@ -22,10 +22,11 @@ pub enum Control {
     /// untruncated family. Long shear waves then have no dispersion.
     ///
     /// Derivation: consider a wave along the axis x with the amplitude u, the wavenumber κ and the modulus M,
-    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. H is too small by the fraction κ²q/(6k), so the energy
-    /// density of the stress is ½ M κ² (1 − κ²q/(3k)) |u|². z is −½ (κ ξ_x)² u, so the energy density of a
-    /// control B = (b/k) I with a modulus b is ½ b κ⁴q/(4k) |u|². For b = (4/3) M, the sum of the two energy
-    /// densities is independent of q, for every dimension, influence function and lattice.
+    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. H is smaller than the gradient of the wave by the
+    /// fraction κ²q/(6k). Therefore the energy density of the stress is ½ M κ² (1 − κ²q/(3k)) |u|². The part
+    /// z of η is −½ (κ ξ_x)² u. Therefore a control B = (b/k) I with a modulus b has the energy density
+    /// ½ b κ⁴q/(4k) |u|². For b = (4/3) M, the sum of the two energy densities is independent of q, for every
+    /// dimension, influence function and lattice.
     Dispersion {
         /// Product (4/3) G/k, N/m⁷.
         strength: f64,

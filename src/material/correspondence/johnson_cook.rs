@@ -15,10 +15,10 @@
 //! plastic state. A force evaluation without passage of time uses this stored factor. Therefore a stress that
 //! was returned to the yield surface does not cause flow again.
 //!
-//! Let S_d be the deviator and q the equivalent stress of the final stress. The increment of plastic strain
-//! is ΔE_p = x S_d with an unknown x, and Δε̄ = ⅔ x q. q follows from the trial stress and x: each part of
-//! the equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part ([`Modes`]), not
-//! the heat capacity. The equation for x,
+//! Let S_d be the deviatoric stress and q the equivalent stress at the end of the step. The increment of
+//! plastic strain is ΔE_p = x S_d with an unknown x, and Δε̄ = ⅔ x q. q follows from the trial stress and x:
+//! each part of the equivalent trial stress is divided by 1 + x c. Here c is the stiffness of the part
+//! ([`Modes`]), not the heat capacity. The equation for x,
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!
@@ -153,8 +153,8 @@ const MOLTEN: f64 = 1e-3;
 /// Tolerance of the residual F of Newton's method, relative to the equivalent trial stress.
 const TOLERANCE: f64 = 1e-14;
 
-/// Largest number of Newton iterations. About five are needed, and up to thirty at the first yield with a
-/// small n.
+/// Largest number of Newton iterations. Usually, about five iterations are needed. When a point with a small
+/// hardening exponent n yields for the first time, up to thirty iterations are needed.
 const MOST_ITERATIONS: usize = 100;
 
 /// Return the first key of this hardening that the deck gives.

@@ -2,7 +2,7 @@
 //!
 //! The deformation gradient is the product of an elastic and a plastic part, F = F_e F_p. The stored state of
 //! a point is C_p⁻¹ − I with C_p = F_pᵀ F_p. This state and F determine b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ.
-//! With the eigenvalues b_a and the eigenvectors n_a of b_e, the logarithmic strains ε_a, the Kirchhoff
+//! Let b_a be the eigenvalues and n_a the eigenvectors of b_e. The logarithmic strains ε_a, the Kirchhoff
 //! stress τ, P and the elastic energy density W are (Simo 1992):
 //!
 //! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ Σ ε + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
@@ -60,7 +60,7 @@ impl Trial {
         })
     }
 
-    /// Return the tensor Σ t_a n_a⊗n_a with these eigenvalues t_a.
+    /// Return the tensor Σ t_a n_a⊗n_a. `entries` are the eigenvalues t_a.
     fn tensor(&self, entries: &Vector3<f64>) -> Matrix3<f64> {
         self.axes * Matrix3::from_diagonal(entries) * self.axes.transpose()
     }

@@ -192,7 +192,7 @@ const CONSTANTS: usize = 2;
 /// the step.
 const OWN: usize = 4;
 
-/// Count of the own numbers of a point if no control decreases with plastic flow.
+/// Count of the own numbers of a point if the body does not yield or has no control.
 const OWN_OF_ELASTIC: usize = 2;
 
 /// A, and the diagonal and mixed entries of B, N/m⁷.

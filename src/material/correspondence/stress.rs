@@ -15,8 +15,8 @@ pub enum Stress {
     /// P = F S, S = C : E with E = ½ (FᵀF − I). This stress derives from an energy and is objective.
     StVenantKirchhoff(Hooke),
     /// P = J σ F⁻ᵀ with the Cauchy stress σ = C : E and J = det F (Willberg et al. 2022, eq. 9, which prints
-    /// F⁻¹ instead of F⁻ᵀ). This stress equals that of St. Venant–Kirchhoff at small strains without
-    /// rotation. It is not objective.
+    /// F⁻¹ instead of F⁻ᵀ). At small strains without rotation, this stress equals that of
+    /// St. Venant–Kirchhoff. This stress law is not objective.
     Willberg2022(Hooke),
     /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF. In plane stress, the out-of-plane
     /// stretch is the one at which the out-of-plane stress is 0.

@@ -36,7 +36,7 @@ pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
 pub struct Conditions<const D: usize> {
     /// The value c of g in an untruncated family of the continuum.
     pub(super) constant: f64,
-    /// The polynomial of degree 2 that equals 1: n·n, or (Σ N_a)².
+    /// A polynomial of degree 2 whose value is 1 for every direction n: n·n, or (Σ N_a)².
     pub(super) one: Vec<Monomial>,
     /// p_k and wanted_k: for unit extensions along the axes, then for shears between the axes.
     pub(super) each: Vec<(Vec<Monomial>, f64)>,

@@ -9,7 +9,8 @@ use super::super::{Elements, Group, Members, Mesh, Runs, fault, position};
 use super::{Place, Reader};
 use crate::error::{Result, excerpt};
 
-/// Largest number of nodes in the model and all instances together, and largest number of elements.
+/// Largest number of nodes in the model and all instances together. Also the largest number of elements in
+/// the model and all instances together.
 const LARGEST: usize = u32::MAX as usize;
 
 /// Nodes, elements and sets of the model, of a part or of an instance.

@@ -340,7 +340,8 @@ impl Reader {
         self.fault(format!("*{keyword} within {open}, which has no end"))
     }
 
-    /// Begin the data lines of a set. Return the index of these lines in `Part::sets`.
+    /// Add an empty set to `Part::sets`, and return its index. The data lines that follow the keyword fill
+    /// the set.
     fn begin_set(&mut self, of: MemberKind, name: &str, keyword: &Keyword) -> usize {
         let set = Set {
             of,

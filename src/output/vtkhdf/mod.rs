@@ -457,7 +457,7 @@ fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> 
     )
 }
 
-/// Return the tables of a result: path, columns and rule of the values.
+/// Return the tables of a result: path, number of columns, and the [`Rule`] that gives the values.
 fn tables_of(contents: &Contents) -> Vec<(String, Option<usize>, Rule)> {
     let rule = |start, stride, counted| Rule {
         start,

@@ -176,8 +176,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Return which data of this body's points are read by the failure criteria of bonds to other bodies. Only
-/// pairs of bodies with a separate damage law count.
+/// For bonds to other bodies, return which data of this body's points the failure criteria read. Only pairs
+/// of bodies with a separate damage law count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -431,7 +431,8 @@ struct End {
 }
 
 impl End {
-    /// Return the weight of the volume of a neighbour at the offset ξ (m) from the point at this end.
+    /// Return the weight of a neighbour, which is the factor on the neighbour's volume. The neighbour has the
+    /// offset ξ (m) from the point at this end.
     fn weight(&self, offset: [f64; 3]) -> f64 {
         let factor = self.volume_factors.at(offset);
         match &self.built.influence {

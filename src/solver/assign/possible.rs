@@ -195,8 +195,8 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     damage_fault(problem, body, damage).map_or(Ok(()), error)
 }
 
-/// Return the reason why bonds of a body cannot break by this damage in this problem; `None` if the bonds can
-/// break.
+/// Return the reason why `damage` cannot break the bonds of a body in this problem; `None` if it can break
+/// the bonds.
 fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
     if let DamageRule::Energy { calibration, .. } = damage.rule
         && !calibration.is_for(problem.dimension.count())

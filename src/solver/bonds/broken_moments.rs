@@ -71,7 +71,7 @@ impl Moments {
         self.0[10] > 0.0
     }
 
-    /// Mean ξ̄ of the reference vectors of all bonds with the weights ω Ṽ, m; 0 for a point without bonds.
+    /// Mean ξ̄ (m) of the reference vectors of all bonds, weighted by ω Ṽ; 0 for a point without bonds.
     pub fn mean(&self) -> Vector {
         match self.0[0] {
             0.0 => Vector::zeros(),

@@ -75,8 +75,8 @@ impl BlockLaws {
         self.damage.is_some() || self.pairs.breaks || self.wears_out
     }
 
-    /// Whether thresholds are stored per point, because they depend on scatter, on the direction of bonds or
-    /// on the smallest stretch.
+    /// Whether thresholds are stored per point. This is the case if they depend on scatter, on the direction
+    /// of bonds or on the smallest stretch.
     pub fn has_thresholds(&self) -> bool {
         self.weibull.is_some() || self.direction.is_some() || self.follows_smallest_stretch()
     }

@@ -152,7 +152,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Point numbers of points i that the kernel reads.
     type Point: LaneTuple;
 
-    /// Point numbers of points j that the kernel reads: the first numbers of [`Self::Point`].
+    /// Point numbers that the kernel reads for points j: none, or the first numbers of [`Self::Point`].
     type Far: LaneTuple;
 
     /// Bond history that the kernel reads.

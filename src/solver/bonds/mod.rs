@@ -71,7 +71,7 @@ enum Pass {
     /// stretch.
     SmallestStretch,
     /// The sums of the law's pass with this index, see [`Law::PASSES`]. Laws compute point numbers from these
-    /// sums. Laws with fewer passes are skipped.
+    /// sums. Laws without this pass are skipped.
     PointSum(usize),
     /// The forces.
     Force,

@@ -17,7 +17,7 @@ const fn extension_only(linear: bool) -> Wanted {
     }
 }
 
-/// Kernel of the point sum with index `N` of a law, over the intact bonds.
+/// Kernel of a point sum: it sums the contributions of the intact bonds to pass `N` of a law.
 #[derive(Clone, Copy)]
 pub struct PassSum<L, const N: usize> {
     /// The law of point i.

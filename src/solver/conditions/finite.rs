@@ -11,7 +11,7 @@ use crate::solver::model::Model;
 
 use super::members;
 
-/// Subjects of the messages about vector components.
+/// Words before the value in the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
 /// Check that the values of all conditions that act at `time` (s) are finite at all of their points, and that

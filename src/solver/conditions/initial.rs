@@ -48,7 +48,8 @@ pub fn apply_initials<const D: usize>(
     Ok(())
 }
 
-/// Set the displacements and velocities of `points`, local indices of owned points, from a file. Collective.
+/// Set the displacements and velocities of points from a file. `points` are the local indices of these owned
+/// points. Collective.
 fn apply_file<const D: usize>(
     initial: &Initial,
     file: &InitialFile,

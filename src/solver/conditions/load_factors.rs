@@ -93,7 +93,7 @@ impl LoadFactors {
         all.map(|factor| factor.to_bits()).collect()
     }
 
-    /// Number of [`Self::words`] if not all factors are 1.
+    /// Number of words that [`Self::words`] returns if at least one factor is not 1.
     pub fn word_count(&self) -> usize {
         3 * self.requested.len()
     }

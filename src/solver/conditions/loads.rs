@@ -142,8 +142,8 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Store force density and displacement for the work of the next step. `displacement` (m) contains all
-    /// points of the part.
+    /// Store force density and displacement for the work of the next step. `displacement`
+    /// contains the displacements (m) of all points of the part.
     pub fn record_for_work(&mut self, displacement: [&[f64]; D]) {
         self.before.copy_from_slice(&self.force);
         for (from, point) in self.moved_from.iter_mut().zip(&self.points) {

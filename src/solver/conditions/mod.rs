@@ -52,7 +52,8 @@ pub struct OnPart<const D: usize> {
 /// is
 /// ½ (f₀ + f₁)·(u₁ − u₀) V.
 /// From 1 to 2, supports do not move, and the force density of loads remains f₁. The displacement u₁ is not
-/// stored, so the work of loads from 0 to 2 is computed as
+/// stored for equilibrium 2. Therefore the work of loads from 0 to 2 is the sum of two terms. The first term
+/// is added at equilibrium 1, and the second term at equilibrium 2:
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {

@@ -2,7 +2,8 @@
 
 use crate::expression::{Expression, Variable};
 
-/// An expression that is evaluated once per time if it does not depend on the position.
+/// An expression. If its value does not depend on the position, it is evaluated only once at each time, for
+/// all points.
 pub struct Values {
     pub expression: Expression,
     /// Whether the expression depends on time.

@@ -1,9 +1,9 @@
 //! The ghosts of contact: points of other ranks that may touch owned points. These ghosts differ from the
 //! ghosts of the bonds, because contact depends on present positions.
 //!
-//! Points of any two ranks can touch each other. Each cell of present positions has a home rank, given by the
-//! hash of the cell. Each rank with points in the cell receives a list from the home rank: the other ranks
-//! that have points in this cell or in an adjacent cell.
+//! Points of any two ranks can touch each other. The points are sorted into cells by their present positions.
+//! Each cell has a home rank, given by the hash of the cell. Each rank with points in the cell receives a
+//! list from the home rank: the other ranks that have points in this cell or in an adjacent cell.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -106,7 +106,8 @@ struct Claim {
     inside: u64,
 }
 
-/// Message from a home rank: another rank has points in a cell or in an adjacent one.
+/// Message from a home rank to a rank with points in `cell`: the other rank `rank` has points in this cell or
+/// in an adjacent cell.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Partner {

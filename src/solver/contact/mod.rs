@@ -9,8 +9,9 @@
 //! them have broken. Contact distances expand with temperature as bonds do, so a body that expands freely has
 //! no contact forces either.
 //!
-//! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so the states of
-//! the bodies are the same on all ranks.
+//! Rigid bodies repel all points. Every rank integrates the motion of all rigid bodies. The forces and
+//! torques of the points on a rigid body are exact sums over all ranks, so the states of the bodies are the
+//! same on all ranks.
 //!
 //! Repulsion follows from the new positions. Friction and damping follow from the velocities half a step
 //! earlier. The work of friction and damping in a step is computed by the trapezoidal rule.
@@ -75,7 +76,7 @@ pub struct Contact<const D: usize> {
     /// list is from the last evaluation, and the second list is from the evaluation before it.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
-    /// Owned points that may touch another point to which no intact bond joins them.
+    /// Owned points that may touch at least one point to which they have no intact bond.
     open: Vec<u32>,
     /// For each owned point, whether `open` contains the point.
     is_open: Vec<bool>,
@@ -113,8 +114,8 @@ pub struct ContactEvaluation {
 pub struct StepEnd {
     /// Time, s.
     pub time: f64,
-    /// Length of this step, s; 0 at the start, and at further equilibria of a load step in which bonds have
-    /// broken.
+    /// Length of this step, s; 0 at the start. If bonds break in a load step, the length is also 0 at all
+    /// further equilibria of this load step.
     pub step: f64,
     /// Length that the next step could have without contact, s.
     pub longest: f64,
@@ -439,7 +440,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Call `visit` for each point that may touch an owned point, in ascending order of ids. The arguments
-    /// are the owned point, the other point, the block of the other point, and the contact rule of both.
+    /// are the owned point, the other point, the block of the other point, and the contact rule of the pair.
     fn for_each_candidate(
         &self,
         model: &Model<D>,

@@ -48,7 +48,7 @@ enum Stiffness {
     /// Stiffness of a layer of material between the points: this factor (N/m^D) times ℓ^(D − 1), where ℓ is
     /// the mean edge (m) of both points.
     OfLayer(f64),
-    /// This factor (N/m⁷) times the product of the volumes of both points.
+    /// Stiffness: this factor (N/m⁷) times the product of the volumes of both points.
     OfVolumes(f64),
 }
 
@@ -65,7 +65,7 @@ pub(super) struct ContactPoint<const D: usize> {
     pub thermal_stretch: f64,
     /// Volume, m³.
     pub volume: f64,
-    /// Edge of a line segment, square or cube with the volume of the point, m.
+    /// Edge of the line segment, square or cube that represents the volume of the point, m.
     pub edge: f64,
     /// Mass, kg.
     pub mass: f64,
@@ -249,9 +249,9 @@ impl Response {
         }
     }
 
-    /// Contact force on a point for an overlap (m) and a stiffness (N/m). `normal` points from the point
-    /// towards the other point or body. `velocity` (m/s) is the velocity of the point relative to this other
-    /// object. `mass` is the reduced mass, kg.
+    /// Contact force on a point for an overlap (m) and a stiffness (N/m). `normal` is the unit vector from
+    /// the point towards the other point or body. `velocity` (m/s) is the velocity of the point relative to
+    /// this other object. `mass` is the reduced mass, kg.
     pub fn touch<const D: usize>(
         &self,
         stiffness: f64,

@@ -171,7 +171,8 @@ impl RigidBody {
         })
     }
 
-    /// Advance to a time (s) by a step (s). A free body first gets the first half kick of the step.
+    /// Advance the body by a step of length `step` (s), which ends at `time` (s). A free body first gets
+    /// the first half kick of the step.
     pub fn drift(&mut self, time: f64, step: f64) {
         match &self.problem.motion {
             RigidMotion::Driven(displacement) => {
@@ -196,7 +197,8 @@ impl RigidBody {
         }
     }
 
-    /// Move a driven body to its position at a time (s), and set its velocity to 0, for the next load step.
+    /// Prepare the next load step: move a driven body to its position at a time (s), and set its velocity
+    /// to 0.
     pub fn place(&mut self, time: f64) {
         if let RigidMotion::Driven(displacement) = &self.problem.motion {
             let moved = Self::values(displacement, time);
@@ -219,9 +221,9 @@ impl RigidBody {
         }
     }
 
-    /// Finish a step (s) that ends at a time (s): store the forces that the points exert, record the work of
-    /// these forces and of the prescribed force, and apply the second half kick. `sums` are the values of
-    /// [`WrenchSums::flat`] over all ranks.
+    /// Finish a step of length `step` (s) that ends at `time` (s). Store the forces that the points exert.
+    /// Record the work of these forces and of the prescribed force, and apply the second half kick. `sums`
+    /// are the values of [`WrenchSums::flat`] over all ranks.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
@@ -279,7 +281,7 @@ impl RigidBody {
         (distance * expansion - apart, normal)
     }
 
-    /// Distance (m) of a position from the surface at the start of the run; negative inside.
+    /// Distance (m) of a position from the initial surface of the body; negative inside.
     pub fn start_distance(&self, position: [f64; 3]) -> f64 {
         let seen = Vector3::from(position) - Vector3::from(self.start);
         distance(&self.problem.shape, seen, self.dimension.count()).0

@@ -18,8 +18,8 @@ use super::{CHUNK, Contact};
 const SKIN: f64 = 0.4;
 
 /// Largest gap of a pair that the look-ahead considers, as a fraction of the largest contact distance. The
-/// last search has found all such pairs, so the limits of the step do not depend on when the last search was
-/// made.
+/// last search has found all pairs with gaps up to this limit. Therefore the step limits of contact do not
+/// depend on when the last search was made.
 pub(super) const MOST_GAP: f64 = 0.1;
 
 /// Distance that a point may move between searches, as a fraction of the largest contact distance. Half of

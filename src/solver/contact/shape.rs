@@ -44,7 +44,8 @@ pub(super) fn distance(
     }
 }
 
-/// Distance and normal from the signed distances (m) to mutually perpendicular faces.
+/// Compute the results of [`distance`] for mutually perpendicular faces. `beyond` are the signed distances
+/// (m) of the position from these faces, and `normals` are the outward normals of the faces.
 fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     let faces = beyond.iter().zip(normals);
     let outer: Vector3<f64> = faces
@@ -61,7 +62,7 @@ fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     (*beyond, *normal)
 }
 
-/// Unit vector along a vector of this length; the x axis if the length is 0.
+/// Unit vector along `vector`, whose length is `length`; the x axis if the length is 0.
 fn direction(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     if length > 0.0 {
         vector / length

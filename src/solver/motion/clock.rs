@@ -1,7 +1,7 @@
 //! The clock of a run: time, time step and number of steps.
 
-/// Time, time step and number of steps. The time step may change. The time since the last change is a
-/// multiple of the time step, so round-off does not accumulate.
+/// Time, time step and number of steps. The time step may change. The time that has passed since
+/// the last change is computed as a multiple of the time step, so round-off does not accumulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
     /// Time (s) and number of completed steps at the last change of the time step.

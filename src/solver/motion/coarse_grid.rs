@@ -29,8 +29,8 @@ const EDGE: f64 = 1.0;
 /// Factor by which edges grow until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Maximum number of multiply-adds to solve with the factored matrix, per point: about as many as a force
-/// evaluation needs for a point with few bonds.
+/// Maximum number of multiply-adds per point to solve with the factored matrix. A force evaluation needs
+/// about as many multiply-adds for a point with few bonds.
 const SOLUTION: f64 = 16.0;
 
 /// Maximum number of multiply-adds to solve with the factored matrix, if there are so few points that
@@ -332,8 +332,8 @@ impl<const D: usize> CoarseGrid<D> {
 }
 
 impl<const D: usize> CellPosition<D> {
-    /// Interpolation weight of a node of the cell at the position of the point. `corner` is the number of the
-    /// node, as in [`CoarseGrid::corner`].
+    /// Interpolation weight of a node of the cell, evaluated at the position of the point. `corner` is the
+    /// number of the node, as in [`CoarseGrid::corner`].
     fn weight(&self, corner: usize) -> f64 {
         let along = self.along.iter().enumerate();
         along

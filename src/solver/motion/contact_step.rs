@@ -51,9 +51,9 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// Largest length of the next step (s) if contact does not limit this step. This length is the longer one
-    /// of the step of the present stage and the step of the next stage. In an adaptive stage, it is the step
-    /// that the rule requests. The result is at least the present step.
+    /// Largest length of the next step (s) if contact does not limit this step. In an adaptive stage, it is
+    /// the step that the rule requests. In any other stage, it is the longer of two steps: the step of the
+    /// present stage and the step of the next stage. The result is at least the present step.
     pub(in crate::solver) fn longest_next_step(&self) -> f64 {
         let stages = self.stages.steps.iter().skip(self.progress.stage).take(2);
         let of_stages = stages.map(|(step, _)| *step).fold(0.0, f64::max);

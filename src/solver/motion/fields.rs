@@ -31,15 +31,15 @@ pub struct Description {
 pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
     Interpolated,
-    /// A new point gets the mean. A removed point returns its volume times the difference of its value from
+    /// A new point gets the mean. A removed point returns its volume times d, where d is its value minus
     /// the mean of its parents. These rules conserve momentum, and do not change a field that is linear in
     /// space.
     Conserved,
     /// A new point gets the mean. The value of a removed point is averaged with the values of its parents,
     /// weighted by volume, so that no value leaves the previous range.
     Mixed,
-    /// A new point gets a part of the values of its parents, in proportion to volume, so that the sum over
-    /// all points is conserved. A removed point returns all of its value.
+    /// A new point takes a part of the value of each parent, in proportion to the volume that it takes from
+    /// this parent. The sum over all points is therefore conserved. A removed point returns all of its value.
     Shared,
     /// The field is recomputed for a new point; a removed point returns nothing.
     FoundAnew,
@@ -368,7 +368,7 @@ fields! {
         ..ENERGY
     };
     /// Number of a point's bonds that have broken since the last output of a further result; one column per
-    /// further result with this field. No columns without damage.
+    /// further result with this field. There are no columns in runs without damage.
     newly_broken_of_further: Vec<Vec<f64>> = Description {
         name: NEWLY_BROKEN_OF_FURTHER,
         unit: "1",

@@ -140,8 +140,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Find a piece that is loaded along an axis, but that no support holds along this axis. Loads within the
-    /// tolerance of the stage are ignored. Of several pieces, return the one with the smallest point id.
-    /// Collective.
+    /// tolerance of the stage are ignored. If there are several such pieces, return the one that contains the
+    /// point with the smallest id. Collective.
     fn unheld_load(&self, pieces: &Pieces<D>) -> Option<UnheldLoad> {
         let allowed = self.allowed_force();
         let is_suspect = |point: usize, d: usize| {

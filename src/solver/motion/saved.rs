@@ -92,8 +92,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Restore a saved state. Collective.
     ///
     /// # Errors
-    /// If the bonds or fields of the saved state differ from those of this run, or if the amount of data for
-    /// the progress of the run differs. The error is the same on all ranks.
+    /// If the bonds or fields of the saved state differ from those of this run, or if [`Saved::progress`]
+    /// does not have the expected length. The error is the same on all ranks.
     pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
         let names = self.saved_names();
         let lengths = self.forces.saved_lengths(self.model.owned());

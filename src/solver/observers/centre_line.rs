@@ -24,7 +24,7 @@ const TOLERANCE: f64 = 1e-9;
 pub struct Damaged {
     /// Position, m.
     pub place: [f64; 3],
-    /// Weight of the point in the centroid of the points of its part.
+    /// Weight of the point in the centroid of its part.
     pub weight: f64,
 }
 
@@ -82,7 +82,8 @@ struct ShortestPaths {
 }
 
 /// A candidate for the next reached point. [`BinaryHeap`] pops the greatest candidate first, so a candidate
-/// with a shorter path is greater. Among equal paths, a candidate with a lower index is greater.
+/// with a shorter path is greater. If two paths are equally long, the candidate with the lower index is
+/// greater.
 #[derive(PartialEq)]
 struct Next {
     length: f64,
@@ -105,7 +106,8 @@ impl PartialOrd for Next {
 }
 
 impl ShortestPaths {
-    /// Find the paths by Dijkstra's method, from all points within a section length of the start.
+    /// Find the paths by Dijkstra's method. Paths begin at all points within one section length of the start
+    /// of the crack.
     fn new(from: [f64; 3], places: &[[f64; 3]], bins: &Bins, reach: Reach) -> Self {
         let mut paths = Self {
             length: vec![f64::INFINITY; places.len()],

@@ -58,7 +58,7 @@ pub struct CrackSurface {
 /// Surface of a crack at one time; the same on all ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    /// Area of the crack, m², with one face counted.
+    /// Area of the crack, m²; only one of the two faces counts.
     pub area: f64,
     /// Largest distance between the start of the crack and a damaged point of the crack, m; 0 without damaged
     /// points.

@@ -100,8 +100,8 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Energies minus work in the first row, J; see [`Energies::error`].
     pub first_energy: f64,
-    /// Upper estimate of the kinetic energy that loads and prescribed motions add in a step without counted
-    /// work, J. The trapezoidal rule, which integrates the work, misses this energy.
+    /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step, but that is
+    /// not part of the recorded work. The trapezoidal rule, which integrates the work, misses this energy.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,

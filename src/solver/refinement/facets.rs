@@ -9,8 +9,9 @@ use crate::solver::assign::cutoffs;
 /// between facets.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
-/// The facets of all ranks. A facet lies between two adjacent points whose bond is broken, or was broken when
-/// the grid between them was refined.
+/// The facets of all ranks. A facet lies between two adjacent points whose bond is broken. A facet also lies
+/// between two points that were adjacent in a coarser grid, if their bond was broken when the grid between
+/// them was refined.
 pub struct Facets {
     all: Vec<Facet>,
     bins: Bins,

@@ -236,7 +236,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
 /// Task that sums over the bonds of a lane group. Bonds that break are left out.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    /// Points of the grid of the lane group.
+    /// Points of the grid that contains the lane group.
     points: GridPoints<'p, K, D>,
     /// The bits of all bonds, including broken bonds; `None` if the kernel does not read these bits.
     whole: Option<&'t [u8]>,
@@ -273,7 +273,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
     }
 }
 
-/// The kernel of breaking bonds and the points of a grid.
+/// The kernel [`BreakingBonds`], and the points of a grid.
 struct BreakingInVectors<'a, const D: usize> {
     kernel: &'a BreakingBonds,
     points: GridPoints<'a, BreakingBonds, D>,

@@ -94,7 +94,8 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
     sweep_from(bonds, points, 0, results, kernel, source);
 }
 
-/// Same as [`sweep`], with results that are columns over the owned points from `base` on.
+/// Same as [`sweep`], but the first entry of each result column belongs to the point with the local index
+/// `base`.
 pub fn sweep_from<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
