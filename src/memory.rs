@@ -109,8 +109,8 @@ fn entry(text: &str, name: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Slurm sets the limit on the control group of a job or step. The control group of the process lies
-    /// below this group.
+    /// Slurm sets the memory limit on the control group of a job or step. The control group of the process
+    /// lies below this group.
     #[test]
     fn limits_of_parent_groups_count() {
         let root = std::env::temp_dir().join(format!("control_groups_{}", std::process::id()));

@@ -113,8 +113,8 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 }
 
 /// Minimum memory traffic of the phase `motion` in 3-D, bytes per point and step. Displacement, velocity and
-/// force density are read and written. The index of the point's block is read. Displacement is written once
-/// more for the bond loops.
+/// force density are read and written. The index of the point's block is read. A copy of the displacement is
+/// written for the bond loops.
 const MOTION_BYTES: u64 = 170;
 /// Estimated minimum memory traffic of a 3-D pass over the bonds, bytes per point. The stored bonds are not
 /// included. Reference position, displacement and volume are read, and the sums of the pass are read

@@ -64,7 +64,8 @@ pub struct Figures {
     /// Phases of the time loop; the last entry is the total.
     pub phases: Vec<Phase>,
     /// Memory: name and size (bytes, sum over the ranks) of each entry. One entry is the memory of the stored
-    /// bonds. The other entries are the memory of the processes at several times. The last entry is the peak.
+    /// bonds. The other entries are the memory of the processes at several times. The last entry is the peak
+    /// memory of the processes.
     pub memory: Vec<(&'static str, f64)>,
     /// Bytes that all ranks send per step in halo exchanges.
     pub halo_bytes: f64,

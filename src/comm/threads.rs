@@ -4,8 +4,8 @@ use std::sync::{Arc, Barrier, Mutex};
 
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 
-/// The state that the ranks share: a barrier, and a buffer for one message from each rank to each rank. In an
-/// all-gather, each rank writes its data to the buffer for messages from itself to itself.
+/// The state that the ranks share: a barrier, and one message buffer for each pair of sender and receiver. In
+/// an all-gather, each rank writes its data to the buffer for messages from itself to itself.
 struct Shared {
     barrier: Barrier,
     slots: Vec<Mutex<Vec<u8>>>,

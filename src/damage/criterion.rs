@@ -413,8 +413,8 @@ impl Criterion {
 
 impl WorkRule {
     /// Combine the rules of two blocks for the bonds between them. Compressed bonds break only if both rules
-    /// allow it. The smaller family correction is used. The work is objective if at least one rule requires
-    /// objective work.
+    /// allow it. The combined rule has the smaller of the two factors [`Self::family_correction`]. The work
+    /// is objective if at least one rule requires objective work.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             breakable: self.breakable.of_both(other.breakable),

@@ -81,8 +81,9 @@ impl CriticalStretch {
     /// Return the critical stretch of bonds between two bodies whose interface opens at a normal stress σ
     /// (Pa).
     ///
-    /// The result is the mean of the strains σ/E′ of both bodies in tension along the normal. At the stress
-    /// σ, a bond along the normal has this stretch if half of the bond lies in each body.
+    /// Under the tension σ along the normal, a body has the strain σ/E′. The result is the mean of the
+    /// strains of the two bodies. At this tension, a bond along the normal has this stretch if half of the
+    /// bond lies in each body.
     ///
     /// E′ is:
     ///

@@ -64,7 +64,7 @@ pub fn contact(
             other_model.filter(|model| inherits && *model.get_ref() != ContactName::None)
         {
             let message = format!(
-                "{key} model: differs from that of [contact], whose `stiffness` means something else; give the pair its own `stiffness`"
+                "{key} model: differs from the `model` of [contact], so the `stiffness` of [contact] has another meaning; give the pair its own `stiffness`"
             );
             return Err(scope.error(model.span(), message));
         }

@@ -190,8 +190,8 @@ impl<'a> Directed<'a> {
             let limits =
                 [(100.0 * least).ceil(), (100.0 * most).floor()].map(|limit| limit / 100.0);
             let message = format!(
-                "{key} fracture_energy_across: must be {} to {} times `fracture_energy_along`, is {} times; beyond this, \
-                 bonds in the weak direction would break far from cracks",
+                "{key} fracture_energy_across: must be {} to {} times `fracture_energy_along`, is {} times; \
+                 outside this range, bonds in the weak direction would break far from cracks",
                 format_number(limits[0]),
                 format_number(limits[1]),
                 format_number((1e4 * ratio).round() / 1e4)

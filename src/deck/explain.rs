@@ -209,10 +209,10 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// Return the depth of a traction or pressure, m; `None` for a condition without a depth. The depth may be
-/// the spacing of each body. In this case, return the common [single spacing](Body::single_spacing) of all
-/// bodies that may have points in the set of the condition. Return `None` if one of these bodies has no
-/// single spacing, or if their spacings differ.
+/// Return the depth of a traction or pressure, m; `None` for a condition without a depth. If the deck gives
+/// no depth, the depth at a point is the spacing of the point's body. In this case, return the common
+/// [single spacing](Body::single_spacing) of all bodies that may have points in the set of the condition.
+/// Return `None` if one of these bodies has no single spacing, or if their spacings differ.
 fn depth(problem: &Problem, condition: &Condition) -> Option<Number> {
     condition.depth?;
     let bodies = problem.sets[condition.set].possible_bodies(&problem.bodies);

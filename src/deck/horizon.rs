@@ -15,10 +15,9 @@ use crate::points::mean_spacing::mean_spacings;
 const SPACING: &str = "spacing";
 
 /// Evaluate the horizons whose expressions contain the mean spacing. The `horizon` of a body is evaluated
-/// with the mean spacing of the body's points.
-/// The `horizon` of the grid is evaluated for each body without its own
-/// horizon. Each result becomes the horizon of its body. The largest result becomes the horizon of the grid.
-/// Meshes and point files are read if horizons depend on their points.
+/// with the mean spacing of the body's points. The `horizon` of the grid is evaluated for each body without
+/// its own horizon. Each result becomes the horizon of its body. The largest result becomes the horizon of
+/// the grid. Meshes and point files are read if horizons depend on their points.
 ///
 /// Return a copy of the deck with these horizons; `None` if no expression of a horizon contains the mean
 /// spacing. If the deck has a parameter or table with the name `spacing`, this name does not mean the mean
@@ -51,8 +50,8 @@ pub fn resolve(scope: &mut Scope, deck: &Deck, comm: &dyn Communicator) -> Resul
     };
     let sources = bodies::point_sources(scope, deck, spacing)?;
     if of_grid && bodies().all(|body| body.horizon.is_some()) {
-        let message = "[grid] horizon: `spacing` is the mean spacing of bodies without their own `horizon`, but all bodies \
-                       have one; give a length";
+        let message = "[grid] horizon: `spacing` is the mean spacing of bodies without their own `horizon`, but each body \
+                       has its own `horizon`; give a length without `spacing`";
         return Err(scope.error(in_grid.span(), message));
     }
     let sources = bodies::of_sources(deck, &sources);

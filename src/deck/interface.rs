@@ -25,7 +25,8 @@ const MAX_STIFFNESS_RATIO: f64 = 10.0;
 /// - If a pair is invalid or repeated.
 /// - If the material laws of a pair do not allow its rule or strength.
 ///
-/// The solver checks whether the material laws allow the damage law of a pair.
+/// This function does not check whether the material laws allow the damage law of a pair; the solver checks
+/// this.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -171,7 +172,7 @@ impl PairContext<'_> {
             }
             if declaration.critical_stretch.is_none() {
                 return error(format!(
-                    "bonds of `{}` break by work, so a strength does not define them; give `damage`",
+                    "bonds of `{}` break by work, so `strength` does not define when they break; give `damage`",
                     declaration.name
                 ));
             }
@@ -188,8 +189,8 @@ impl PairContext<'_> {
         let ratio = (a / b).max(b / a);
         if ratio > MAX_STIFFNESS_RATIO {
             return error(format!(
-                "is for bodies whose stiffnesses differ by a factor of {MAX_STIFFNESS_RATIO} at most, and these stiffnesses differ by a \
-                 factor of {}; give `damage` with a `critical_stretch`",
+                "is for bodies whose stiffnesses differ by a factor of at most {MAX_STIFFNESS_RATIO}, but the stiffnesses of these bodies \
+                 differ by a factor of {}; give `damage` with a `critical_stretch`",
                 format_number((10.0 * ratio).round() / 10.0)
             ));
         }

@@ -220,7 +220,7 @@ impl Section<'_> {
             };
             return Err(error(format!(
                 "Poisson's ratio is {:.4}, but a bond-based law in {} always has {:.4}; remove the \
-                 second constant to accept this value{other}",
+                 second constant to accept the ratio of the bond-based law{other}",
                 found.poisson_ratio,
                 dimension.name(),
                 own,

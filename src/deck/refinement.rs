@@ -38,7 +38,8 @@ pub fn refinement(
     }
     let lattice = |body: &&problem::Body| matches!(body.points, PointSource::Lattice { .. });
     let Some(first) = bodies.iter().find(lattice) else {
-        let message = "[refinement]: only bodies given as shapes are refined, and there is none";
+        let message =
+            "[refinement]: only bodies given as shapes are refined, but the deck has no such body";
         return Err(scope.error(table.span(), message));
     };
     let levels = *refinement.levels.get_ref();
@@ -113,7 +114,7 @@ fn trigger(
             let diagonal = edges.map(|edge| edge * edge).sum::<f64>().sqrt();
             if body.horizon < diagonal {
                 let message = format!(
-                    "{key}: the horizon of [body.{}] must reach across a cell's diagonal, {} m",
+                    "{key}: the horizon of [body.{}] must be at least the diagonal of a cell, {} m",
                     body.name,
                     format_number(diagonal)
                 );

@@ -76,8 +76,8 @@ pub struct Grid {
     /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
     /// Two entries: one for the owned points, one for the ghosts. An entry contains the runs, sorted by slot,
-    /// and the index of the first run of each chunk of [`CHUNK`] slots. The number of runs follows the last
-    /// index.
+    /// and the index of the first run of each chunk of [`CHUNK`] slots. The list of these indices ends with
+    /// the number of runs.
     runs: [(Vec<Run>, Vec<u32>); 2],
     /// The runs of the owned points, sorted by local index.
     by_point: Vec<Run>,

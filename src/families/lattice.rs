@@ -242,7 +242,8 @@ impl BondLattice {
     }
 
     /// Call `visit(group, lane, [i, j])` as [`Self::for_each`] does, for each set bit of `bits`. `bits` has
-    /// one byte per offset, with one bit per bond of the lane group with index `vector`.
+    /// one byte per offset. Bit k of a byte stands for the bond in lane k of the lane group with index
+    /// `vector`.
     fn for_each_of(
         &self,
         bits: impl Iterator<Item = u8>,

@@ -27,8 +27,11 @@ pub enum Region {
 /// returns a region by its name.
 ///
 /// # Errors
-/// If the style or a region of a union is unknown, an argument is missing or not a number, the region is
-/// everything outside of a surface (`side out`), or the region moves.
+/// - If the style is unknown.
+/// - If a region of a union is unknown.
+/// - If an argument is missing or invalid.
+/// - If the region is everything outside of a surface (`side out`).
+/// - If the region moves.
 pub fn region(
     variables: &Variables,
     arguments: &[&str],

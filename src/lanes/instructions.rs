@@ -22,7 +22,7 @@ pub enum Instructions {
     Avx512(Avx512),
 }
 
-/// Environment variable with the name of the largest set that may be used, for tests.
+/// Environment variable for tests. Its value is the name of the largest instruction set that may be used.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
 /// Names of the instruction sets that the program was built for, from the smallest to the largest.

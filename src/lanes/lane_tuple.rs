@@ -31,8 +31,8 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Select the first [`Self::COUNT`] columns, to read.
     ///
     /// # Panics
-    /// If there are fewer columns, unless [`Self::PADDED`]. For a pair of tuples, also if there are fewer
-    /// columns than the first tuple has quantities.
+    /// If there are fewer than [`Self::COUNT`] columns and [`Self::PADDED`] is false. For a pair of tuples,
+    /// also if there are fewer columns than the first tuple has quantities.
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
     /// Select the first [`Self::COUNT`] columns, for adding values.

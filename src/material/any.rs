@@ -82,7 +82,7 @@ pub type AnyPoint = UpTo<{ MOST.point }>;
 /// The bond history of one end of a bond, with room for any law.
 pub type AnyHistory = UpTo<{ MOST.bond_history }>;
 
-/// Return the first entries of a longer tuple.
+/// Return the first `B::COUNT` entries of a longer tuple.
 #[inline(always)]
 fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))

@@ -77,8 +77,9 @@ pub enum Weights {
 }
 
 impl Weights {
-    /// Return two masks, for points i and j: one bit per bond within the horizon of the point. Broken bonds
-    /// are included. The force state of point i or j acts only on the bonds in the mask of this point.
+    /// Return two masks, for points i and j. In the mask of a point, the bits of the bonds within the horizon
+    /// of this point are set. Broken bonds are included. The force state of point i or j acts only on the
+    /// bonds in the mask of this point.
     #[inline(always)]
     pub fn acting(self) -> [u8; 2] {
         match self {

@@ -27,8 +27,8 @@ pub fn multiplicity(exponents: [usize; 3]) -> f64 {
     (all / exponents.map(factorial).iter().product::<usize>()) as f64
 }
 
-/// Write to `sums` the monomials of a degree in the components of `base`, multiplied by `factor`. Monomials
-/// with a component beyond the `D` components of `base` are not written.
+/// Compute the monomials of a degree in the components of `base`. Write each monomial, multiplied by
+/// `factor`, to `sums`. Monomials with a component beyond the `D` components of `base` are not written.
 #[inline(always)]
 pub fn write_monomials<const D: usize>(
     degree: usize,

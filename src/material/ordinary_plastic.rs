@@ -121,7 +121,7 @@ fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     let is_corrected = values.word(SURFACE_CORRECTION.name) != "none";
     (is_corrected && values.word(CALIBRATION.name) != "family").then(|| LawFault {
         key: Some(CALIBRATION.name),
-        message: "with a `surface_correction`, the yield limit is always that of each point's own family; \
+        message: "with a `surface_correction`, the yield limit is always computed for each point's own family; \
                   use \"family\""
             .to_owned(),
     })

@@ -284,7 +284,7 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
 /// Return the number (from 1), id and name of each block or set. Ids and names are in variables whose names
 /// start with `prefix`, such as `eb`. If the file has no ids, there is one block or set for each of the
 /// variables `VARIABLE1`, `VARIABLE2`, …. The id of each block or set is then its number. A missing name
-/// becomes `DEFAULT_ID`, such as `block_3`.
+/// is replaced by `default`, an underscore and the id, such as `block_3`.
 fn entities(
     file: &Netcdf,
     prefix: &str,

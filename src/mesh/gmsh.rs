@@ -677,8 +677,9 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Read a `size_t`. The number may be a count that is too large. In this case, reading the entries fails
-    /// at the end of the file, because every entry takes bytes.
+    /// Read a `size_t`. If the number is a count of entries, it may be larger than the number of entries in
+    /// the file. In this case, reading the entries fails at the end of the file, because every entry takes
+    /// bytes.
     fn size(&mut self) -> Result<u64> {
         match self.encoding {
             Encoding::Text => {

@@ -8,7 +8,7 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// Create the set of some numbers, in any order.
+    /// Create a set from numbers in any order.
     pub fn new(mut numbers: Vec<u64>) -> Self {
         numbers.sort_unstable();
         let mut runs = Self::default();

@@ -397,9 +397,9 @@ impl OutputPair<'_> {
 }
 
 /// Match two lists of ids, one list of each result. Both lists must ascend, or the lists must be equal.
-/// `is_last` is true for a list that ends with the last ids of its result. At the end of such a list, the
-/// remaining ids of the other list have no partner and count as used. Return the pairs of indices of equal
-/// ids, and the number of used ids of each list.
+/// `is_last` is true for a list that ends with the last ids of its result. When the matching reaches the end
+/// of such a list, the remaining ids of the other list have no partner and count as used. Return the pairs of
+/// indices of equal ids, and the number of used ids of each list.
 fn match_in_order(ids: &[Vec<u64>; 2], is_last: [bool; 2]) -> (Vec<[usize; 2]>, [usize; 2]) {
     let (mut pairs, mut used) = (Vec::new(), [0; 2]);
     loop {

@@ -3,7 +3,8 @@
 use super::projection::{Camera, Projection};
 use super::scene::Axis;
 
-/// The arrangement of a picture. Positions are pixels, to the right and down from the upper left corner.
+/// The arrangement of a picture. Positions are in pixels, measured to the right and down from the upper left
+/// corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Width of the whole picture.

@@ -25,8 +25,8 @@ impl Colouring {
         self.map.colour(self.fraction(value))
     }
 
-    /// Return the position of a value on the scale: 0 at the low end, 1 at the high end, and numbers
-    /// outside of 0 to 1 beyond the ends. Return NaN if the value has no position.
+    /// Return the position of a value on the scale: 0 at the low end, 1 at the high end, and below 0 or above
+    /// 1 beyond the ends. Return NaN if the value has no position.
     pub fn fraction(&self, value: f64) -> f64 {
         let (low, high) = self.range;
         if !self.is_logarithmic {

@@ -131,7 +131,7 @@ fn read_part(
     })
 }
 
-/// Parse the point of a row. The id of the result is 0.
+/// Parse the point of a row. The returned point has the id 0.
 fn point(
     columns: &Columns,
     users: &[(usize, Option<u32>)],

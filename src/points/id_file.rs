@@ -44,7 +44,7 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
                     _ => String::new(),
                 };
                 format!(
-                    "{name}:{line}: must contain numbers of points, {first} or more, has {}{hint}",
+                    "{name}:{line}: must contain point numbers, {first} or larger, has {}{hint}",
                     excerpt(entry)
                 )
             })?;

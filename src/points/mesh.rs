@@ -419,7 +419,7 @@ fn solid(
 ) -> Result<(f64, [f64; 3])> {
     let measure = mesh::measure(mesh.elements.kind(element), nodes);
     if measure.is_folded() {
-        let message = "det J changes sign; the nodes must follow the order of the format, and no part of the \
+        let message = "det J changes sign; the nodes must be in the order that the format prescribes, and no part of the \
                        element may be inverted";
         return Err(mesh.elements.fault(element, message));
     }
@@ -454,7 +454,7 @@ fn lies_in_plane(
     match (dimension..3).find(|k| distance(*k) > PLANE_SLACK * size) {
         None => Ok(()),
         Some(k) => Err(format!(
-            "its nodes must have the same {axis} as all others of the mesh, {:e}; a {dimension}-D problem has {} only",
+            "its nodes must have the same {axis} as all other nodes of the mesh, {:e}; a {dimension}-D problem has {} only",
             first[k],
             ["x", "x and y"][dimension - 1],
             axis = ["x", "y", "z"][k],

@@ -182,8 +182,8 @@ mod tests {
             == 1
     }
 
-    /// Assert that the test with the index agrees with the test of all edges, on a half-unit grid. The
-    /// positions include vertices and positions on edges.
+    /// Assert that [`Polygon::contains`], which uses the index of the edges, agrees with [`by_all_edges`].
+    /// The tested positions form a half-unit grid. They include vertices and positions on edges.
     #[track_caller]
     fn assert_same(vertices: &[[f64; 2]], tolerance: f64) {
         let polygon = Polygon::new(vertices.to_vec());

@@ -134,7 +134,7 @@ impl Law {
         let scales = !is_given && (self.declaration.scales_thresholds)(&self.values);
         if damage.weibull.is_some() && scales {
             return Some(format!(
-                "`weibull_modulus` is not available for `{}`, which scales the critical stretch of each bond itself",
+                "`weibull_modulus` is not available for `{}`, which already scales the critical stretch of each bond",
                 self.declaration.name
             ));
         }

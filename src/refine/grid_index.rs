@@ -32,8 +32,8 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
 }
 
 /// Return the grid index with the number `number` in a level-0 cell. The grid indices of `level` in this cell
-/// are numbered from 0, with x fastest. Number 0 is `origin`, the index of the centre of the level-0 cell.
-/// All indices are in spacings of the level.
+/// are numbered from 0, and x varies fastest. Number 0 is `origin`, the index of the centre of the level-0
+/// cell. All indices are in spacings of the level.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)

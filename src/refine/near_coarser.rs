@@ -15,8 +15,8 @@ pub struct NearCoarser<'a> {
     /// contain indices of this grid.
     coarsest: u64,
     /// For each bit of a word, the words that contain indices near the index of the bit. An index is near if
-    /// it lies within the given distance. Each entry has the offset to such a word, and the bits of the near
-    /// indices in this word.
+    /// it lies within the given distance. Each of these words is given by two values: the offset to this
+    /// word, and the bits of the near indices in this word.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
@@ -66,8 +66,8 @@ impl<'a> NearCoarser<'a> {
         }
     }
 
-    /// Test whether a coarser node lies within the distance of the node at `index`. The result is true if, at
-    /// an index within the distance, a node of the level is possible but does not exist.
+    /// Test whether a coarser node lies within the given distance from the node at `index`. The result is
+    /// true if, at an index within this distance, a node of the level is possible but does not exist.
     ///
     /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {

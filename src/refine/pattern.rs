@@ -95,7 +95,7 @@ impl Pattern {
 
     /// The finest level at which the node at `index` is refined, and the index of the node in spacings of
     /// this level. `index` is in spacings of the finest level of the pattern ([`Self::finest`]). `None` if
-    /// the node is permanent or not refined.
+    /// the node is not refined at any level, or if it is permanent at this level.
     pub fn refined_at(&self, index: GridIndex) -> Option<(u32, GridIndex)> {
         let finest = self.finest();
         let (coarsest, _) = canonical(finest, index);

@@ -223,8 +223,8 @@ impl EnergyWatch {
             )
         } else {
             let lost = format!("{size:.3e} J, {percent:.0} % of the largest energy");
-            let causes = "possible causes are loads that act in full in the first load step or end at once, bodies that are \
-                          stopped, unstable cracks, snap-through and pieces that turn";
+            let causes = "possible causes are loads that act in full in the first load step, loads that end abruptly, \
+                          bodies that are stopped, unstable cracks, snap-through, and pieces that turn";
             match steps {
                 StepKinds::Time => format!(
                     "the time steps have lost {lost}; repeat with half the time step and compare"

@@ -173,7 +173,8 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// Find the rows of this rank's range of ids whose points are in the result; `None` for all rows. Collective.
+/// Find the rows of the output's points. The rows are counted within this rank's range of ids. `None` if the
+/// output contains all points. Collective.
 ///
 /// # Errors
 /// If the set of the output is empty.

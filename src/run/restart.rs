@@ -14,7 +14,7 @@ use super::files::Files;
 use super::observer::{Message, Observer};
 use super::restart_compatibility;
 
-/// Result of a restart, in addition to the restored simulation.
+/// Data that a restart returns in addition to the restored simulation.
 pub struct Restart {
     /// Writer of the next checkpoints.
     pub checkpoints: CheckpointWriter,

@@ -15,10 +15,10 @@ use super::files::Files;
 /// Largest number of bytes that are read to find the heading of a history file.
 const LONGEST_HEADING: u64 = 1 << 20;
 
-/// Find the further results, with their side-cars, and the tables of cracks that a run of this problem does
-/// not replace. Files that have names like these, but were not written by an earlier run, are omitted. The
-/// names of the earlier cracks are read from the history file. Therefore the function must be called before
-/// the run replaces this file. Only rank 0 calls the function.
+/// Find the files of earlier runs that a run of this problem does not replace: further results with their
+/// side-cars, and tables of cracks. A file with the name of a further result or of a table of a crack is
+/// omitted if no earlier run wrote it. The names of the earlier cracks are read from the history file.
+/// Therefore the function must be called before the run replaces this file. Only rank 0 calls the function.
 ///
 /// # Errors
 /// If the folder cannot be read.

@@ -117,8 +117,8 @@ impl<'a> Job<'a> {
             return;
         }
         let text = format!(
-            "bonds broke up to one step late: their energy above the criterion, {overshoot:.3e} J, exceeds half of the \
-             fracture energy, {fracture:.3e} J; repeat with half the time step and compare",
+            "bonds broke up to one step late: their energy above the criterion is {overshoot:.3e} J, more than half of \
+             the fracture energy of {fracture:.3e} J; repeat with half the time step and compare",
         );
         self.observer.message(&Message::Warning(text));
     }

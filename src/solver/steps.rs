@@ -121,8 +121,8 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     let repeats = (libm::log(smallest / largest) / libm::log(rule.reduce)).ceil();
     if repeats > MOST_REPEATS {
         return error(format!(
-            "[time] adaptive reduce: with {}, a step of {largest:.3e} s may be repeated {repeats:.0} times before its size \
-             is `smallest`, {smallest:.3e} s; at most {MOST_REPEATS} repeats are allowed; use a smaller `reduce` or a larger \
+            "[time] adaptive reduce: with {}, a step of {largest:.3e} s may need {repeats:.0} repeats to reach the size \
+             `smallest`, {smallest:.3e} s; at most {MOST_REPEATS} repeats are allowed; use a smaller `reduce` or a larger \
              `smallest`",
             format_number(rule.reduce),
         ));
@@ -163,8 +163,8 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
         return Ok(());
     }
     let message = format!(
-        "[time] {key}: must be at most {SIGN_CHANGES}/damping = {:.3e} s, is {} s; with the largest `damping`, {} 1/s, \
-         velocities would change their sign in each longer step",
+        "[time] {key}: must be at most {SIGN_CHANGES}/damping = {:.3e} s, is {} s; with a longer step, \
+         the largest `damping`, {} 1/s, would reverse the velocities in each step",
         SIGN_CHANGES / rate,
         format_number(step),
         format_number(rate),

@@ -146,7 +146,7 @@ fn bonded_with_contact(
         }
         let message = format!(
             "[interface] rule: {bonds} bonds join [body.{}] and [body.{}], which also have contact; for contact alone, set \
-             `rule = \"none\"`, or give the pair an [interface.pair.NAME]",
+             `rule = \"none\"`; for bonds and contact, give the pair an [interface.pair.NAME]",
             first.name, second.name
         );
         warnings.push(Warning::new(message).at(&second.span));
@@ -229,7 +229,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
         if let Some(safety) = unstable {
             let largest = (100.0 / slower).floor() / 100.0;
             warn(format!(
-                "; bonds of this stretch need `safety = {largest:.2}` or less, but `safety` is {safety}"
+                "; at this stretch, the step is stable only with `safety = {largest:.2}` or less, but `safety` is {safety}"
             ));
         }
     }
@@ -307,8 +307,9 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
         let points = total(simulation.comm, found as u64);
         if points > D as u64 {
             let message = format!(
-                "[crack.{}]: passes through {points} points; they count as points on one side, so the actual cut lies \
-                 beside them; move the crack or the grid by half a spacing, or choose another spacing",
+                "[crack.{}]: passes through {points} points; all of them count as points on the same side of the \
+                 crack, so the actual cut lies beside them; \
+                 move the crack or the grid by half a spacing, or choose another spacing",
                 crack.name
             );
             warnings.push(Warning::new(message).at(&crack.span));

@@ -234,7 +234,7 @@ fn numbers_that_no_solid_has() {
     assert_eq!(warnings(&timid), [expected]);
     assert!(warnings(&brittle(0.5)).is_empty());
     let bold = brittle(0.5).replace("time.end = 1", "time = { end = 1, safety = 0.95 }");
-    let expected = "[body.plate] damage: its bonds break at a stretch of 0.500; bonds of this stretch need `safety = 0.86` or less, but `safety` is 0.95";
+    let expected = "[body.plate] damage: its bonds break at a stretch of 0.500; at this stretch, the step is stable only with `safety = 0.86` or less, but `safety` is 0.95";
     assert_eq!(warnings(&bold), [expected]);
     let wide = plate("").replace("horizon = 3", "horizon = 9");
     let wide = wide.replace("time.end = 1", "time.end = 10");

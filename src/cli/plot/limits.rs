@@ -84,9 +84,10 @@ enum Cut {
 }
 
 impl Limits {
-    /// Return the limits of some values for a requested range; `None` without values. For [`Range::Values`],
-    /// the limits are those of all values, because the painter applies the two numbers of this range itself.
-    /// The limits are also those of all values if the values at the two percentiles are equal.
+    /// Return the limits of `values` for the requested `range`; `None` if `values` is empty. For
+    /// [`Range::Values`], the limits are those of all values, because the painter applies the two numbers of
+    /// this range itself. For [`Range::Automatic`] and [`Range::Percentiles`], the limits are also those of
+    /// all values if the values at the low and the high percentile are equal.
     pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);

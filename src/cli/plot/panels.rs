@@ -17,8 +17,8 @@ use crate::cli::{file_error, outln, result_file};
 /// Draw the requested outputs of each result side by side, with the same axes and range of colours.
 ///
 /// # Errors
-/// If a file is not a result, if an argument is wrong, if a result lacks the field, if the results have
-/// different dimensions or quantities, if no point is drawn, or if the picture is too narrow or cannot be
+/// If a file is not a result, an argument is wrong, or a result lacks the field. If the results differ in
+/// their dimension or drawn quantity, or if no point is drawn. If the picture is too narrow or cannot be
 /// written.
 pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity) -> Result<()> {
     if arguments.time == "all" {

@@ -202,9 +202,9 @@ impl Design {
         number(self.value(row, axis))
     }
 
-    /// Return the index of the abscissa, the axis for rates and pictures. This is the axis `name`. Without a
-    /// `name`, it is the first axis with several values that are all numbers; the result is `None` if no axis
-    /// has such values.
+    /// Return the index of the abscissa: the axis over which pictures are drawn and rates of convergence are
+    /// computed. This is the axis `name`. Without a `name`, it is the first axis with several values that are
+    /// all numbers; the result is `None` if no axis has such values.
     ///
     /// # Errors
     /// If the named axis is missing, has one value, or has values that are not numbers.

@@ -39,7 +39,7 @@ pub struct Contact {
     /// to 1. The default is 1 (no damping).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
-    /// Pairs of bodies with their own contact model or constants, by a freely chosen name.
+    /// Pairs of bodies with their own contact model or constants; each pair has a freely chosen name.
     #[serde(default)]
     pub pair: Tables<ContactPair>,
 }

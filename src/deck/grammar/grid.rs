@@ -102,7 +102,7 @@ pub struct Interface {
     /// their distance. The default is `"none"` in a deck with `[contact]`, otherwise `"own"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Pairs of bodies with their own rule or damage law, by a freely chosen name.
+    /// Pairs of bodies with their own rule or damage law; each pair has a freely chosen name.
     #[serde(default)]
     pub pair: Tables<Pair>,
 }

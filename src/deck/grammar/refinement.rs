@@ -31,7 +31,7 @@ pub struct Refinement {
     /// `"average"`, both ends use the mean horizon.
     #[serde(default)]
     pub bonds: LevelBonds,
-    /// Regions that are refined from the start, by a freely chosen name.
+    /// Regions that are refined from the start; each region has a freely chosen name.
     #[serde(default)]
     pub region: Tables<RefinedRegion>,
     /// Criteria of refinement during the run; no refinement during the run if not given.
@@ -60,9 +60,9 @@ pub struct Trigger {
     /// A condition on the reference position and t that every trigger must fulfil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time in s after which refined points are coarsened. During this time, they must lie outside the
-    /// horizons of all triggers and of all points with broken bonds. Each evaluation of the criteria coarsens
-    /// these points by one level. If not given, points are never coarsened.
+    /// Time in s after which refined points are coarsened. A point is coarsened if, for this time, it has
+    /// been outside the horizons of all triggers and of all points with broken bonds. Each evaluation of the
+    /// criteria coarsens these points by one level. If not given, points are never coarsened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }

@@ -148,8 +148,8 @@ impl<const D: usize> Law<D> for BondAssociated {
     type BondHistory = [Lanes; 0];
     /// Diagonal and mixed entries of K (m⁵), and Σ ω Ṽ (m³).
     type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
-    /// Pass 0: K over the intact bonds, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ. Pass 1: Z Σ ω Ṽ (N m), and Σ ω Ṽ of the
-    /// bonds at which the stress does not exist (m³).
+    /// Sums over the intact bonds. Pass 0: K (m⁵), Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ (m³). Pass 1: Z Σ ω Ṽ (N m), and
+    /// Σ ω Ṽ of the bonds at which the stress does not exist (m³).
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;

@@ -74,8 +74,9 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
         key: Some(KIND.name),
         message: format!(
-            "with \"wan2019\", the control would have a negative stiffness, because the tensor C : I of this solid has the \
-             eigenvalue {least:.4e} Pa, and all its eigenvalues must be above 0; take \"dispersion\" or \"silling2017\""
+            "with \"wan2019\", the control of zero-energy modes would have a negative stiffness: the tensor C : I must \
+             have only eigenvalues above 0, but for this solid it has the eigenvalue \
+             {least:.4e} Pa; take \"dispersion\" or \"silling2017\""
         ),
     })
 }

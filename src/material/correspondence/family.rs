@@ -10,8 +10,8 @@ use crate::lanes::{LaneTuple, Lanes};
 /// an isotropic shape tensor with the same trace.
 const SINGULAR: f64 = 1e-2;
 
-/// Limit of the stiffness of a family's intact part, relative to the initial family. If the intact part is
-/// stiffer, the point of the family carries no force.
+/// Largest allowed stiffness of the intact part of a family, divided by the stiffness of the initial family.
+/// If the intact part is stiffer, the point of the family carries no force.
 ///
 /// The stable step is computed for initial families only. In tests without a limit, points of torn plates
 /// moved without bound. A limit of 16 already prevented this.

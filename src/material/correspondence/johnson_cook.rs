@@ -12,8 +12,8 @@
 //! of the step.
 //!
 //! The product of the last two factors of σ is the factor of rate and temperature. This factor is part of the
-//! plastic state. A force evaluation without passage of time uses this stored factor. Therefore a stress that
-//! was returned to the yield surface does not cause flow again.
+//! plastic state. A force evaluation with Δt = 0 uses this stored factor. Therefore a stress that was
+//! returned to the yield surface does not cause flow again.
 //!
 //! Let S_d be the deviatoric stress and q the equivalent stress at the end of the step. The increment of
 //! plastic strain is ΔE_p = x S_d with an unknown x, and Δε̄ = ⅔ x q. q follows from the trial stress and x:

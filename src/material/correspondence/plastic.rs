@@ -124,7 +124,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     if values.word(super::STRESS.name) != "st-venant-kirchhoff" {
         return fault(
             &super::STRESS,
-            "a body that yields has `stress = \"st-venant-kirchhoff\"`",
+            "a body that yields needs `stress = \"st-venant-kirchhoff\"`",
         );
     }
     johnson_cook::fault(values)

@@ -90,7 +90,8 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Return the sum of p_k c over the family.
+    /// Return the sum of p_k c over the family. `polynomial` is p_k, and `sums` are the sums of the monomials
+    /// of degree 4 over this family.
     pub(super) fn of_constant(&self, sums: &[f64], polynomial: &Quadratic) -> f64 {
         self.constant * product(sums, polynomial, &self.one)
     }

@@ -1,7 +1,7 @@
 //! Functions ω and σ that are radii of ellipsoids. The ellipsoid of ω/ω₀ has a semi-axis along each
 //! coordinate axis a. This semi-axis is a ratio of dilatations at a unit strain along a: the dilatation of
-//! the solid, divided by the dilatation of the family with ω₀. The semi-axes of σ/σ₀ are the same ratios of
-//! deviatoric energies.
+//! the solid, divided by the dilatation of the family with ω₀. Semi-axis a of σ/σ₀ is a ratio of deviatoric
+//! energies at the same strain: the energy of the solid, divided by the energy of the family with σ₀.
 
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use super::{Fit, Form};

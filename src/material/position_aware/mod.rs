@@ -328,8 +328,8 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
-    /// Return the neighbours of unit volume on a cubic lattice, within a distance of 3, that fulfil a
-    /// condition.
+    /// Return the reference vectors of the family of a point on a cubic lattice, without the vectors for
+    /// which `kept` is false. The spacing is 1, the horizon is 3, and the volume of each neighbour is 1.
     fn family(kept: impl Fn([i32; 3]) -> bool) -> Vec<Vector3<f64>> {
         let all =
             (-3..=3).flat_map(|x| (-3..=3).flat_map(move |y| (-3..=3).map(move |z| [x, y, z])));

@@ -1,6 +1,6 @@
 //! The function h as the radius of an ellipsoid. The semi-axes are fitted to the energy densities at unit
-//! extension along each axis a. These energy densities are half of the components aaaa of the elastic tensor,
-//! which is 3μ in the solid.
+//! extension along each axis a. These energy densities are half of the components C_aaaa of the elastic
+//! tensor C. In the solid, these components are 3μ.
 
 use nalgebra::SMatrix;
 

@@ -37,8 +37,8 @@ const MONOMIALS: usize = 28;
 
 /// Form of the function h.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Return the tensor of a point that determines ½ h, from the sums of |ξ| Ṽ c/μ times the monomials of
-    /// degree 6 of n.
+    /// Return the tensor that determines ½ h of a point. `sums` are the sums of |ξ| Ṽ c/μ times the monomials
+    /// of degree 6 of n.
     fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D>;
 
     /// Return ½ h of eight bonds.

@@ -70,8 +70,9 @@ enum Breaks {
     Stress(StressMeasure),
 }
 
-/// Quantity that breaks the bonds of a body with this damage. In a bond-based law, the work of a bond follows
-/// from its stretch, so the bond breaks at the equivalent critical stretch.
+/// Return the quantity that this damage law compares with a threshold to break the bonds of a body. In a
+/// bond-based law, the work of a bond follows from its stretch, so the bond breaks at the equivalent critical
+/// stretch.
 fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     match damage.rule {

@@ -99,7 +99,7 @@ fn pair_damage_is_possible(
         let [work, stretch] = if first { [a, b] } else { [b, a] };
         return error(format!(
             "with this damage, bonds break by their work in `{work}`, but by their stretch in `{stretch}`, whose law is \
-             bond-based; use `critical_stretch` damage, or a bond-based law in both bodies or in none"
+             bond-based; use `critical_stretch` damage, two bond-based laws, or two laws that are not bond-based"
         ));
     }
     Ok(())
@@ -145,8 +145,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         return Ok(());
     }
     let message = format!(
-        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: its inelastic strain would depend \
-         on the thermal stress perpendicular to the {}, which the law does not know; use plane stress, \
+        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: the inelastic strain would depend \
+         on the thermal stress perpendicular to the {}, which the law does not compute; use plane stress, \
          uniaxial stress or 3-D, or an elastic law",
         body.name,
         law.declaration.name,

@@ -131,8 +131,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
     }
 
     /// Return an error if a component is not finite at a point of a set. `components` contains an expression
-    /// and a factor for each component. The component is the product of both. `names` are the subjects of
-    /// the messages. Collective.
+    /// and a factor for each component. The component is the product of both. `names` has one entry per
+    /// component, such as "component x is". The message has this entry before the value. Collective.
     fn check_values<'e>(
         &self,
         key: &str,

@@ -435,11 +435,12 @@ impl<const D: usize> Conditions<D> {
         (conditions, sums)
     }
 
-    /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step (s)
-    /// beyond the counted work. The work is integrated by the trapezoidal rule, which misses this energy. A
-    /// load contributes the energy that it adds in one step to points initially at rest. A supported
-    /// component contributes the energy of its velocity. It also contributes the energy that a point
-    /// initially at rest gains from the prescribed acceleration in one step.
+    /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in one step,
+    /// and that the counted work does not contain. `step` is the length of the step, s. The work is
+    /// integrated by the trapezoidal rule, which misses this energy. A load contributes the energy that it
+    /// adds in one step to points initially at rest. A supported component contributes the energy of its
+    /// velocity. It also contributes the energy that a point initially at rest gains from the prescribed
+    /// acceleration in one step.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density on a point jumps
     /// from 0 to f, the energy ½ ρ u̇² jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow

@@ -267,10 +267,10 @@ impl RigidBody {
     }
 
     /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
-    /// The overlap is contact distance minus present distance. The contact distance is half the edge of the
-    /// point's cell, or the distance at the start if this distance is smaller, times 1 + a with the thermal
-    /// stretch a of the point. The overlap is set to 0 if the point is farther from the surface than half the
-    /// edge times 1 + a.
+    /// The overlap is contact distance minus present distance. The contact distance is (1 + a) times the
+    /// smaller of two lengths: half the edge of the point's cell, and the distance of the point from the
+    /// surface at the start. Here a is the thermal stretch of the point. The overlap is set to 0 if the point
+    /// is farther from the surface than (1 + a) times half the edge.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.position());
         let (half, expansion) = (0.5 * point.edge, 1.0 + point.thermal_stretch);

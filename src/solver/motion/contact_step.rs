@@ -51,7 +51,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// Largest length of the next step (s) if contact does not limit this step. In an adaptive stage, it is
+    /// Largest length of the next step (s), without limits from contact. In an adaptive stage, it is
     /// the step that the rule requests. In any other stage, it is the longer of two steps: the step of the
     /// present stage and the step of the next stage. The result is at least the present step.
     pub(in crate::solver) fn longest_next_step(&self) -> f64 {

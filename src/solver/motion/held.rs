@@ -255,7 +255,7 @@ impl<const D: usize> Simulation<'_, D> {
                 condition: self.largest_load(&piece.points, about),
                 description: format!(
                     "loads with a torque of {torque:.3e} N m about {name} act on a piece of body `{body}` that no \
-                     support holds across {name}; it turns until the loads are aligned. {size}"
+                     support holds perpendicular to {name}; the piece turns until the loads are aligned. {size}"
                 ),
             })
         })

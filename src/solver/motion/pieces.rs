@@ -26,8 +26,8 @@ pub(super) struct Piece {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Return a column per component over the local points. An entry is 0 if the point can move and this
-    /// component of its load is not 0, otherwise 1.
+    /// Return one column per component, with one entry per local point. An entry is 0 if the point can move
+    /// and this component of its load is not 0, otherwise 1.
     pub(super) fn unloaded_points(&self) -> [Vec<f64>; D] {
         let mut all = std::array::from_fn(|_| vec![1.0; self.model.volume.len()]);
         // A point that has never had an intact bond does not move in load steps, so its loads are ignored.

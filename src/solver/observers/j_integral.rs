@@ -48,9 +48,9 @@ impl JIntegrals {
     /// Find the points of the boxes. Collective.
     ///
     /// # Errors
-    /// If a box contains no point, or if the bodies end near the box in the direction of growth. In 3-D, also
-    /// if no body lies on the line that approximates the crack front, see [`front_length`]. The error is the
-    /// same on all ranks.
+    /// If a box contains no point. If the crack grows along an axis, but the bodies reach less than one
+    /// horizon beyond the box along this axis. In 3-D, also if no body lies on the line that approximates the
+    /// crack front, see [`front_length`]. The error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let mut directions = Vec::new();
         let mut boxes = Vec::new();
@@ -155,8 +155,8 @@ fn is_in_the_bodies<const D: usize>(
         for (end, beyond) in sides {
             if beyond < margin * (1.0 - ROUND_OFF) {
                 let message = format!(
-                    "{key}: the crack grows along {axis}, so the bodies must reach at least one horizon ({} m) beyond \
-                     the box along {axis}, but beside the box they end at {axis} = {} m",
+                    "{key}: the crack grows along {axis}, so the bodies must extend at least one horizon ({} m) beyond \
+                     the box along {axis}, but near the box they end at {axis} = {} m",
                     format_number(margin),
                     format_number(end),
                     axis = AXES[d],

@@ -116,8 +116,8 @@ fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (range.start < range.end).then_some(range)
 }
 
-/// Return the range of a (m) in which the cell of the point at `position` (m) covers the line
-/// {a · `direction`}. `None` if the distance of the point from the line exceeds the edge of the cell
+/// Return the range of distances a (m) for which the cell of the point at `position` (m) covers the positions
+/// a · `direction` of a line. `None` if the distance of the point from the line exceeds the edge of the cell
 /// (`edges[0]`).
 fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
@@ -167,8 +167,8 @@ pub fn front_length<const D: usize>(
         }
     }
     let message = format!(
-        "[history.j_integral.{}]: no body lies on the line through the centre of the box along `front`; the line must \
-         be near the crack front",
+        "[history.j_integral.{}]: no body lies on the line that runs through the centre of the box in the direction \
+         `front`; this line must be near the crack front",
         rule.name
     );
     Err(Error::input(message).at(&rule.span))

@@ -65,12 +65,14 @@ impl Course {
     /// `value` returns the value of a point, given its local index. The result is `None` if no value exceeds
     /// the threshold. The result is bitwise the same for any number of ranks. Collective.
     ///
-    /// The search starts at the farthest point above the threshold; if several are equally far, at the
-    /// one with the smallest id. The next points are the nearest points along the line that lie ahead of this
-    /// point and within one horizon of it. The values are interpolated linearly between the farthest and the
-    /// next points to find the threshold. If several points are equally far along the
-    /// line, the largest of their values is used. While values grow, the result therefore moves along the
-    /// line without jumps, also when the value of a next point begins to exceed the threshold.
+    /// The search starts at the farthest point whose value exceeds the threshold. If several of these points
+    /// are equally far, the search starts at the point with the smallest id. The next points are the nearest
+    /// points along the line that lie ahead of this point and within one horizon of it. Between the farthest
+    /// point and the next points, the values are interpolated linearly. The result is the position at which
+    /// the interpolated value equals the threshold. Without next points, it is the position of the farthest
+    /// point. If several points are equally far along the line, the largest of their values is used. While
+    /// values grow, the result therefore moves along the line without jumps, also when the value of a next
+    /// point begins to exceed the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -97,9 +97,9 @@ impl Tip {
 /// The length of a crack over time, from which its speed is computed.
 ///
 /// The speed is the mean over an interval of rows that ends at the present row. The interval begins at the
-/// latest row in which the crack was at least one horizon shorter. If there is no such row, let l₀ be the
-/// length of the crack in the first row with a tip. The interval then begins at the latest row in which the
-/// length of the crack was at most l₀.
+/// latest row in which the crack was at least one horizon shorter than in the present row. If there is no
+/// such row, let l₀ be the length of the crack in the first row with a tip. The interval then begins at the
+/// latest row in which the length of the crack was at most l₀.
 ///
 /// In an interval with less growth than one horizon, the speed would show the jumps of the tip from point to
 /// point of the lattice. In an interval with a fixed number of rows, the speed would depend on the time
