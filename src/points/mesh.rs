@@ -309,9 +309,10 @@ fn bodies_of_elements(
 /// volume. Return the name of the part; `None` if there is no such part. `rest` is the index of the body that
 /// selects no block.
 ///
-/// If all elements that belong to no other body are such elements, the part is the whole rest of the mesh. In
-/// files of Exodus, the part may also be a block of spheres that no other body selects. In other files,
-/// single-node elements may define sets, so the part can only be the whole rest of the mesh.
+/// The rest of the mesh consists of the elements that belong to no other body. If it has only single-node
+/// elements, the part is the whole rest of the mesh. In files of Exodus, the part may also be a block of
+/// spheres that no other body selects. In other files, single-node elements may define sets, so the part can
+/// only be the whole rest of the mesh.
 fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {
     let is_left = |element: usize| bodies[element] == NO_BODY;
     let is_single = |element: usize| mesh.elements.kind(element).dimension() == 0;

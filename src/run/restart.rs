@@ -25,9 +25,10 @@ pub struct Restart {
 /// Restore a simulation from the newest intact checkpoint. Collective.
 ///
 /// # Errors
-/// If there is no intact checkpoint, or if the checkpoint belongs to another deck, to other points or to sets
-/// with other points. For another deck, the message lists the differences. If the run ends before the
-/// checkpoint.
+/// - If there is no intact checkpoint.
+/// - If the checkpoint was written for a deck with other physics. The message lists the differences.
+/// - If the checkpoint was written for other points, or if the points of a set were different.
+/// - If the end time of the run is not after the start of the last step before the checkpoint.
 pub fn restart<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     files: &Files,

@@ -19,7 +19,7 @@ const OVERHEAD: f64 = 64.0 * 1024.0;
 /// indices takes 20 bytes.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
-/// Bytes of a bond in a lattice, at each end: one bit.
+/// Bytes of a bond in a lattice, at each end. An end of the bond takes one bit, which is 1/8 byte.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
 /// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which

@@ -22,10 +22,10 @@
 //!
 //! F = σ(ε̄ + Δε̄, Δε̄/Δt) − q = 0
 //!
-//! is solved by Newton's method in ln u, with u = x/(1 + x c) for the largest c. In 3-D and plane strain
-//! there is one part, and u is proportional to Δε̄. Then F is convex in ln u, also at ε̄ = 0, where the slope
-//! of ε̄ⁿ is infinite for n < 1. Newton's method therefore converges from above. In plane stress, a bracket
-//! safeguards the method.
+//! is solved by Newton's method. The variable of the iteration is ln u, with u = x/(1 + x c), where c is the
+//! largest stiffness of the parts. In 3-D and plane strain there is one part, and u is proportional to Δε̄.
+//! Then F is convex in ln u, also at ε̄ = 0, where the slope of ε̄ⁿ is infinite for n < 1. Newton's method
+//! therefore converges from above. In plane stress, a bracket safeguards the method.
 
 use super::super::{Key, Kind, LawFault, PlasticState, Property, Values};
 use super::plastic::{HARDENING, YIELD_STRESS};

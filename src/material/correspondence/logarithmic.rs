@@ -5,7 +5,7 @@
 //! Let b_a be the eigenvalues and n_a the eigenvectors of b_e. The logarithmic strains ε_a, the Kirchhoff
 //! stress τ, P and the elastic energy density W are (Simo 1992):
 //!
-//! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ Σ ε + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
+//! ε_a = ½ ln b_a, τ = Σ τ_a n_a⊗n_a, τ_a = λ (ε_1 + ε_2 + ε_3) + 2G ε_a, P = τ F⁻ᵀ, W = ½ Σ τ_a ε_a.
 //!
 //! The flow rule is that of small strains, applied to ε_a and τ_a. It changes ε_a and keeps n_a.
 //! After the flow, b_e is Σ exp(2 ε_a) n_a⊗n_a with the new ε_a. A rigid rotation only rotates b_e, so no

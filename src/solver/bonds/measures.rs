@@ -283,8 +283,9 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
 }
 
 /// Kernel that sums Σ T·(v_j − v_i) Ṽ over the intact bonds. This is the rate of change of the strain energy
-/// density if every point moves with its rate v. The first point numbers are the components of v. The unit of
-/// the sum is J/m⁴ times the unit of v.
+/// density if every point moves with its rate v. The kernel reads v from the columns of point numbers: the
+/// first D columns are the components of v, and the point numbers of the law follow. The unit of the sum is
+/// J/m⁴ times the unit of v.
 #[derive(Clone, Copy)]
 pub struct EnergyRate {
     /// Law of point i.

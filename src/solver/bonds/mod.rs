@@ -409,7 +409,7 @@ impl<const D: usize> Forces<D> {
         self.halo.update_ghosts(comm, &mut [values]);
     }
 
-    /// Exchange the ghost values of several columns over the local points. Collective.
+    /// Exchange the ghost values of several columns. Each column has one value per local point. Collective.
     pub fn update_ghosts_of_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
         self.halo.update_ghosts(comm, columns);
     }

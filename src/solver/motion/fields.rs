@@ -35,8 +35,9 @@ pub enum Birth {
     /// the mean of its parents. These rules conserve momentum, and do not change a field that is linear in
     /// space.
     Conserved,
-    /// A new point gets the mean. The value of a removed point is averaged with the values of its parents,
-    /// weighted by volume, so that no value leaves the previous range.
+    /// A new point gets the mean. If a point is removed, each parent gets the average of its own value and
+    /// the value of the removed point. The weights are the parent's volume and the volume that the parent
+    /// receives. Therefore no value leaves the range of the averaged values.
     Mixed,
     /// A new point takes a part of the value of each parent, in proportion to the volume that it takes from
     /// this parent. The sum over all points is therefore conserved. A removed point returns all of its value.

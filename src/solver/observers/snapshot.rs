@@ -353,7 +353,8 @@ fn set_out_of_plane_stress<const D: usize>(
     }
 }
 
-/// Reorder columns to `components` values per point, for `count` points. Missing columns are 0.
+/// Convert columns to rows: one row per point with `components` values, for `count` points. Missing columns
+/// are 0.
 fn rows(columns: &[Vec<f64>], count: usize, components: usize) -> Vec<f64> {
     let mut values = vec![0.0; components * count];
     for (d, column) in columns.iter().enumerate() {

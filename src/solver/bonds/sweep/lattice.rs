@@ -154,8 +154,8 @@ const FAST_PATH_BACKOFF: usize = 7;
 /// Choice between the fast path and the full loop for the next lane group. Lists have no fast path, because
 /// their loops spend most of the time on loading points j.
 struct FastPathGate {
-    /// Whether the fast path is allowed: the kernel may skip its criterion, and it removes no thermal
-    /// stretches from the bonds.
+    /// Whether the fast path is allowed. It is allowed if the kernel may skip its criterion, and if no
+    /// thermal stretches have to be removed from the bonds.
     is_allowed: bool,
     /// Number of lane groups that must still skip the fast path.
     skipped: usize,
