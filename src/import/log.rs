@@ -90,8 +90,8 @@ pub(super) const OTHER_INFLUENCE: &str =
 /// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
-/// Line numbers of the losses that change the results. A loss is a key that is left out, a file that is read in
-/// part, or a command or key with another effect in the new deck.
+/// Line numbers of the losses that change the results. A loss is a key that is left out, a file that is read
+/// in part, or a command or key with another effect in the new deck.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.

@@ -53,8 +53,8 @@ impl<'n> Sets<'n> {
         self.ids_by_name = Some(sets);
     }
 
-    /// Store the number of the last point. Call this function for PeriLab, which drops larger numbers from node
-    /// sets.
+    /// Store the number of the last point. Call this function for PeriLab, which drops larger numbers from
+    /// node sets.
     pub fn set_last_number(&mut self, last: u64) {
         self.last_number = Some(last);
     }

@@ -558,7 +558,8 @@ impl<'a> Cursor<'a> {
         std::str::from_utf8(token).map_err(|_| self.fault("is not UTF-8 text"))
     }
 
-    /// Return an error unless the last word is on the line `line`, on which the node or element `number` begins.
+    /// Return an error unless the last word is on the line `line`, on which the node or element `number`
+    /// begins.
     /// `what` is the kind of this entry. In binary files, the line number does not change.
     fn is_on_line(&self, line: u64, what: &str, number: u64) -> Result<()> {
         if self.line == line {
@@ -568,8 +569,8 @@ impl<'a> Cursor<'a> {
         Err(fault(self.path, line, message))
     }
 
-    /// Return an error if further words follow on the line of the node or element `number`. `what` is the kind
-    /// of this entry. Binary files have no lines.
+    /// Return an error if further words follow on the line of the node or element `number`. `what` is the
+    /// kind of this entry. Binary files have no lines.
     fn end_of_line(&self, what: &str, number: u64) -> Result<()> {
         let is_text = matches!(self.encoding, Encoding::Text);
         let mut rest = self.bytes[self.at..].iter();

@@ -51,8 +51,8 @@ pub(super) fn without_suffix(style: &str) -> &str {
 /// Keyword of a fix, and its values.
 type Setting<'w> = (&'w str, &'w [&'w str]);
 
-/// Split the words after the arguments of a fix into keywords and their values. `known` has the keywords, each
-/// with the number of its values. `Err` holds the first word that is unknown or has too few values.
+/// Split the words after the arguments of a fix into keywords and their values. `known` has the keywords,
+/// each with the number of its values. `Err` holds the first word that is unknown or has too few values.
 fn settings<'w>(
     words: &'w [&'w str],
     known: &[(&str, usize)],
@@ -69,7 +69,8 @@ fn settings<'w>(
     Ok(found)
 }
 
-/// Return the number of arguments of a fix before its keywords, and the keywords that the import reads. Return
+/// Return the number of arguments of a fix before its keywords, and the keywords that the import reads.
+/// Return
 /// `None` for a fix without a counterpart.
 fn form(style: &str, first: Option<&str>) -> Option<(usize, &'static [(&'static str, usize)])> {
     let of_load: &[_] = &[("region", 1), ("every", 1), ("energy", 1)];

@@ -29,8 +29,8 @@ fn find(model: &Model, name: &str) -> Option<Group> {
     found.map(|(_, group, _)| group.clone())
 }
 
-/// Return a region by its name, with bounds of the box in place of infinite bounds. Return `None` for a region
-/// without a shape.
+/// Return a region by its name, with bounds of the box in place of infinite bounds. Return `None` for a
+/// region without a shape.
 fn named_region(model: &Model, name: &str) -> Option<Region> {
     let mut regions = model.regions.iter();
     let (_, region, _) = regions.find(|(other, ..)| other == name)?;
@@ -88,8 +88,8 @@ pub(super) fn set(
     }
 }
 
-/// Return the name of a set with the points of a group that are in a region at the start. Write the set if the
-/// new deck does not have it yet. `Err` holds the reason why there is no such set.
+/// Return the name of a set with the points of a group that are in a region at the start. Write the set if
+/// the new deck does not have it yet. `Err` holds the reason why there is no such set.
 pub(super) fn set_in_region(
     translation: &mut Translation,
     model: &Model,

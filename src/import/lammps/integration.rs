@@ -15,8 +15,8 @@ const INTEGRATORS: [&str; 8] = ["move", "nph", "npt", "nve", "nvk", "nvt", "poem
 /// Name of the set and of the condition of points that no fix integrates.
 const HELD: &str = "held";
 
-/// Write a condition that holds the points that no fix integrates. `fixes` are the fixes that act in the first
-/// run, and `run` is its command.
+/// Write a condition that holds the points that no fix integrates. `fixes` are the fixes that act in the
+/// first run, and `run` is its command.
 pub(super) fn hold(
     translation: &mut Translation,
     model: &Model,

@@ -26,7 +26,8 @@ const MATERIALS: [(&str, &str, &str); 9] = [
     ("correspondence vumat", "", ""),
 ];
 
-/// Elastic constants by precedence. If more than two are given, PeriLab computes the moduli from the first two.
+/// Elastic constants by precedence. If more than two are given, PeriLab computes the moduli from the first
+/// two.
 const PRECEDENCE: [&str; 4] = [
     "bulk_modulus",
     "poisson_ratio",
