@@ -146,6 +146,14 @@ impl Region {
         }
     }
 
+    /// Test whether the region is a block that contains a box.
+    pub fn covers(&self, bounds: [[f64; 3]; 2]) -> bool {
+        let Self::Block(lower, upper) = self else {
+            return false;
+        };
+        (0..3).all(|k| lower[k] <= bounds[0][k] && bounds[1][k] <= upper[k])
+    }
+
     /// Replace infinite bounds of the region by the bounds of a box.
     pub fn within(&self, bounds: [[f64; 3]; 2]) -> Self {
         let clamp = |value: f64, k: usize| {

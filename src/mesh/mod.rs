@@ -89,6 +89,8 @@ pub struct Mesh {
     pub groups: Vec<Group>,
     /// Whether names of groups are matched without regard to case.
     pub ignores_case: bool,
+    /// Names of groups that cannot be read, each with the error message for a deck that uses the group.
+    unsupported: Vec<(String, String)>,
 }
 
 /// Elements of all types, in the order of the file.
@@ -264,7 +266,8 @@ impl Mesh {
     /// these groups. If the key means no group, return `None`.
     ///
     /// # Errors
-    /// If the key means groups of different kinds; the message lists these groups.
+    /// If the key means groups of different kinds; the message lists these groups. Also if the key means a
+    /// group that cannot be read.
     pub fn find(
         &self,
         key: &GroupKey,
@@ -285,6 +288,11 @@ impl Mesh {
                         || (number.is_some() && group.number == number)
                 })
         };
+        if let GroupKey::Name(name) = key
+            && let Some(message) = self.unsupported(name)
+        {
+            return Err(message.to_owned());
+        }
         let all = |refers: &dyn Fn(&Group) -> bool| -> Vec<&Group> {
             let groups = self.groups.iter();
             groups
@@ -334,6 +342,19 @@ impl Mesh {
             "{key} stands for several groups; name one of them: {}",
             full.join(", ")
         ))
+    }
+
+    /// Return the error message for the name of a group that cannot be read; `None` for other names. The kind
+    /// of the group may come before the name.
+    fn unsupported(&self, name: &str) -> Option<&str> {
+        let kinds = ["node set ", "element set "];
+        let bare = kinds.iter().find_map(|kind| name.strip_prefix(kind));
+        let mut all = self.unsupported.iter();
+        let found = all.find(|(own, _)| {
+            let is_own = |name: &str| own.eq_ignore_ascii_case(name);
+            is_own(name) || bare.is_some_and(is_own)
+        });
+        found.map(|(_, message)| message.as_str())
     }
 
     /// Return the name of each group that `wanted` accepts, or the number of a group without a name.

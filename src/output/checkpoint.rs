@@ -66,7 +66,7 @@ pub struct Header {
 pub struct Fingerprint {
     /// Hash of the ids, positions, volumes and blocks of the points.
     pub points: u64,
-    /// Name of each set, and hash of the ids of its points.
+    /// Name of each set that comes from a file or mesh, and hash of the ids of its points.
     pub sets: Vec<(String, u64)>,
 }
 

@@ -76,8 +76,9 @@ impl<'a> CollectiveFile<'a> {
                 let message = format!("{}: the file exists already", path.display());
                 Err(Error::input(message))
             }
-            // The new file has another inode, so programs that have opened the old file can still read it.
-            (0, Creation::Truncate) => match std::fs::remove_file(path) {
+            // The new file has another inode, so programs that have opened the old file can still read it. If
+            // the path is a symbolic link, the link stays.
+            (0, Creation::Truncate) => match path.canonicalize().and_then(std::fs::remove_file) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
                     let message = format!("cannot replace {}: {error}", path.display());
                     Err(Error::run(message))

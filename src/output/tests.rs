@@ -133,7 +133,11 @@ fn a_replaced_file_stays_readable_where_it_is_open() -> Result<()> {
     let path = std::env::temp_dir().join(format!("fissure-replaced-{}", std::process::id()));
     std::fs::write(&path, "an old result").unwrap();
     let mut open = std::fs::File::open(&path).unwrap();
-    CollectiveFile::create(&path, &threads::alone(), Creation::Truncate)?.close()?;
+    let link = path.with_extension("link");
+    std::os::unix::fs::symlink(&path, &link).unwrap();
+    CollectiveFile::create(&link, &threads::alone(), Creation::Truncate)?.close()?;
+    assert!(link.is_symlink());
+    std::fs::remove_file(&link).unwrap();
     let mut text = String::new();
     open.read_to_string(&mut text).unwrap();
     assert_eq!(text, "an old result");

@@ -6,6 +6,7 @@ use crate::comm::{self, agree};
 use crate::error::Result;
 use crate::output::checkpoint::{Checkpoints, Fingerprint, Header};
 use crate::output::mix;
+use crate::problem::{Selector, Set};
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
@@ -92,7 +93,7 @@ impl CheckpointWriter {
     }
 }
 
-/// Compute the hashes of all points and of all sets. Collective.
+/// Compute the hashes of all points, and of the sets that come from files. Collective.
 pub fn fingerprint<const D: usize>(simulation: &Simulation<'_, D>) -> Fingerprint {
     let (problem, model) = (simulation.problem, &simulation.model);
     let own = (0..model.owned()).fold(0_u64, |sum, point| {
@@ -102,12 +103,20 @@ pub fn fingerprint<const D: usize>(simulation: &Simulation<'_, D>) -> Fingerprin
         sum.wrapping_add(words.fold(mix(model.ids[point]), |hash, word| mix(hash ^ word)))
     });
     let hash_of_set = |set: usize| {
-        let ids = members(problem, model, set)
-            .into_iter()
-            .map(|point| model.ids[point as usize]);
+        let points = members(problem, model, set).into_iter();
+        let ids = points.map(|point| model.ids[point as usize]);
         comm::total(simulation.comm, ids.map(mix).fold(0, u64::wrapping_add))
     };
+    // The points of all other sets follow from the deck and from the hash of the points.
+    let is_read = |set: &Set| {
+        let selector = &set.selector;
+        matches!(
+            selector,
+            Selector::Ids { file: Some(_), .. } | Selector::Mesh(_)
+        )
+    };
     let sets = problem.sets.iter().enumerate();
+    let sets = sets.filter(|(_, set)| is_read(set));
     Fingerprint {
         points: comm::total(simulation.comm, own),
         sets: sets

@@ -85,8 +85,9 @@ pub struct EnergyWatch {
 }
 
 impl EnergyWatch {
-    /// Create the watch for a run before its first step. Collective.
-    pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
+    /// Create the watch for a run before its first step. `largest` is the largest energy of earlier rows, if
+    /// the run is a restart (J); otherwise 0. Collective.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, largest: f64) -> Self {
         let (problem, model) = (simulation.problem, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
         let mut stiffness = [ExactSum::ZERO];
@@ -101,7 +102,7 @@ impl EnergyWatch {
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
-            largest: 0.0,
+            largest,
             suspected: false,
         }
     }

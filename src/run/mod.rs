@@ -288,7 +288,8 @@ impl<'a> Job<'a> {
         // The energy input from changing temperatures is not counted, so the energy of runs with changing
         // temperatures is not checked.
         let is_closed = !self.problem.temperature_changes();
-        let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
+        let mut energy =
+            is_closed.then(|| EnergyWatch::new(simulation, recorder.largest_past_energy()));
         while !stepper.is_over() {
             if stepper.is_refinement_due()
                 && let Some(regridded) = stepper.at_full_step().refine()?

@@ -235,6 +235,11 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
+    /// Largest energy of the rows before a restart, J; 0 without such rows.
+    pub fn largest_past_energy(&self) -> f64 {
+        self.observer.largest_past_energy()
+    }
+
     /// Return the row of the history at the current step; `None` if no row was due.
     pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
         let is_now = |row: &&HistoryRow| row.number == clock.number();

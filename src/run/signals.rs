@@ -10,10 +10,6 @@ use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 /// Exit code of an immediate exit after a second signal.
 const IMMEDIATE_EXIT: i32 = 130;
 
-/// Further stop signals within this interval after the first are ignored, because the launcher and the batch
-/// system may both send the same signal.
-const SAME_SIGNAL: Duration = Duration::from_secs(1);
-
 /// Receiver of the signals of this process.
 ///
 /// - SIGTERM, SIGINT, SIGUSR1: write a checkpoint and stop, within about ten steps. If another of these
@@ -26,6 +22,10 @@ pub struct Signals {
 }
 
 impl Signals {
+    /// Further stop signals within this interval after the first are ignored, because the launcher and the
+    /// batch system may both send a stop signal.
+    pub const SAME_SIGNAL: Duration = Duration::from_secs(1);
+
     /// Start a thread that receives the signals.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl Signals {
                             stop.store(true, Ordering::Relaxed);
                             first = Some(Instant::now());
                         }
-                        (_, Some(first)) if first.elapsed() > SAME_SIGNAL => {
+                        (_, Some(first)) if first.elapsed() > Self::SAME_SIGNAL => {
                             signal_hook::low_level::exit(IMMEDIATE_EXIT);
                         }
                         _ => {}

@@ -599,16 +599,20 @@ fn curves_of_histories() {
         &["kinetic_energy_strain_energy_momentum_x.png: 4 curves"],
     );
 
-    // A killed run or a full disk may leave an incomplete last row, which is ignored.
+    // A killed run or a full disk may leave an incomplete last row, which is ignored with a warning.
     let pictures = ["", "2", "2,3.1"].map(|last| {
         let cut = folder.write("cut.csv", &format!("time [s],a\n0,1\n1,2\n{last}"));
         let picture = folder.join("cut.svg");
         let options = ["--y", "a", "-o", picture.to_str().unwrap()];
-        expect(&command("plot", &[&cut], &options), 0, &["1 curve"]);
+        let output = command("plot", &[&cut], &options);
+        expect(&output, 0, &["1 curve"]);
+        let warning = "cut.csv:4: the last line is ignored";
+        assert_eq!(text(&output).contains(warning), !last.is_empty());
         std::fs::read_to_string(&picture).unwrap()
     });
     assert!(pictures.iter().all(|picture| *picture == pictures[0]));
     let header = folder.write("header.csv", "time [s],a");
+    let nothing = folder.write("nothing.csv", "");
     let empty = folder.write("empty.csv", "time [s],a\n0,NaN\n1,inf\n");
     let broken = folder.write("broken.csv", "time [s],a\n0,1\n1\n");
     for (result, options, words) in [
@@ -637,7 +641,12 @@ fn curves_of_histories() {
         (
             &header,
             &["--y", "a"],
-            "header.csv: must have a line with the names of the columns",
+            "header.csv:1: the line with the names of the columns is incomplete",
+        ),
+        (
+            &nothing,
+            &["--y", "a"],
+            "nothing.csv: must have a line with the names of the columns",
         ),
         (&empty, &["--y", "a"], "--y a: no finite values to draw"),
         (

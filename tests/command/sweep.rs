@@ -1,8 +1,8 @@
 //! `fissure sweep` on small decks.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-use std::time::Duration;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::support::command::{Folder, finish, fissure, succeed, text, wait};
 
@@ -384,6 +384,48 @@ fn a_signal_stops_the_runs_and_the_same_command_continues() {
     }
 }
 
+#[test]
+fn a_request_for_a_checkpoint_does_not_end_a_run_without_handlers() {
+    let sweep = Sweep::new("sweep-early-signal");
+    // The run installs its handlers 1 s after its start.
+    sweep.folder.write("late.sh", "sleep 1\nexec \"$@\"\n");
+    let options = ["--set", "dx=2e-3", "--launcher", "sh late.sh", "-o", "o"];
+    let mut child = start(&mut sweep.command(&options));
+    let log = sweep.folder.join("o/dx=2e-3/log.txt");
+    wait_until(&mut child, || log.exists());
+    send(&child, libc::SIGUSR2);
+    expect(&wait(child), 0, &["dx=2e-3: complete after"]);
+}
+
+fn start(command: &mut Command) -> Child {
+    let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+fn send(child: &Child, signal: i32) {
+    // SAFETY: the child has not been waited for, so its process id is still valid.
+    unsafe {
+        libc::kill(child.id() as i32, signal);
+    }
+}
+
+/// Wait until a condition holds.
+///
+/// # Panics
+/// If the child ends before, or after two minutes.
+fn wait_until(child: &mut Child, holds: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        let status = child.try_wait().unwrap();
+        assert!(status.is_none(), "the command has ended: {status:?}");
+        if start.elapsed() > Duration::from_secs(120) {
+            child.kill().unwrap();
+            panic!("the command hangs");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
 fn stops_and_continues(signal: i32) {
     let sweep = Sweep::new("sweep-signal");
     let options = [
@@ -396,34 +438,26 @@ fn stops_and_continues(signal: i32) {
         "-o",
         "o",
     ];
-    let mut command = sweep.command(&options);
-    let child = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = start(&mut sweep.command(&options));
     let result = sweep.folder.join("o/dx=1e-3/history.csv");
     let rows = || std::fs::read_to_string(&result).map_or(0, |text| text.lines().count());
-    while rows() < 3 {
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    // SAFETY: the child has not been waited for, so its process id is still valid.
-    let send = |signal: i32| unsafe {
-        libc::kill(child.id() as i32, signal);
-    };
+    wait_until(&mut child, || rows() >= 3);
     // The run continues after a checkpoint on request.
-    send(libc::SIGUSR2);
-    while !sweep.folder.join("o/dx=1e-3/checkpoint_0.h5").exists() {
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    send(signal);
+    send(&child, libc::SIGUSR2);
+    let checkpoint = sweep.folder.join("o/dx=1e-3/checkpoint_0.h5");
+    wait_until(&mut child, || checkpoint.exists());
+    // Another stop signal within 1 s does not kill the run.
+    send(&child, signal);
+    send(&child, libc::SIGINT);
     let output = wait(child);
+    let log = std::fs::read_to_string(sweep.folder.join("o/dx=1e-3/log.txt")).unwrap();
+    assert!(log.contains("stopped by a signal after step"), "{log}");
     expect(
         &output,
         75,
         &["the sweep was stopped by a signal or a time limit; the same command continues it"],
     );
-    assert!(sweep.folder.join("o/dx=1e-3/checkpoint_0.h5").exists());
+    assert!(checkpoint.exists());
     assert!(!sweep.folder.join("o/dx=1e-3/complete").exists());
     assert!(!sweep.folder.join("o/dx=0.5e-3").exists());
     let table = sweep.table("o/sweep.csv");

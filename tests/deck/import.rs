@@ -1926,6 +1926,25 @@ fn points_of_no_integrator_of_lammps_are_held() {
     );
 }
 
+/// A lattice with more sites than are tested for atoms.
+#[test]
+fn points_of_large_lattices_of_lammps_are_held_only_if_they_are_found() {
+    let folder = Folder::new("held-large");
+    for (mobile, (is_held, losses)) in [
+        ("0 219 0 219 0 219", (false, 0)),
+        ("INF INF INF INF INF INF", (false, 0)),
+        ("INF 200 INF INF INF INF", (true, 0)),
+        ("INF INF INF INF INF 218.5", (false, 1)),
+    ] {
+        let commands = "group mobile region m\nfix 1 mobile nve\nrun 1\n";
+        let script = format!("{BLOCK}region m block {mobile}\n{commands}");
+        let script = script.replace("block 0 2 0 1 0 1", "block 0 219 0 219 0 219");
+        let imported = folder.import("in.large", &script).unwrap();
+        assert_eq!(imported.text.contains("[set.held]"), is_held, "{mobile}");
+        assert_eq!(imported.losses().conditions.len(), losses, "{mobile}");
+    }
+}
+
 #[test]
 fn loads_of_lammps_that_are_left_out_are_losses() {
     let folder = Folder::new("losses");
@@ -1945,9 +1964,10 @@ fn loads_of_lammps_that_are_left_out_are_losses() {
         assert_eq!(imported.losses().to_string(), warning, "{command}");
         assert!(imported.text.contains("\n# left out: ["), "{command}");
         let imported = block(&folder, &format!("fix 9 all nve\nrun 1\n{command}\n"));
-        let is_lost = !command.starts_with("set");
-        assert_eq!(imported.losses().is_empty(), !is_lost, "{command}");
+        assert!(!imported.losses().is_empty(), "{command}");
     }
+    let imported = block(&folder, "fix 9 all nve\nrun 1\nset type 1 density 3\n");
+    assert!(imported.losses().is_empty(), "{}", imported.losses());
     // A fix that does not act is no loss.
     let imported = block(
         &folder,

@@ -792,11 +792,15 @@ const ABAQUS: &str = "\
  2,
 *Surface, type=ELEMENT, name=Right
 Second, S4
+*Surface, type=ELEMENT, name=Whole
+BODY,
 *Surface, name=Sides, combine=union
 Right,
-BODY,Right
+Whole,Right
 *Surface, type=NODE, name=Edge
 Face
+*Elset, elset=Edge
+ 2,
 *Surface, name=Edges, combine=union
 Edge
 *Solid Section, elset=BODY, material=Steel
@@ -1087,22 +1091,8 @@ fn damaged_lines_of_abaqus_have_their_message() {
             "a.inp:3: *END ASSEMBLY within `i`, which has no end",
         ),
         (
-            "*SURFACE, NAME=a\n, S1\n",
-            "a.inp:2: *SURFACE: a line must begin with an element, a node or a set; a blank entry, which stands \
-             for the whole model, is not supported",
-        ),
-        (
-            "*SURFACE, NAME=a, COMBINE=difference\nb, c\n",
-            "a.inp:1: *SURFACE: COMBINE=DIFFERENCE is not supported, only COMBINE=UNION is; list the elements of \
-             the surface",
-        ),
-        (
-            "*SURFACE, NAME=a, CROP\nb\n",
-            "a.inp:1: *SURFACE: CROP is not supported; list the elements of the surface",
-        ),
-        (
             "NODES*SURFACE, NAME=a, COMBINE=UNION\nb, c\n",
-            "a.inp:5: set `a`: there is no element set `b` before it",
+            "a.inp:5: set `a`: there is no element surface `b` before it",
         ),
         (
             "*INCLUDE, INPUT=nothing.txt\n",
@@ -1111,6 +1101,38 @@ fn damaged_lines_of_abaqus_have_their_message() {
     ] {
         let text = text.replace("NODES", nodes);
         assert_eq!(parse("a.inp", &text).unwrap_err(), message);
+    }
+}
+
+/// A surface that cannot be read is an error only for a deck or a surface that uses it.
+#[test]
+fn unsupported_surfaces_of_abaqus_are_errors_where_they_are_used() {
+    let mesh = "*NODE\n1, 0, 0\n2, 1, 0\n3, 0, 1\n*ELEMENT, TYPE=CPS3, ELSET=b\n1, 1, 2, 3\n";
+    for (surface, message) in [
+        (
+            "*SURFACE, NAME=a\n1, S1\n, S1\n",
+            "a.inp:9: *SURFACE: a line must begin with an element, a node or a set; a blank entry, which stands \
+             for the whole model, is not supported",
+        ),
+        (
+            "*SURFACE, NAME=a, COMBINE=difference\nc, d\n",
+            "a.inp:7: *SURFACE: COMBINE=DIFFERENCE is not supported, only COMBINE=UNION is; list the elements of \
+             the surface",
+        ),
+        (
+            "*SURFACE, NAME=a, CROP\nc\n",
+            "a.inp:7: *SURFACE: CROP is not supported; list the elements of the surface",
+        ),
+    ] {
+        let text = format!("{mesh}{surface}");
+        let read = parse("a.inp", &text).unwrap();
+        let find = |name: &str| read.find(&GroupKey::Name(name.to_owned()), |_| true);
+        assert!(find("b").unwrap().is_some(), "{surface}");
+        for name in ["a", "A", "element set a"] {
+            assert_eq!(find(name).unwrap_err(), message);
+        }
+        let union = format!("{text}*SURFACE, NAME=u, COMBINE=UNION\na\n");
+        assert_eq!(parse("a.inp", &union).unwrap_err(), message);
     }
 }
 

@@ -8,7 +8,7 @@ use fissure::output::{ResultReader, StoredColumn};
 use fissure::picture::chart::{Chart, Label, Series};
 
 use super::{PlotArguments, check_ending};
-use crate::cli::{Verbosity, file_error, outln};
+use crate::cli::{Verbosity, errln, file_error, outln};
 
 /// The default of `--x`.
 const TIME: &str = "time";
@@ -20,6 +20,8 @@ const MOST_NAMED: usize = 3;
 struct Table {
     path: PathBuf,
     columns: Vec<StoredColumn>,
+    /// Number of the last line of a CSV file if the line is ignored, see [`read_csv`].
+    ignored_line: Option<usize>,
 }
 
 /// Draw columns of one or more histories as curves.
@@ -34,6 +36,15 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
         .iter()
         .map(|path| Table::read(path))
         .collect::<Result<_>>()?;
+    for table in &tables {
+        if let (Some(line), true) = (table.ignored_line, verbosity > Verbosity::Quiet) {
+            errln!(
+                "warning: {}:{line}: the last line is ignored: it does not end with a newline, so it may be \
+                 incomplete",
+                table.path.display()
+            );
+        }
+    }
     let x = arguments.x.as_deref().unwrap_or(TIME);
     if arguments.y.is_empty() {
         let names: Vec<&str> = tables[0].names().collect();
@@ -140,10 +151,10 @@ impl Table {
         } else {
             path.to_path_buf()
         };
-        let columns = if is_csv(&path) {
+        let (columns, ignored_line) = if is_csv(&path) {
             read_csv(&path)?
         } else {
-            ResultReader::open(&path)?.history()?
+            (ResultReader::open(&path)?.history()?, None)
         };
         let columns = columns.into_iter().map(|column| StoredColumn {
             unit: if column.unit == "1" {
@@ -154,7 +165,11 @@ impl Table {
             ..column
         });
         let columns = columns.collect();
-        Ok(Self { path, columns })
+        Ok(Self {
+            path,
+            columns,
+            ignored_line,
+        })
     }
 
     fn names(&self) -> impl Iterator<Item = &str> {
@@ -180,20 +195,26 @@ pub fn is_csv(path: &Path) -> bool {
 }
 
 /// Read a CSV file whose first row has names with units, such as `time [s]`. A last line without a newline is
-/// ignored, because a killed run or a full disk may leave an incomplete row.
+/// ignored, because a killed run or a full disk may leave an incomplete row. Return the columns, and the
+/// number of the ignored line.
 ///
 /// # Errors
 /// If the file cannot be read or has no complete line, or a row does not have one number per column.
-pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
+pub fn read_csv(path: &Path) -> Result<(Vec<StoredColumn>, Option<usize>)> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| Error::input(format!("cannot read {}: {error}", path.display())))?;
-    let complete = text.rfind('\n').map_or("", |end| &text[..end]);
+    let (complete, last) = text.rsplit_once('\n').unwrap_or(("", &text));
+    let has_last = !last.trim().is_empty();
     let mut rows = complete.lines().enumerate();
     let (_, header) = rows.next().ok_or_else(|| {
         let path = path.display();
-        Error::input(format!(
-            "{path}: must have a line with the names of the columns"
-        ))
+        Error::input(if has_last && last.len() == text.len() {
+            format!(
+                "{path}:1: the line with the names of the columns is incomplete: it must end with a newline"
+            )
+        } else {
+            format!("{path}: must have a line with the names of the columns")
+        })
     })?;
     let mut columns: Vec<StoredColumn> = header
         .split(',')
@@ -221,7 +242,8 @@ pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
             column.values.push(value);
         }
     }
-    Ok(columns)
+    let ignored_line = has_last.then(|| text.split('\n').count());
+    Ok((columns, ignored_line))
 }
 
 /// Return short, distinct names of runs: the folder of each history, with as many parent folders as needed to
@@ -272,6 +294,7 @@ mod tests {
             let table = |path: &&str| Table {
                 path: PathBuf::from(path),
                 columns: Vec::new(),
+                ignored_line: None,
             };
             run_names(&paths.iter().map(table).collect::<Vec<_>>())
         };

@@ -158,8 +158,8 @@ impl<'a> Program<'a> {
     /// index, the state and the run time (s) of each run that is complete or failed. Return true if a signal
     /// or a time limit stopped a run.
     ///
-    /// A first SIGINT, SIGTERM or SIGUSR1 makes all runs write checkpoints and stop; a second one kills the
-    /// runs. SIGUSR2 makes all runs write checkpoints and continue.
+    /// A first SIGINT, SIGTERM or SIGUSR1 makes all runs write checkpoints and stop; another one more than
+    /// 1 s later kills the runs. SIGUSR2 makes all runs write checkpoints and continue.
     ///
     /// # Errors
     /// If signals cannot be received, a run cannot be started, a marker file cannot be created, or `ended`
@@ -175,8 +175,8 @@ impl<'a> Program<'a> {
         let mut waiting = due.iter().copied();
         let mut processes: Vec<Process> = Vec::new();
         let (mut stopped, mut outcome) = (false, Ok(()));
-        // True if the runs have received a signal to stop.
-        let mut asked = false;
+        // Time at which the runs have received a signal to stop.
+        let mut asked: Option<Instant> = None;
         loop {
             while !stopped && outcome.is_ok() && processes.len() < usize::from(self.arguments.jobs)
             {
@@ -201,8 +201,17 @@ impl<'a> Program<'a> {
                     kill(&processes, SIGUSR2);
                     continue;
                 }
-                kill(&processes, if asked { libc::SIGKILL } else { SIGUSR1 });
-                (stopped, asked) = (true, true);
+                stopped = true;
+                match asked {
+                    None => {
+                        kill(&processes, SIGUSR1);
+                        asked = Some(Instant::now());
+                    }
+                    Some(first) if first.elapsed() > fissure::run::Signals::SAME_SIGNAL => {
+                        kill(&processes, libc::SIGKILL);
+                    }
+                    Some(_) => {}
+                }
             }
             let mut going_on = Vec::new();
             for mut process in processes {
@@ -233,9 +242,9 @@ impl<'a> Program<'a> {
                 }
             }
             processes = going_on;
-            if outcome.is_err() && !asked {
+            if outcome.is_err() && asked.is_none() {
                 kill(&processes, SIGUSR1);
-                asked = true;
+                asked = Some(Instant::now());
             }
         }
         outcome.map(|()| stopped)
@@ -290,6 +299,15 @@ impl<'a> Program<'a> {
         // In a separate process group, a run does not receive the SIGINT of Ctrl-C. Only this process
         // receives SIGINT, and sends SIGUSR1 to the run.
         command.process_group(0);
+        // Without a handler, SIGUSR2 would end the run. The run ignores the signal until its own handler
+        // replaces this setting.
+        // SAFETY: the closure only calls `signal`, which is async-signal-safe.
+        unsafe {
+            command.pre_exec(|| {
+                libc::signal(SIGUSR2, libc::SIG_IGN);
+                Ok(())
+            });
+        }
         command.spawn().map_err(|error| {
             let program = command.get_program().to_string_lossy().into_owned();
             Error::run(format!("cannot start {program}: {error}"))

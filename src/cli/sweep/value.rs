@@ -159,7 +159,7 @@ pub fn read(folder: &Path, columns: &[Column]) -> Result<Vec<(Option<f64>, Strin
         return Ok(Vec::new());
     }
     let path = folder.join("history.csv");
-    let history = read_csv(&path)?;
+    let (history, _) = read_csv(&path)?;
     let value = |column: &Column| {
         let found = history.iter().find(|stored| stored.name == column.name);
         let stored = found.ok_or_else(|| {

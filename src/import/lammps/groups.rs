@@ -6,7 +6,7 @@ use crate::import::regions::Region;
 use crate::import::translation::Translation;
 
 /// Largest number of lattice sites that are tested for atoms.
-const MOST_SITES: f64 = 1e7;
+const MOST_SITES: usize = 10_000_000;
 
 /// Reason for leaving out a command whose group has no counterpart.
 pub(super) const NO_SET: &str = "its group is no body or region";
@@ -104,7 +104,7 @@ pub(super) fn set_in_region(
             (format!("{group} in {region}"), of_group.intersection(shape))
         }
     };
-    if !has_atoms(model, &shape) {
+    if has_atoms(model, &shape) == Some(false) {
         return Err("no atom of its group is in its region at the start");
     }
     Ok(write_set(translation, model, &wanted, &shape))
@@ -128,25 +128,29 @@ pub(super) fn write_set(
     written
 }
 
-/// Test whether a region has an atom at the start. The result is also true if the region has too many lattice
-/// sites for a test.
-pub(super) fn has_atoms(model: &Model, region: &Region) -> bool {
+/// Test whether a region has an atom at the start. If the region has more than `MOST_SITES` lattice sites,
+/// test only every n-th site in each direction. Return `None` if there is no atom at these sites.
+pub(super) fn has_atoms(model: &Model, region: &Region) -> Option<bool> {
     let spacing = model.spacing.unwrap_or(1.0);
     let bounds = region.bounds();
     let index = |corner: usize, k: usize| bounds[corner][k] / spacing - model.origin[k];
     let first = [0, 1, 2].map(|k| index(0, k).floor());
     let last = [0, 1, 2].map(|k| index(1, k).ceil());
-    let sites: f64 = (0..3).map(|k| last[k] - first[k] + 1.0).product();
-    if !(0.0..=MOST_SITES).contains(&sites) {
-        return true;
-    }
+    let count: f64 = (0..3).map(|k| last[k] - first[k] + 1.0).product();
+    let step = (count / MOST_SITES as f64).cbrt().ceil().max(1.0) as usize;
     let sites = |k: usize| {
         let site = move |n: i64| (n as f64 + model.origin[k]) * spacing;
-        (first[k] as i64..=last[k] as i64).map(site)
+        let range = first[k] as i64..=last[k] as i64;
+        range.step_by(step).map(site)
     };
     let is_atom = |point: [f64; 3]| {
         let mut atoms = model.atoms.iter();
         region.contains(point, spacing) && atoms.any(|atoms| atoms.region.contains(point, spacing))
     };
-    sites(0).any(|x| sites(1).any(|y| sites(2).any(|z| is_atom([x, y, z]))))
+    let planes = sites(0).flat_map(|x| sites(1).map(move |y| (x, y)));
+    let all = planes.flat_map(|(x, y)| sites(2).map(move |z| [x, y, z]));
+    if all.take(MOST_SITES).any(is_atom) {
+        return Some(true);
+    }
+    (count <= MOST_SITES as f64).then_some(false)
 }

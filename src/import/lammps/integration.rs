@@ -38,18 +38,29 @@ pub(super) fn hold(
     if integrators.iter().any(|fix| fix.words[2] == "all") {
         return;
     }
-    let mut parts = Vec::from_iter(region_of(model, "all"));
+    let all = region_of(model, "all");
+    let mut parts = Vec::from_iter(all.clone());
     for fix in &integrators {
         let Some(region) = region_of(model, &fix.words[2]) else {
             let note = format!("{NO_SET}; points outside of it do not move in LAMMPS");
             translation.leave_out_load(&fix.node, "condition", HELD, &note);
             return;
         };
+        let is_all = |all: &Region| region == *all || region.covers(all.bounds());
+        if all.as_ref().is_some_and(is_all) {
+            return;
+        }
         parts.push(region);
     }
     let rest = Region::Difference(parts);
-    if !has_atoms(model, &rest) {
-        return;
+    match has_atoms(model, &rest) {
+        Some(true) => {}
+        Some(false) => return,
+        None => {
+            let note = "the lattice is too large to find the points of no such fix, which do not move in LAMMPS";
+            translation.leave_out_load(&integrators[0].node, "condition", HELD, note);
+            return;
+        }
     }
     let set = write_set(translation, model, HELD, &rest);
     let written = translation.new_name("condition", HELD);

@@ -2,7 +2,7 @@
 
 use super::fixes::{fix, is_load, without_suffix};
 use super::groups::{NO_SET, set};
-use super::setup::ignored;
+use super::setup::{ignored, initial_value};
 use super::{Model, NO_STEP, Velocity, makes_no_step, wrong};
 use crate::error::Result;
 use crate::import::draft::Value;
@@ -158,6 +158,9 @@ pub(super) fn follow(
                     translation.leave_out_load(node, "condition", &name, reason);
                 }
                 "velocity" | "displace_atoms" => {
+                    translation.leave_out_load(node, "initial", name, reason);
+                }
+                "set" if initial_value(command).is_some() => {
                     translation.leave_out_load(node, "initial", name, reason);
                 }
                 _ => translation.log.left_out(node, reason),

@@ -244,6 +244,13 @@ pub(super) fn ignored(name: &str) -> Option<&'static str> {
     }
 }
 
+/// Return the first key of `set` that moves atoms or sets their velocity.
+pub(super) fn initial_value(command: &Command) -> Option<&str> {
+    let arguments = command.arguments();
+    let mut keys = arguments.into_iter().skip(2).step_by(2);
+    keys.find(|key| INITIAL_VALUES.contains(key))
+}
+
 /// Read `set`: densities and volumes.
 fn properties(
     translation: &mut Translation,
@@ -253,8 +260,7 @@ fn properties(
 ) -> Result<()> {
     let node = &command.node;
     let arguments = command.arguments();
-    let mut initial = arguments.iter().skip(2).step_by(2);
-    if let Some(key) = initial.find(|key| INITIAL_VALUES.contains(key)) {
+    if let Some(key) = initial_value(command) {
         let note = format!(
             "{} is not set; points start on the lattice, with the velocities of `velocity`",
             excerpt(key)

@@ -7,7 +7,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::super::{Elements, Group, Members, Mesh, Runs, fault, position};
 use super::{Place, Reader};
-use crate::error::{Result, excerpt};
+use crate::error::{Error, Result, excerpt};
 
 /// Largest number of nodes in the model and all instances together. Also the largest number of elements in
 /// the model and all instances together.
@@ -46,8 +46,11 @@ pub(super) struct Set {
     pub(super) names: Vec<String>,
     /// Whether the set consists of all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
-    /// Whether the set is a union of surfaces, which consists of nodes if the surfaces in `names` do.
+    pub(super) is_surface: bool,
+    /// Whether the set is a union of the surfaces in `names`, and consists of nodes if these surfaces do.
     pub(super) is_union: bool,
+    /// Error for the use of a set that cannot be read; `None` if the set can be read.
+    pub(super) unsupported: Option<Error>,
     pub(super) place: Place,
 }
 
@@ -70,6 +73,14 @@ pub(super) struct Instance {
     /// A point on the axis of rotation.
     pub(super) pivot: Vector3<f64>,
     pub(super) position_lines_read: usize,
+}
+
+/// Return the name of a set in an instance; the name itself if the name of the instance is empty.
+fn qualified(instance: &str, name: &str) -> String {
+    match instance {
+        "" => name.to_owned(),
+        _ => format!("{instance}.{name}"),
+    }
 }
 
 /// If there are more than `limit` numbers, remove repeated numbers and set a new limit of more than twice the
@@ -126,10 +137,22 @@ impl Reader {
         let mut known: FxHashMap<(MemberKind, String), Runs> = FxHashMap::default();
         let mut order = Vec::new();
         for mut set in part.sets {
+            let name = qualified(&self.placed[own].name, &set.name);
+            if let Some(error) = set.unsupported {
+                let names = [name, set.name];
+                let all = names.map(|name| (name, error.message.clone()));
+                self.mesh.unsupported.extend(all);
+                continue;
+            }
             if set.is_union {
-                set.of = self.kind_of_union(&set, &known);
+                set.of = self.kind_of_union(&set, own);
             }
             let members = self.members(&set, own, &known)?;
+            if set.is_surface {
+                let key = (set.of, name.to_ascii_uppercase());
+                let all = self.surfaces.entry(key).or_default();
+                *all = Runs::union([&*all, &members].map(|runs| (runs.ranges(), 0)).into_iter());
+            }
             let key = (set.of, set.name.to_ascii_uppercase());
             if !known.contains_key(&key) {
                 order.push((key.clone(), set.name));
@@ -139,11 +162,7 @@ impl Reader {
         }
         for (key, name) in order {
             let members = known.remove(&key).unwrap_or_default();
-            let name = if is_instance {
-                format!("{}.{name}", self.placed[own].name)
-            } else {
-                name
-            };
+            let name = qualified(&self.placed[own].name, &name);
             self.add_set(&name, key.0, members);
         }
         Ok(())
@@ -240,6 +259,18 @@ impl Reader {
             set.of
         };
         for name in &set.names {
+            if set.is_union {
+                let full_name = qualified(set.instance.as_deref().unwrap_or(&home.name), name);
+                if let Some(message) = self.mesh.unsupported(&full_name) {
+                    return Err(Error::input(message));
+                }
+                let found = self.find_surface(of, name, set, own);
+                let found = found
+                    .ok_or_else(|| missing(&format!("surface {} before it", excerpt(name))))?;
+                members.extend(found.iter());
+                compact(&mut members, &mut limit);
+                continue;
+            }
             let found = self.find_set(of, name, set.instance.as_deref(), known);
             let qualified = || {
                 // The name may be a number in an instance, such as `part-1-1.7`.
@@ -266,23 +297,24 @@ impl Reader {
     }
 
     /// Return the kind of the members of a union of surfaces.
-    fn kind_of_union(
-        &self,
-        union: &Set,
-        known: &FxHashMap<(MemberKind, String), Runs>,
-    ) -> MemberKind {
+    fn kind_of_union(&self, union: &Set, own: usize) -> MemberKind {
         let has_surface = |of: MemberKind| {
             let mut names = union.names.iter();
-            names.any(|name| {
-                self.find_set(of, name, union.instance.as_deref(), known)
-                    .is_some()
-            })
+            names.any(|name| self.find_surface(of, name, union, own).is_some())
         };
         if has_surface(MemberKind::Nodes) && !has_surface(MemberKind::Elements) {
             MemberKind::Nodes
         } else {
             MemberKind::Elements
         }
+    }
+
+    /// Find the members of a surface in a union by its name. `own` is the index in `placed` of the instance
+    /// or model that contains the union.
+    fn find_surface(&self, of: MemberKind, name: &str, union: &Set, own: usize) -> Option<&Runs> {
+        let own = &self.placed[own].name;
+        let name = qualified(union.instance.as_ref().unwrap_or(own), name);
+        self.surfaces.get(&(of, name.to_ascii_uppercase()))
     }
 
     /// Find the members of a set by its name, in `known` or among the groups of the mesh. With `instance`,

@@ -13,7 +13,7 @@ use nalgebra::{Rotation3, Unit, Vector3};
 use rustc_hash::FxHashMap;
 
 use super::kind::Kind;
-use super::{Mesh, fault, load, position};
+use super::{Mesh, Runs, fault, load, position};
 use crate::error::{Error, Result, excerpt};
 use assembly::{Instance, MemberKind, Part, Placed, Set};
 use names::{GENERATORS, Keyword, kind};
@@ -78,6 +78,8 @@ struct Reader {
     /// Position of `*ASSEMBLY` while the assembly is being read.
     assembly: Option<Place>,
     placed: Vec<Placed>,
+    /// Members of the surfaces in `placed`, by kind and by name in capitals, such as `INSTANCE.NAME`.
+    surfaces: FxHashMap<(MemberKind, String), Runs>,
     data: Data,
     /// Number of the element that is being read, followed by the numbers of its nodes that have been read.
     pending: Vec<u64>,
@@ -221,12 +223,14 @@ impl Reader {
                 let Some(set) = keyword.get("NAME") else {
                     return Ok(());
                 };
+                self.begin_set(of, set, keyword);
+                self.last_set().is_surface = true;
                 if keyword.get("CROP").is_some() {
                     let message =
                         "*SURFACE: CROP is not supported; list the elements of the surface";
-                    return Err(self.fault(message));
+                    self.leave_out_set(message);
+                    return Ok(());
                 }
-                self.begin_set(of, set, keyword);
                 self.data = match keyword
                     .get("COMBINE")
                     .map(str::to_ascii_uppercase)
@@ -234,7 +238,7 @@ impl Reader {
                 {
                     None => Data::Surface,
                     Some("UNION") => {
-                        self.last_set().is_union = keyword.get("TYPE").is_none();
+                        self.last_set().is_union = true;
                         Data::Surfaces
                     }
                     Some(other) => {
@@ -243,7 +247,8 @@ impl Reader {
                              the surface",
                             excerpt(other).trim_matches('`')
                         );
-                        return Err(self.fault(message));
+                        self.leave_out_set(message);
+                        Data::Skipped
                     }
                 };
             }
@@ -351,7 +356,9 @@ impl Reader {
             ranges: Vec::new(),
             names: Vec::new(),
             is_nodes_of_elements: false,
+            is_surface: false,
             is_union: false,
+            unsupported: None,
             place: self.place.clone(),
         };
         let sets = &mut self.part().sets;
@@ -362,6 +369,13 @@ impl Reader {
     fn last_set(&mut self) -> &mut Set {
         let set = self.part().sets.last_mut();
         set.expect("the keyword has begun a set")
+    }
+
+    /// Skip the further data lines of the last set, and keep the error for the case that the set is used.
+    fn leave_out_set(&mut self, message: impl std::fmt::Display) {
+        let error = self.fault(message);
+        self.last_set().unsupported = Some(error);
+        self.data = Data::Skipped;
     }
 
     /// Check that the last element has all its nodes.
@@ -427,7 +441,7 @@ impl Reader {
                 "" => {
                     let message = "*SURFACE: a line must begin with an element, a node or a set; a blank entry, which \
                                    stands for the whole model, is not supported";
-                    return Err(self.fault(message));
+                    self.leave_out_set(message);
                 }
                 entry => self.add_to_set(entry),
             },
