@@ -104,10 +104,9 @@ impl Constants {
         removed.map(|(key, ..)| key).collect()
     }
 
-    /// Write Young's modulus of a bond-based law of PeriLab, which uses one constant and a fixed Poisson
-    /// ratio
-    /// `ratio`. Return the key of this constant: the bulk modulus if given, or else the shear modulus, or else
-    /// Young's modulus. Return `None` if none of them is given.
+    /// Write Young's modulus of a bond-based law of PeriLab, which uses one constant and the fixed Poisson's
+    /// ratio `ratio`. Return the key of this constant: the bulk modulus if given, or else the shear modulus,
+    /// or else Young's modulus. Return `None` if none of them is given.
     pub fn write_young(&self, section: &mut Section, ratio: f64) -> Option<&'static str> {
         let factors = [
             ("bulk_modulus", 3.0 * (1.0 - 2.0 * ratio)),

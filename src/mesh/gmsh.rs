@@ -559,8 +559,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Return an error unless the last word is on the line `line`, on which the node or element `number`
-    /// begins.
-    /// `what` is the kind of this entry. In binary files, the line number does not change.
+    /// begins. `what` is the kind of this entry. In binary files, the line number does not change.
     fn is_on_line(&self, line: u64, what: &str, number: u64) -> Result<()> {
         if self.line == line {
             return Ok(());

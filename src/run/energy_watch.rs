@@ -78,7 +78,7 @@ pub struct EnergyWatch {
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
-    /// Largest energy of a row so far, J.
+    /// Largest energy of the rows so far, including those before a restart, J.
     largest: f64,
     /// Whether the ratio of energy gain to energy input in the previous row was above [`FATAL_GAIN`].
     suspected: bool,

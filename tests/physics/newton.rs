@@ -369,7 +369,8 @@ fn a_free_body_that_is_heated_expands_without_stress() {
                 let [dx, dy] = [x[k] - x[0], y[k] - y[0]];
                 let now = (dx + u[k] - u[0]).hypot(dy + v[k] - v[0]);
                 let stretch = now / dx.hypot(dy) - 1.0;
-                assert!((stretch - 1e-3).abs() < 1e-10, "{law} {k}: {stretch}");
+                // The bound is the stretch times the tolerance of the load steps, 1e-6.
+                assert!((stretch - 1e-3).abs() < 1e-9, "{law} {k}: {stretch}");
             }
         });
     }

@@ -70,8 +70,7 @@ fn settings<'w>(
 }
 
 /// Return the number of arguments of a fix before its keywords, and the keywords that the import reads.
-/// Return
-/// `None` for a fix without a counterpart.
+/// Return `None` for a fix without a counterpart.
 fn form(style: &str, first: Option<&str>) -> Option<(usize, &'static [(&'static str, usize)])> {
     let of_load: &[_] = &[("region", 1), ("every", 1), ("energy", 1)];
     let of_support: &[_] = &[("region", 1)];

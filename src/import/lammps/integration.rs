@@ -57,7 +57,7 @@ pub(super) fn hold(
         Some(true) => {}
         Some(false) => return,
         None => {
-            let note = "the lattice is too large to find the points of no such fix, which do not move in LAMMPS";
+            let note = "the lattice is too large to find the points that no fix integrates; they do not move in LAMMPS";
             translation.leave_out_load(&integrators[0].node, "condition", HELD, note);
             return;
         }
@@ -65,13 +65,13 @@ pub(super) fn hold(
     let set = write_set(translation, model, HELD, &rest);
     let written = translation.new_name("condition", HELD);
     let mut section = Section::new(format!("condition.{written}"));
-    section.comment("Points without a fix such as `nve`: in LAMMPS they do not move.");
+    section.comment("In LAMMPS, points that no fix such as `nve` integrates do not move.");
     section
         .set("set", Value::text(set))
         .set("velocity", Value::numbers(&[0.0; 3]));
     translation.add(section);
     for fix in integrators {
-        let note = format!("[condition.{written}] holds the points of no such fix");
+        let note = format!("[condition.{written}] holds the points that no fix integrates");
         translation.log.taken(&fix.node, note);
     }
 }

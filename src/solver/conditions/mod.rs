@@ -49,8 +49,7 @@ pub struct OnPart<const D: usize> {
 ///
 /// f is the force density of a load or a reaction, u is the displacement, and V is the volume of a point. A
 /// load step in which bonds break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work
-/// is
-/// ½ (f₀ + f₁)·(u₁ − u₀) V.
+/// is ½ (f₀ + f₁)·(u₁ − u₀) V.
 /// From 1 to 2, supports do not move, and the force density of loads remains f₁. The displacement u₁ is not
 /// stored for equilibrium 2. Therefore the work of loads from 0 to 2 is the sum of two terms. The first term
 /// is added at equilibrium 1, and the second term at equilibrium 2:

@@ -64,7 +64,8 @@ pub struct HistoryObserver {
     largest_past_energy: f64,
 }
 
-/// Columns of the energies that earlier rows contain.
+/// Columns whose largest value in earlier rows is the largest energy before a restart. The kinetic energies
+/// of rigid bodies, one column per body, are left out.
 const ENERGIES: [&str; 6] = [
     "kinetic_energy",
     "strain_energy",
