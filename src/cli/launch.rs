@@ -1,7 +1,6 @@
 //! Start of MPI and of the threads. The environment variables of the launcher (the program that starts the
 //! ranks) give the rank, the number of ranks on the host and the number of threads.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -34,12 +33,9 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
         }
         return finish(Err(error), speaks);
     }
+    comm::mpi::abort_on_panic();
     let speaks = world.rank() == 0;
-    // A panic on one rank would make the other ranks hang, so abort all ranks. The panic message has been
-    // printed.
-    catch_unwind(AssertUnwindSafe(|| body(&world)))
-        .unwrap_or_else(|_| world.abort(1))
-        .unwrap_or_else(|error| finish(Err(error), speaks))
+    body(&world).unwrap_or_else(|error| finish(Err(error), speaks))
 }
 
 /// Time by which all processes except rank 0 delay their exit, so that rank 0 can print an error.

@@ -36,7 +36,7 @@ pub struct PeerBuffers {
 /// Work that overlaps with an exchange; see [`Communicator::exchange`].
 pub type During<'a> = dyn FnMut(&mut dyn FnMut() -> bool) + 'a;
 
-/// A group of ranks. All methods except [`Self::rank`], [`Self::size`], [`Self::abort`] and [`Self::raw`] are
+/// A group of ranks. All methods except [`Self::rank`], [`Self::size`] and [`Self::raw`] are
 /// collective.
 pub trait Communicator {
     /// This rank's number, from 0.
@@ -65,9 +65,6 @@ pub trait Communicator {
     /// Large messages progress only inside MPI calls. Therefore `during` should call its argument from time
     /// to time. Each call of the argument drives progress and returns true while any message is in flight.
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>);
-
-    /// Abort all ranks after an error that they can no longer report collectively.
-    fn abort(&self, code: i32) -> !;
 
     /// The raw MPI handle; `None` without MPI.
     fn raw(&self) -> Option<RawCommunicator>;

@@ -45,6 +45,16 @@ pub fn is_running() -> bool {
     mpi::environment::is_initialized()
 }
 
+/// From now on, a panic on any thread aborts all ranks with exit code 1 after its message is printed. Without
+/// this, the other ranks would wait for the rank that panicked. MPI must be running.
+pub fn abort_on_panic() {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        print(panic);
+        SimpleCommunicator::world().abort(1);
+    }));
+}
+
 /// Name and version of the MPI library. MPI does not have to be running.
 pub fn library() -> String {
     let text = mpi::environment::library_version().unwrap_or_default();
@@ -323,10 +333,6 @@ impl Communicator for World {
         drop(in_flight);
     }
 
-    fn abort(&self, code: i32) -> ! {
-        self.world.abort(code)
-    }
-
     fn raw(&self) -> Option<RawCommunicator> {
         // SAFETY: reads a constant of the MPI library.
         Some(unsafe { RSMPI_COMM_WORLD })
@@ -335,7 +341,33 @@ impl Communicator for World {
 
 #[cfg(test)]
 mod tests {
+    use std::process::{Command, Stdio};
+
     use super::*;
+
+    /// Environment variable that makes [`panics_abort_all_ranks`] the child that panics.
+    const CHILD: &str = "FISSURE_TEST_PANIC";
+
+    #[test]
+    fn panics_abort_all_ranks() {
+        if std::env::var_os(CHILD).is_some() {
+            let _world = World::start().unwrap();
+            abort_on_panic();
+            let panicked = std::thread::spawn(|| panic!("on purpose")).join();
+            unreachable!("the thread ended with {panicked:?}");
+        }
+        let name = std::thread::current().name().unwrap().to_owned();
+        let child = Command::new(std::env::current_exe().unwrap())
+            .args([&name, "--exact", "--nocapture"])
+            .env(CHILD, "1")
+            .stdout(Stdio::null())
+            .output()
+            .unwrap();
+        assert_eq!(child.status.code(), Some(1));
+        let errors = String::from_utf8_lossy(&child.stderr);
+        assert!(errors.contains("on purpose"), "{errors}");
+        assert!(!errors.contains("the thread ended"), "{errors}");
+    }
 
     #[test]
     fn library_names_and_versions() {

@@ -151,10 +151,6 @@ impl Communicator for ThreadRank {
         }
     }
 
-    fn abort(&self, code: i32) -> ! {
-        std::process::exit(code)
-    }
-
     fn raw(&self) -> Option<RawCommunicator> {
         None
     }
