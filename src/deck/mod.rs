@@ -7,6 +7,7 @@ mod contact;
 mod damage;
 mod difference;
 mod explain;
+mod from_toml;
 pub mod grammar;
 mod group_name;
 mod history;
@@ -35,6 +36,8 @@ mod validate;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+
+use toml::de::DeTable;
 
 pub use difference::{differences, history_differences};
 pub use schema::schema;
@@ -103,8 +106,10 @@ impl Deck {
     /// # Errors
     /// If the text does not follow the grammar; the message is as in [`read`].
     pub fn new(source: Source) -> Result<Self> {
-        let grammar = toml::from_str(&source.text)
-            .map_err(|error| toml_error::toml_error(&source, &error))?;
+        let tree = DeTable::parse(&source.text)
+            .map_err(|error| toml_error::syntax_error(&source, &error))?;
+        let grammar = from_toml::from_table(tree.get_ref(), tree.span())
+            .map_err(|error| toml_error::grammar_error(&source, tree.get_ref(), &error))?;
         Ok(Self {
             source,
             grammar,

@@ -1,9 +1,10 @@
 //! Merging of overlay decks into a deck.
 
+use toml::de::DeTable;
 use toml_edit::{DocumentMut, Item, TableLike};
 
 use super::source::Source;
-use super::toml_error::toml_error;
+use super::toml_error::syntax_error;
 use crate::error::Result;
 
 /// Return the text of a deck merged with overlays; later overlays override earlier overlays. Tables are
@@ -32,8 +33,8 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
 /// Parse a text to a document that keeps comments and blanks.
 fn document(source: &Source) -> Result<DocumentMut> {
     // Errors of this parser have the same text as for decks without overlays.
-    if let Err(error) = source.text.parse::<toml::Table>() {
-        return Err(toml_error(source, &error));
+    if let Err(error) = DeTable::parse(&source.text) {
+        return Err(syntax_error(source, &error));
     }
     let parsed = source.text.parse::<DocumentMut>();
     parsed.map_err(|error| source.error(error.span().unwrap_or(0..0), error.message()))

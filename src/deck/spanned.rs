@@ -2,35 +2,89 @@
 
 use std::borrow::{Borrow, Cow};
 use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::{Deserialize, Serialize};
+use serde::de::{Error as _, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A value and its byte range in the deck. Comparison and hash use the value only.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Deserialize, Serialize)]
-#[serde(transparent)]
-pub struct Spanned<T>(serde_spanned::Spanned<T>);
+#[derive(Debug, Clone)]
+pub struct Spanned<T> {
+    span: Range<usize>,
+    value: T,
+}
+
+/// Name by which [`from_toml`](super::from_toml) recognises a [`Spanned`].
+pub const SPANNED: &str = "Spanned";
 
 impl<T> Spanned<T> {
     /// Create a value with this byte range.
     pub fn new(span: Range<usize>, value: T) -> Self {
-        Self(serde_spanned::Spanned::new(span, value))
+        Self { span, value }
     }
 
     /// Return the byte range.
     pub fn span(&self) -> Range<usize> {
-        self.0.span()
+        self.span.clone()
     }
 
     /// Return a reference to the value.
     pub fn get_ref(&self) -> &T {
-        self.0.get_ref()
+        &self.value
     }
 
     /// Return a mutable reference to the value.
     pub fn get_mut(&mut self) -> &mut T {
-        self.0.get_mut()
+        &mut self.value
+    }
+}
+
+impl<T: PartialEq> PartialEq for Spanned<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+impl<T: Eq> Eq for Spanned<T> {}
+
+impl<T: Hash> Hash for Spanned<T> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.value.hash(state);
+    }
+}
+
+/// The value alone.
+impl<T: Serialize> Serialize for Spanned<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.value.serialize(serializer)
+    }
+}
+
+/// A list of start, end and value.
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Spanned<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct SpannedVisitor<T>(PhantomData<T>);
+
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for SpannedVisitor<T> {
+            type Value = Spanned<T>;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("start, end and value")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Spanned<T>, A::Error> {
+                let missing = |count| A::Error::invalid_length(count, &self);
+                let start = list.next_element()?.ok_or_else(|| missing(0))?;
+                let end = list.next_element()?.ok_or_else(|| missing(1))?;
+                let value = list.next_element()?.ok_or_else(|| missing(2))?;
+                Ok(Spanned::new(start..end, value))
+            }
+        }
+
+        deserializer.deserialize_tuple_struct(SPANNED, 3, SpannedVisitor(PhantomData))
     }
 }
 

@@ -1,13 +1,12 @@
-//! Translation of errors of the TOML parser into errors about the deck, with the key, the expected value and
+//! Translation of errors of the TOML parser and of serde into errors about the deck, with the key, the expected value and
 //! the given value.
 
 use std::ops::Range;
 
-use serde::Deserialize;
-use serde::de::IntoDeserializer;
-use serde::de::value::{Error as NameError, StrDeserializer};
+use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
+use super::from_toml::{Mismatch, NEITHER_NAME_NOR_TABLE, NOT_ONE_KEY, from_name};
 use super::grammar::{Crack, Damage, DimensionName, Form, OUTPUT_KEYS, Section, Shape};
 use super::source::Source;
 use crate::error::Error;
@@ -15,19 +14,21 @@ use crate::material::declarations;
 use crate::message::suggestion;
 use crate::problem::law;
 
-/// Translate an error of the TOML parser into an error about the deck.
-pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
+/// Return the error for a text that is not valid TOML.
+pub fn syntax_error(source: &Source, error: &toml::de::Error) -> Error {
     let span = error.span().unwrap_or(0..0);
-    let message = error.message().trim();
+    let message = match double_brackets(source, &span) {
+        Some(message) => message.to_owned(),
+        None => syntax_message(source, span.clone(), error.message().trim()),
+    };
+    source.error(span, message)
+}
+
+/// Return the message if `span` begins with a header in double brackets that needs single brackets.
+fn double_brackets(source: &Source, span: &Range<usize>) -> Option<&'static str> {
     let marked = &source.text[span.start..];
-    if marked.starts_with("[[") && !marked.starts_with("[[stage]]") {
-        let message = "a section has single brackets, as in `[body.plate]`";
-        return source.error(span, message);
-    }
-    match DeTable::parse(&source.text) {
-        Ok(tree) => grammar_error(source, tree.get_ref(), span, message),
-        Err(_) => source.error(span.clone(), syntax_message(source, span, message)),
-    }
+    let is_wrong = marked.starts_with("[[") && !marked.starts_with("[[stage]]");
+    is_wrong.then_some("a section has single brackets, as in `[body.plate]`")
 }
 
 /// Return the message for a text that is not valid TOML.
@@ -61,9 +62,13 @@ fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String 
     }
 }
 
-/// Return the error for a text that is valid TOML but not a valid deck.
-fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &str) -> Error {
-    let place = find(tree, &span, &mut Vec::new()).unwrap_or_default();
+/// Return the error for a text that is valid TOML, with the table `tree`, but not a valid deck.
+pub fn grammar_error(source: &Source, tree: &DeTable, mismatch: &Mismatch) -> Error {
+    let Mismatch { message, span } = mismatch;
+    if let Some(message) = double_brackets(source, span) {
+        return source.error(span.clone(), message);
+    }
+    let place = find(tree, span, &mut Vec::new()).unwrap_or_default();
     let mut quoted = message.split('`').skip(1).step_by(2);
     let first = quoted.next().unwrap_or_default();
     let error = |path: &[String], words: String| {
@@ -82,7 +87,7 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
             suggestion(key, OUTPUT_KEYS.into_iter())
         );
         let message = format!("[output]: {words}; a table with this name is a further output");
-        return source.error(span, message);
+        return source.error(span.clone(), message);
     }
     if message.starts_with("missing field") {
         return match (&place.path[..], first) {
@@ -104,15 +109,6 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
         let words = format!("unknown key `{first}`{}", suggestion(first, quoted));
         return error(place.parent(), words);
     }
-    if let Some(rest) = message.strip_prefix("unexpected keys in table: ") {
-        let (unknown, known) = rest.split_once(", available keys: ").unwrap_or((rest, ""));
-        let name = unknown.split(", ").next().unwrap_or_default();
-        let words = format!(
-            "unknown key `{name}`{}",
-            suggestion(name, known.split(", "))
-        );
-        return error(place.parent(), words);
-    }
     if message.starts_with("unknown variant") {
         let words = format!("unknown name `{first}`{}", suggestion(first, quoted));
         let is_value = place.value.is_some_and(DeValue::is_str);
@@ -125,12 +121,12 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
             words,
         );
     }
-    if let (Some(value), "wanted string or table") = (place.value, message) {
+    if let (Some(value), NEITHER_NAME_NOR_TABLE) = (place.value, message.as_str()) {
         let written = source.text.get(span.clone()).unwrap_or_default();
         let words = format!("must be a name in quotes, is {}", given(value, written));
         return error(&place.path, words);
     }
-    if message.starts_with("wanted exactly 1 element") {
+    if message == NOT_ONE_KEY {
         let section = place.path.first().map_or("", String::as_str);
         let kinds = match section {
             "material" => declarations().map(|law| law.name.to_owned()).collect(),
@@ -239,11 +235,10 @@ fn label(path: &[String]) -> String {
 
 /// Return the names of all variants of a grammar enum. The names are read from the message of a
 /// deserialization error.
-fn kinds<'de, T: Deserialize<'de>>() -> Vec<String> {
-    let nameless: StrDeserializer<NameError> = "".into_deserializer();
-    let message = T::deserialize(nameless)
+fn kinds<T: DeserializeOwned>() -> Vec<String> {
+    let message = from_name::<T>("")
         .err()
-        .map_or(String::new(), |error| error.to_string());
+        .map_or(String::new(), |error| error.message);
     let quoted = message.split('`').skip(3).step_by(2);
     quoted.map(str::to_owned).collect()
 }
@@ -270,7 +265,7 @@ fn wanted(expected: &str) -> &str {
         "u32" => "a whole number, 0 to 4294967295",
         "u64" => "a whole number, 0 or more",
         "a nonzero u64" => "a whole number, 1 or more",
-        "a map" | "a spanned value" | "newtype variant" | "struct variant" => "a table",
+        "a map" | "newtype variant" | "struct variant" => "a table",
         _ if expected.starts_with("struct ") => "a table",
         _ => expected,
     }
@@ -298,6 +293,7 @@ fn given(value: &DeValue, written: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::from_toml::from_text;
     use super::super::grammar::{Deck, SECTIONS};
     use super::*;
     use crate::deck;
@@ -454,7 +450,7 @@ values = [0, 1]
         }
     }
 
-    /// The messages about wrong decks depend on these words of the TOML parser.
+    /// The messages about wrong decks depend on these words of the TOML parser and of serde.
     #[test]
     fn the_reader_says_what_is_looked_for() {
         let grid = "dimension = 'plane-stress'\ngrid = { spacing = 1, horizon = 3 }\n";
@@ -478,11 +474,11 @@ values = [0, 1]
             ("dimension = '4d'", "unknown variant `4d`, expected "),
             (
                 "[body.plate.shape]\nbox = { lower = [0], upper = [1] }\ndisc = {}",
-                "wanted exactly 1 element",
+                NOT_ONE_KEY,
             ),
             (
                 "[crack.notch.segment]\nfrom = [0]\nto = [1]\nvia = [2]",
-                "unexpected keys in table: via, available keys: from, to, width",
+                "unknown field `via`, expected one of `from`, `to`, `width`",
             ),
             ("time = { end = 1, step = [] }", "invalid type: "),
             ("output = { every_steps = 0 }", "invalid value: "),
@@ -492,8 +488,12 @@ values = [0, 1]
             } else {
                 format!("{grid}{wrong}")
             };
-            let error = toml::from_str::<Deck>(&deck).err();
-            let message = error.map_or_else(String::new, |error| error.message().trim().to_owned());
+            let message = match DeTable::parse(&deck) {
+                Err(error) => error.message().trim().to_owned(),
+                Ok(_) => from_text::<Deck>(&deck)
+                    .err()
+                    .map_or(String::new(), |error| error.message),
+            };
             if !message.starts_with(said) {
                 others.push(format!("{wrong}: {message}"));
             }

@@ -365,11 +365,12 @@ pub struct JIntegral {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deck::from_toml::from_text;
 
     #[test]
     fn the_keys_of_an_output_are_listed() {
-        let error = toml::from_str::<Output>("unknown = 1").unwrap_err();
-        let keys: Vec<&str> = error.message().split('`').skip(3).step_by(2).collect();
+        let error = from_text::<Output>("unknown = 1").unwrap_err();
+        let keys: Vec<&str> = error.message.split('`').skip(3).step_by(2).collect();
         assert_eq!(keys, OUTPUT_KEYS);
     }
 
@@ -377,12 +378,12 @@ mod tests {
     fn tables_of_an_output_are_further_ones() {
         let text =
             "every = 1\nslice = { every_steps = 2 }\nfields = ['damage']\n[edge]\nset = 'left'\n";
-        let outputs: Outputs = toml::from_str(text).unwrap();
+        let outputs: Outputs = from_text(text).unwrap();
         assert!(outputs.main.every.is_some() && outputs.main.fields.is_some());
         let names: Vec<&String> = outputs.further.keys().collect();
         assert_eq!(names, ["slice", "edge"]);
         let written = toml::to_string(&outputs).unwrap();
-        let again: Outputs = toml::from_str(&written).unwrap();
+        let again: Outputs = from_text(&written).unwrap();
         assert_eq!(toml::to_string(&again).unwrap(), written);
     }
 }

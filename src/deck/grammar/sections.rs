@@ -202,11 +202,12 @@ impl Deck {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deck::from_toml::from_text;
 
     /// Return the keys of the deck, read from a deserialization error.
     fn fields(deck: &str) -> Vec<String> {
-        let error = toml::from_str::<Deck>(deck).unwrap_err();
-        let fields = error.message().split('`').skip(3).step_by(2);
+        let error = from_text::<Deck>(deck).unwrap_err();
+        let fields = error.message.split('`').skip(3).step_by(2);
         fields.map(str::to_owned).collect()
     }
 
