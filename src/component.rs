@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 /// Names of the components of a vector.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Names of the components of a symmetric tensor, in the order of the result.
+/// Names of the components of a symmetric tensor, in the order in which a result stores them.
 const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
 /// Names of the components of a tensor, row by row.

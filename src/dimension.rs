@@ -24,7 +24,7 @@ pub enum Dimension {
     Space,
 }
 
-/// Condition perpendicular to a bar.
+/// Condition perpendicular to a bar: no stress or no strain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Constraint {
     /// No stress perpendicular to the bar; the bar has the modulus E.

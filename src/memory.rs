@@ -31,9 +31,9 @@ pub fn check_room(needed: u64) -> Result<(), Shortage> {
     Ok(())
 }
 
-/// Return the memory that this process can still allocate, bytes. The limit of the address space
-/// (`ulimit -v`), the control group and the machine each leave some memory; the smallest of these amounts is
-/// returned. `u64::MAX` on systems that report none of the three.
+/// Return the memory that this process can still allocate, bytes. This is the smallest of three amounts: the
+/// memory left within the limit of the address space (`ulimit -v`), the memory left in the control group, and
+/// the memory left on the machine. `u64::MAX` on systems that report none of the three.
 fn available() -> u64 {
     let limits = [address_space(), control_group(), machine()];
     limits.into_iter().flatten().min().unwrap_or(u64::MAX)
@@ -62,8 +62,8 @@ fn control_group() -> Option<u64> {
     left_in_groups(Path::new("/sys/fs/cgroup"), Path::new(path))
 }
 
-/// Return the smallest amount of memory and swap (bytes) that is left in one of these control groups: `path`
-/// below `root`, and the groups above it. `None` if none of these groups has a limit.
+/// Compute the memory and swap that is left in the control group `path` below `root`, and in each group above
+/// it. Return the smallest of these amounts, bytes; `None` if none of these groups has a limit.
 fn left_in_groups(root: &Path, path: &Path) -> Option<u64> {
     let groups = path.ancestors().map(|group| root.join(group));
     groups.filter_map(|group| left_in_group(&group)).min()

@@ -60,7 +60,7 @@ mod tests {
     const COUNT: u64 = 20_000;
 
     /// Return the bound on the largest difference between the empirical distribution function of `count`
-    /// values and the true distribution function. At most one in a million samples exceeds the bound
+    /// values and the true distribution function. The probability of a larger difference is at most 10⁻⁶
     /// (Dvoretzky, Kiefer & Wolfowitz, with Massart's constant).
     fn bound(count: u64) -> f64 {
         (libm::log(2e6) / (2.0 * count as f64)).sqrt()

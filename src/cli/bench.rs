@@ -57,7 +57,7 @@ impl Law {
     }
 
     /// Return the number of floating-point operations per directed bond and step, without the operations that
-    /// compute ξ and |ξ|. With `failure`, include the test for failure. See
+    /// compute ξ and |ξ|. If `failure` is true, count the operations of the failure test, too. See
     /// docs/src/developers/performance.md.
     fn operations(self, failure: bool) -> u64 {
         match self {
@@ -90,8 +90,8 @@ impl Family {
     }
 }
 
-/// Largest allowed fraction of the points that touch other points. With this limit, the distance between
-/// adjacent cracks is larger than the horizon.
+/// Upper limit of the argument of `--contact`: the number of points that touch other points, divided by the
+/// number of all points. With this limit, the distance between adjacent cracks is larger than the horizon.
 const MOST_TOUCHING: f64 = 0.25;
 
 /// Initial strain of the block along x in a benchmark with contact. The strain presses the faces of each
@@ -136,8 +136,8 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// Return the deck of the benchmark. A small initial displacement avoids zeros, because some processors
-/// compute faster with zeros.
+/// Return the deck of the benchmark. Some processors compute faster with zeros. The deck therefore contains
+/// a small initial displacement.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
     let breaking = arguments.law.damage();

@@ -19,7 +19,8 @@ pub struct Phase {
     pub slowest: f64,
 }
 
-/// Measured limits of all cores, and the rates that the time loop reaches.
+/// Memory bandwidth and operation rate: the measured limits of all cores together, and the rates that the
+/// time loop reaches.
 pub struct Limited {
     /// Triad bandwidth, bytes/s.
     pub bandwidth: f64,
@@ -64,14 +65,14 @@ pub struct Figures {
     /// Phases of the time loop; the last entry is the total.
     pub phases: Vec<Phase>,
     /// Memory: name and size (bytes, sum over the ranks) of each entry. One entry is the memory of the stored
-    /// bonds. The other entries are the memory of the processes at several times. The last entry is the peak
-    /// memory of the processes.
+    /// bonds. The last entry is the peak memory of the processes. The other entries are the memory of the
+    /// processes at several times.
     pub memory: Vec<(&'static str, f64)>,
     /// Bytes that all ranks send per step in halo exchanges.
     pub halo_bytes: f64,
     /// Communication time per step that does not overlap with computation, mean over the ranks, s.
     pub messages_time: f64,
-    /// Communication time per step if nothing overlaps, mean over the ranks, s.
+    /// Communication time per step if no computation overlaps with it, mean over the ranks, s.
     pub messages_time_alone: f64,
     /// Number of messages that all ranks send per step in halo exchanges.
     pub messages: f64,

@@ -101,8 +101,8 @@ fn report(request: &Request) -> Result<String> {
     }
 }
 
-/// Compute the properties of the interior of each body, where families are complete. `None` for a body
-/// without a lattice, and if the computation fails.
+/// Compute the properties of the interior of each body, where families are complete. The entry of a body is
+/// `None` if the body has no lattice, or if the computation fails.
 fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
     (0..problem.bodies.len())
         .map(|body| interior(problem, body))

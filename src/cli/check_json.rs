@@ -156,7 +156,7 @@ fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map
     entry
 }
 
-/// Return the figures of a body's points.
+/// Return the JSON entries with the figures of a body, and the entry that says whether its bonds can break.
 fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String, Value> {
     let mut entry = object(json!({
         "points": figures.points,

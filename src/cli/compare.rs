@@ -232,8 +232,8 @@ fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     }
 }
 
-/// Append a table of differences. With `lists_equal`, the table includes equal quantities. Otherwise, a line
-/// with the number of equal quantities follows.
+/// Append a table of differences. With `lists_equal`, the table includes equal quantities. Without it, the
+/// table omits equal quantities, and a line below the table states their number.
 fn table(
     text: &mut String,
     heading: &str,

@@ -117,8 +117,8 @@ pub fn slurm(arguments: &SlurmArguments) -> Result<()> {
 }
 
 impl Script {
-    /// Return a script of the folder `slurm/`. The script contains the text of `slurm/launch`, so it needs no
-    /// other file.
+    /// Return this job script of the folder `slurm/` as text. The text contains that of `slurm/launch`, so
+    /// the script needs no other file.
     fn text(self) -> String {
         let (name, script) = match self {
             Self::Hybrid => ("hybrid", include_str!("../../slurm/hybrid.sbatch")),

@@ -26,7 +26,8 @@ pub struct ImportArguments {
     /// Deck to translate: YAML, XML, or an input script of LAMMPS.
     deck: PathBuf,
 
-    /// Path of the new deck [default: the path of the source deck with the ending .toml].
+    /// Path of the new deck [default: the path of the source deck: .toml replaces the ending .yaml, .yml,
+    /// .xml or .peridigm, and is appended to other names].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 

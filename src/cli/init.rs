@@ -76,7 +76,7 @@ impl Template {
 /// Write a deck to a new file. If the deck reads a data file, write this file into the same folder.
 ///
 /// # Errors
-/// - If the deck exists.
+/// - If the file of the deck already exists.
 /// - If the data file exists with other content, or has the path of the deck.
 /// - If a file cannot be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {

@@ -51,7 +51,8 @@ const SIZES: [&str; 5] = [
     "SLURM_STEP_NUM_TASKS",
 ];
 
-/// Return the variable with the number of launched processes, and that number; `None` without a launcher.
+/// Return the name of the variable that gives the number of launched processes, and this number. `None`
+/// without a launcher.
 fn started() -> Option<(&'static str, usize)> {
     SIZES
         .iter()

@@ -48,7 +48,8 @@ fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     (0..REPETITIONS).map(once).fold(f64::INFINITY, f64::min)
 }
 
-/// Size of each array of a thread, divided by the thread's share of the last-level cache.
+/// Size of each array with which a thread measures the bandwidth, divided by the thread's share of the
+/// last-level cache.
 const CACHES: usize = 4;
 
 fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {

@@ -266,8 +266,8 @@ struct BenchArguments {
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Size of the block. N is the number of points of a cube; it is rounded to a cube number. X,Y,Z are the
-    /// numbers of points along the edges.
+    /// Size of the block. With one number N, the block is a cube with N points; N is rounded to a cube
+    /// number. X,Y,Z are the numbers of points along the edges.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 

@@ -10,7 +10,7 @@ use super::format::si;
 
 /// Time from the start to the first line, s.
 const FIRST_LINE: f64 = 5.0;
-/// Time from the start to the second line, and minimum interval between later lines, s.
+/// Time from the start to the second line, s. The intervals between later lines are at least as long.
 const MINUTE: f64 = 60.0;
 /// Minimum interval between later lines, as a fraction of the elapsed time. A run of one day prints about
 /// sixty lines.
@@ -29,7 +29,7 @@ pub enum Progress {
     Lines {
         /// Word for a step in the printed lines, such as `step` or `frame`.
         noun: &'static str,
-        /// Start of the display.
+        /// Time at which the display started.
         start: Instant,
         /// Number of steps that were complete at the start.
         first: u64,

@@ -104,9 +104,9 @@ fn run_deck(
 
 /// Observer that prints the messages and the progress of a run.
 struct Log {
-    /// This rank prints messages, warnings and progress.
+    /// Whether this rank prints messages, warnings and progress.
     prints: bool,
-    /// This rank also prints verbose messages.
+    /// Whether this rank also prints verbose messages.
     verbose: bool,
     title: String,
     /// Names of the bodies.

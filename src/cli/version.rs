@@ -5,8 +5,8 @@ use fissure::comm::mpi;
 use fissure::lanes::instructions::{BUILT, Instructions};
 use fissure::output;
 
-/// Print the versions of the program, MPI and HDF5, the best instruction set of this machine, and all
-/// instruction sets of this build.
+/// Print the versions of the program, MPI and HDF5. Also print the best instruction set of this machine, and
+/// all instruction sets of this build.
 pub fn print() {
     let best = Instructions::of_this_machine();
     let all = BUILT.join(", ");

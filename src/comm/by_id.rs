@@ -12,7 +12,8 @@ use rayon::prelude::*;
 
 use super::Communicator;
 
-/// The exchange plan between the owned points of a rank and its range of ids.
+/// The exchange plan of a rank. It covers the points that the rank owns and the points in the rank's range of
+/// ids.
 pub struct IdOrder {
     first: u64,
     count: usize,
@@ -151,7 +152,7 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
 /// Rows that stay on this rank are copied. Collective.
 ///
 /// For each rank q, `from_rows` lists the rows of `values` to send to q. `to_rows` lists the rows of the
-/// result to receive from q, in the order in which q sends them. `from` returns the range of a row in
+/// result that come from q, in the order in which q sends them. `from` returns the range of a row in
 /// `values`, and `to` the range of a row in the result.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,

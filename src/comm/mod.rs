@@ -163,7 +163,7 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     Err(unpack(&packed))
 }
 
-/// Value that is packed as the span of an error without a span.
+/// Value that is packed in place of the span if an error has no span.
 const NO_SPAN: [u64; 2] = [u64::MAX; 2];
 
 /// Number of bytes of a packed error before its message: exit code, and start and end of the span.

@@ -1,5 +1,5 @@
-//! Energy criterion: a bond breaks irreversibly when the work of its force states reaches w_c. By default
-//! only stretched bonds break.
+//! Energy criterion: a bond breaks irreversibly when the work of its force states reaches the critical work
+//! w_c. By default only stretched bonds break.
 //!
 //! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. For force states that are linear
 //! in η, the work is w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. Breaking all bonds across a unit area dissipates G0. In the
@@ -17,12 +17,13 @@ use crate::dimension::Dimension;
 pub enum Calibration {
     /// Breaking all bonds across a unit area dissipates the fracture energy.
     Energy,
-    /// Opening a crack dissipates the fracture energy. w_c is that of [`Self::Energy`], divided by the
-    /// separation energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio before a run;
-    /// `None` until then.
+    /// Opening a crack dissipates the fracture energy. w_c is computed as for [`Self::Energy`], and then
+    /// divided by the separation energy ratio. [`crate::solver::calibration::calibrated`] computes this ratio
+    /// before a run; `None` until then.
     Opening(Option<f64>),
     /// Willberg et al. 2022, eq. 16 and 18, as printed: w has no factor ½, and in the plane w_c is
-    /// 3G0/(πδ³h). This w is the work on η, so the criterion holds for small rotations only.
+    /// 3G0/(πδ³h). This w is the work on η, and a rigid rotation changes η. Therefore the criterion holds for
+    /// small rotations only.
     Willberg2022,
     /// PeriLab's formula: a bond breaks when ¼ |(T_i − T_j)·η| is 3G0/(πδ³h) in the plane, or 4G0/(πδ⁴) in
     /// space.

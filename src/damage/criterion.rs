@@ -24,17 +24,18 @@ pub enum Criterion {
     /// Bonds break at this stretch.
     Stretch(f64),
     /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
-    /// of both blocks, 0 for a block without critical stretch. A law that scales thresholds scales only these
-    /// critical stretches, not the term of the threshold that contains α.
+    /// of both blocks, 0 for a block without critical stretch. If the law scales thresholds, it scales only
+    /// these critical stretches. It does not scale the term α s_min of `CriticalStretch::threshold`.
     Thresholds([f64; 2], Directions),
     /// Same as [`Self::Stretch`], with a separate critical stretch of each block; ∞ for a block without
     /// critical stretch.
     StretchBetween([f64; 2], StretchConversion),
-    /// Same as [`Self::Thresholds`], for thresholds that belong to different horizons.
+    /// Same as [`Self::Thresholds`], for thresholds of points i and j that belong to different horizons.
+    /// [`StretchConversion`] converts these thresholds to the critical stretch of the bond.
     ThresholdsBetween([f64; 2], StretchConversion, Directions),
-    /// Each acting end contributes the work of its force state, and a share of the critical work. Bonds break
-    /// when the sum of the works reaches the sum of the shares. The numbers are the shares of points i and j,
-    /// J/m⁶.
+    /// Bonds break when their work reaches their critical work. Each end that acts on a bond adds the work of
+    /// its force state to the work of the bond. The end also adds its share to the critical work of the bond.
+    /// The numbers are the shares of points i and j, J/m⁶.
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the shares computed from the work thresholds of points i and j.
     WorkThresholds(HorizonRatios, WorkRule, Directions),
@@ -45,8 +46,8 @@ pub enum Criterion {
     StressThresholds(StressRule),
 }
 
-/// Factors on the critical work at points i and j, which depend on the bond's direction: the factors w_c/w of
-/// [`ToughnessByDirection`]. `None` if the fracture energy of neither body depends on the direction. The
+/// Factors w_c/w on the critical work at points i and j, see [`ToughnessByDirection`]. The factors depend on
+/// the direction of the bond. `None` if the fracture energy of neither body depends on the direction. The
 /// factors multiply work thresholds; their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
@@ -60,8 +61,9 @@ pub type HorizonRatios = [[f64; 2]; 2];
 /// An end e acts on the bond if the bond is within the horizon of e. The energy of the bond at this end is
 /// then ½ k_e s² |ξ|, with the stiffness k_e.
 ///
-/// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k, with the critical stretch
-/// t_k of point k and the factor r_ek of [`Self::ratios`].
+/// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k. The minimum is over the
+/// points k of the bond: k = i and k = j. Here t_k is the critical stretch of point k, and r_ek is the factor
+/// in [`Self::ratios`].
 ///
 /// With sums over the acting ends, the bond breaks when Σ ½ k_e s² |ξ| reaches Σ ½ k_e m_e² |ξ|. The critical
 /// stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
@@ -256,8 +258,8 @@ impl Criterion {
         }
     }
 
-    /// Return one bit per bond, set if the bond meets the criterion. `laws` are the laws of points i and j,
-    /// and `points` the numbers [`Law::Point`] of these points. `work` (J/m⁶) is read only if
+    /// Return one bit per bond, set if the bond meets the criterion. `laws` are the laws of points i and j.
+    /// `points` are the point numbers ([`Law::Point`]) of points i and j. `work` (J/m⁶) is read only if
     /// [`Self::reads_work`] is true.
     #[inline(always)]
     pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
@@ -377,8 +379,9 @@ impl Criterion {
         }
     }
 
-    /// Return, for each broken bond, the part of its energy above the threshold, as a fraction of its energy:
-    /// 1 − (s_c/s)², 1 − w_c/w or 1 − (σ_c/σ)², at least 0. s, w and σ are the stretch, work and stress of
+    /// Return the overshoot energy of each broken bond, as a fraction of the energy of the bond. The
+    /// overshoot energy is the part of the energy above the threshold. The fraction is 1 − (s_c/s)²,
+    /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0. s, w and σ are the stretch, work and stress of
     /// the bond, and s_c, w_c and σ_c are their thresholds. Bonds exceed the threshold because the criterion
     /// is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`. `scale`
     /// is the factor [`Law::toughness_scale`] on critical stretches; `None` for laws that do not scale them.
@@ -413,7 +416,7 @@ impl Criterion {
 
 impl WorkRule {
     /// Combine the rules of two blocks for the bonds between them. Compressed bonds break only if both rules
-    /// allow it. The combined rule has the smaller of the two factors [`Self::family_correction`]. The work
+    /// allow it. [`Self::family_correction`] of the combined rule is the smaller of the two factors. The work
     /// is objective if at least one rule requires objective work.
     pub fn of_both(self, other: Self) -> Self {
         Self {
@@ -433,9 +436,9 @@ impl WorkRule {
     }
 
     /// Return the critical work of bonds (J/m⁶): the sum of the [corrected](Self::corrected) shares of the
-    /// acting ends. `i` and `j` are the shares of points i and j without this correction. The sum is written
-    /// out, because array methods are not always inlined. Without inlining, all data of a bond stay in memory
-    /// instead of registers.
+    /// acting ends. `i` and `j` are the uncorrected shares of points i and j. The sum is written out, because
+    /// array methods are not always inlined. Without inlining, all data of a bond stay in memory instead of
+    /// registers.
     #[inline(always)]
     fn sum_of_acting<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], ends: Ends<'_>) -> Lanes {
         let [acts_i, acts_j] = ends.weights.acting();

@@ -5,8 +5,8 @@
 //! horizons of both points are equal, the smaller threshold of points i and j holds for a bond, so that both
 //! ends agree. If the thresholds belong to different horizons,
 //! [`StretchConversion`](crate::damage::StretchConversion) computes the threshold of the bond from the two
-//! thresholds. With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6. The
-//! comparison is in [`Criterion::breaking`](crate::damage::Criterion::breaking).
+//! thresholds. With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6.
+//! [`Criterion::breaking`](crate::damage::Criterion::breaking) tests the criterion.
 
 use std::f64::consts::PI;
 
@@ -27,8 +27,8 @@ pub struct CriticalStretch {
 
 impl CriticalStretch {
     /// Return s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio of
-    /// bond-based laws. In the table, K is the bulk modulus and E Young's modulus (Pa), c is the micromodulus
-    /// of `pmb`, and A the cross-section (m²).
+    /// bond-based laws. In the table, K is the bulk modulus (Pa), E is Young's modulus (Pa), c is the
+    /// micromodulus of `pmb`, and A is the cross-section (m²).
     ///
     /// | dimension | s0 | source |
     /// |---|---|---|
@@ -81,9 +81,9 @@ impl CriticalStretch {
     /// Return the critical stretch of bonds between two bodies whose interface opens at a normal stress σ
     /// (Pa).
     ///
-    /// Under the tension σ along the normal, a body has the strain σ/E′. The result is the mean of the
-    /// strains of the two bodies. At this tension, a bond along the normal has this stretch if half of the
-    /// bond lies in each body.
+    /// Under a tension σ normal to the interface, each body has the normal strain σ/E′, with the modulus E′
+    /// below. The result is the mean of the strains of the two bodies. At this tension, a bond along the
+    /// normal has this stretch if half of the bond lies in each body.
     ///
     /// E′ is:
     ///

@@ -7,12 +7,13 @@
 //!
 //! Cracks along the vector a have a normal perpendicular to this vector. Cracks across a have the normal a. w
 //! is the critical work of an isotropic body whose fracture energy equals the fracture energy of cracks along
-//! a. If cracks across a have the larger fracture energy, c = (n·a)²; otherwise c = 1 − (n·a)².
+//! a. If the fracture energy of cracks across a is at least the fracture energy of cracks along a,
+//! c = (n·a)². Otherwise, c = 1 − (n·a)².
 //!
 //! A crack with the normal N breaks all bonds that cross its plane. The fracture energy of this crack is
 //! proportional to a weighted mean of w_c(n): the mean is over all directions n, and the weight of a
-//! direction is |n·N|. With the same weight, the mean of c^k is the product of the
-//! following factors over j = 1 … k, for N parallel (∥) or perpendicular (⊥) to a:
+//! direction is |n·N|. With the same weight, the mean of c^k is a product of k factors. The table gives the
+//! factor j (j = 1 … k) for N parallel (∥) or perpendicular (⊥) to a:
 //!
 //! | c | N | plane | space |
 //! |---|---|---|---|
@@ -22,9 +23,9 @@
 //! | 1 − (n·a)² | ⊥ a | 2j/(2j + 1) | (2j + 1)/(2j + 2) |
 //!
 //! p and q follow from k and the fracture energies of cracks along and across a. k = 1 is used if it gives
-//! p ≥ 0.1; otherwise k is 2. If p < 0.1 with k = 2 too, the fracture energies are rejected: bonds in the
-//! weak direction would break at small strains, far from any crack. A critical stretch is multiplied by
-//! √(w_c/w).
+//! p ≥ 0.1; otherwise k is 2. If k = 2 also gives p < 0.1, the fracture energies are rejected, because
+//! bonds in the weak direction would break at small strains, far from any crack. A critical stretch is
+//! multiplied by √(w_c/w).
 
 use std::f64::consts::PI;
 
@@ -42,8 +43,8 @@ const LEAST_CONSTANT_PART: f64 = 0.1;
 /// Tolerance of [`LEAST_CONSTANT_PART`] for the round-off of p.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of directions per quarter of a circle, in sums over all directions. In 3-D, the
-/// sums also divide the range of the z component from 0 to 1 into this number of steps.
+/// Resolution of a sum over all directions: the number of azimuths per quarter of a circle. In 3-D, this
+/// is also the number of z components between 0 and 1.
 const DIRECTIONS: u32 = 256;
 
 /// Factor w_c/w of the critical work of a bond, as a function of the bond's direction.
@@ -72,8 +73,8 @@ impl ToughnessByDirection {
     };
 
     /// Create the factor w_c/w in 2 or 3 dimensions. `axis` is the unit vector a. `ratio` is the fracture
-    /// energy of cracks across a, divided by the fracture energy of cracks along a. `None` if `ratio` is
-    /// outside [`Self::limits`].
+    /// energy of cracks across this vector, divided by the fracture energy of cracks along this vector.
+    /// `None` if `ratio` is outside [`Self::limits`].
     pub fn new(dimension: usize, axis: [f64; 3], ratio: f64) -> Option<Self> {
         let is_tough_across = ratio >= 1.0;
         (0..=MOST_SQUARINGS).find_map(|squarings| {
@@ -90,8 +91,8 @@ impl ToughnessByDirection {
         })
     }
 
-    /// Return the smallest and the largest `ratio` that [`Self::new`] accepts. Beyond these limits, p is
-    /// below its minimum.
+    /// Return the smallest and the largest `ratio` that [`Self::new`] accepts. For other ratios, the constant
+    /// part p of w_c/w is below `LEAST_CONSTANT_PART`.
     pub fn limits(dimension: usize) -> [f64; 2] {
         [false, true].map(|is_tough_across| {
             let [across, along] = means(dimension, is_tough_across, MOST_SQUARINGS);
@@ -126,8 +127,8 @@ impl ToughnessByDirection {
         self.constant_part + self.power_factor * across
     }
 
-    /// Fracture energy of cracks with this unit normal, divided by the fracture energy of cracks along a. The
-    /// quotient is computed as a sum over bond directions.
+    /// Fracture energy of cracks with this unit normal, divided by the fracture energy of cracks along the
+    /// axis a. The quotient is computed as a sum over bond directions.
     pub fn relative_fracture_energy(&self, dimension: usize, normal: [f64; 3]) -> f64 {
         let quarter = f64::from(DIRECTIONS);
         let mut sums = [0.0; 2];

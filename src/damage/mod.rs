@@ -56,7 +56,8 @@ impl DamageLaw {
         }
     }
 
-    /// Whether bonds break at a critical work, and rigid rotation does no work ([`WorkMeasure::Objective`]).
+    /// Whether bonds break at a critical work that is measured such that rigid rotation does no work
+    /// ([`WorkMeasure::Objective`]).
     pub fn is_objective_work(&self) -> bool {
         match self {
             Self::CriticalStretch(_) | Self::Stress(_) => false,

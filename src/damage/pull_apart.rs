@@ -19,7 +19,7 @@ use crate::material::Influence;
 /// Number of distances from a point to the plane, in the quadrature of τ.
 const DISTANCES: u32 = 48;
 
-/// Number of bond lengths per distance in the quadrature of τ.
+/// Number of bond lengths in the quadrature of τ, for each distance from a point to the plane.
 const LENGTHS: u32 = 64;
 
 /// Number of angles φ per bond length in the quadrature of τ.

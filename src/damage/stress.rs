@@ -85,9 +85,9 @@ pub struct StressLimit {
     pub rule: StressRule,
 }
 
-/// Computation of the mean stress measure of each bond, Pa. An end counts in the mean if the bond is within
-/// the horizon of the end, and the point at this end carries stress. The result also has one bit per bond,
-/// set if at least one end counts. The result is the same for points i and j.
+/// Computation of the mean stress measure of each bond, Pa. An end counts in the mean if its point carries
+/// stress and the bond is within the horizon of this point. The result also has one bit per bond, set if at
+/// least one end counts. The result does not change if points i and j are exchanged.
 pub(super) struct MeanStress {
     stresses: [Lanes; 2],
     acting: [u8; 2],

@@ -25,8 +25,8 @@ const MOST_BODIES: usize = 256;
 /// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
 /// the material does not support, an invalid number or shape, or a body without exactly one source of points.
 /// If a spacing is missing, the name of a mesh file has an unknown ending, or a key does not belong to the
-/// source of points. If two bodies request the same rows or elements of a file, or name different columns of
-/// the same file.
+/// source of points. If two bodies request the same rows or elements of a file, or have different `columns`
+/// for the same file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -96,7 +96,7 @@ pub fn bodies(
 /// in `[grid]`: the edges of a lattice cell, m.
 ///
 /// # Errors
-/// On the errors that [`bodies`] finds in the sources of points. However, spacings are not compared with the
+/// On the same errors in the sources of points as [`bodies`], except that spacings are not compared with the
 /// horizon.
 pub fn point_sources(
     scope: &Scope,
@@ -143,8 +143,8 @@ fn are_possible(scope: &Scope, deck: &Deck) -> Result<()> {
 /// Set the grid origins of a deck without `origin`. Bodies with the same spacing share an origin, so that
 /// their points stay aligned. In each direction, one of these bodies determines the origin: the first body
 /// that has two flat faces a whole number of cells apart. If a grid with the origin 0 fills this body
-/// exactly, the origin is 0. Otherwise, the origin is the coordinate of the lower face of this body. If there
-/// is no such body, the origin is 0.
+/// exactly, the origin is 0. Otherwise, the origin is the coordinate of the lower face of this body. If no
+/// body has two such faces, the origin is 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -181,9 +181,11 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
 /// Tolerance for the deviation of a length from a whole number of cells, as a fraction of a cell's edge.
 const WHOLE: f64 = 1e-6;
 
-/// Return the grid origin along an axis, m, from which cells with the edge `edge` (m) fill a shape exactly.
-/// The origin is 0 if a grid with this origin fills the shape exactly, otherwise the lower face of the shape.
-/// `None` if the shape does not have two flat faces a whole number of cells apart.
+/// Return the origin of a grid along `axis`, m. The cells of this grid, with the edge `edge` (m), fill the
+/// shape exactly along this axis. The origin is 0 if a grid with this origin fills the shape exactly,
+/// otherwise the lower face of the shape.
+/// `None` if the shape does not have two flat faces, or if the distance between the faces is not a whole
+/// number of cells.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {
@@ -195,8 +197,9 @@ fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
 
 /// Return the positions of the two faces that bound a shape along an axis, m; `None` if the shape has no flat
 /// faces normal to this axis. For a prism or polygon, the positions along x or y are the smallest and the
-/// largest coordinate of the corners, even if the sides are slanted. A union has the lowest and the highest
-/// face of its parts, and no flat faces if a part has none. A difference has the faces of its first part.
+/// largest coordinate of the corners, even if the sides are slanted. The faces of a union are the lowest and
+/// the highest face of its parts. If one of its parts has no flat faces, the union has none. A difference has
+/// the faces of its first part.
 fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),

@@ -87,10 +87,11 @@ fn initial_file(scope: &Scope, file: &grammar::Text, key: &str) -> Result<proble
 ///
 /// # Errors
 /// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth` or
-/// `normal` that is missing or has no effect. A missing `depth` is not reported here if only some bodies need
-/// it, and it is not yet known whether the set has points of these bodies.
-/// If the set has such points, the solver reports the
-/// missing `depth`.
+/// `normal` that is missing or has no effect.
+///
+/// In one case, a missing `depth` is not reported here: only some bodies need it, and it is not yet known
+/// whether the set has points of these bodies. If the set has such points, the solver reports the missing
+/// `depth`.
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,

@@ -20,8 +20,8 @@ type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
 ///
 /// # Errors
 /// On an invalid number, an unknown set, or a table without exactly one measure of toughness. On a
-/// calibration or a toughness by direction that is not available in this dimension. On incomplete keys of a
-/// toughness by direction, and on a seed without `weibull_modulus`.
+/// calibration or a toughness by direction that is not available in this dimension. On a toughness by
+/// direction with only some of its three keys, and on a seed without `weibull_modulus`.
 pub fn damage(
     scope: &Scope,
     sets: &[problem::Set],

@@ -20,8 +20,8 @@ const SPACING: &str = "spacing";
 /// the grid. Meshes and point files are read if horizons depend on their points.
 ///
 /// Return a copy of the deck with these horizons; `None` if no expression of a horizon contains the mean
-/// spacing. If the deck has a parameter or table with the name `spacing`, this name does not mean the mean
-/// spacing. Collective.
+/// spacing. If the deck has a parameter or table with the name `spacing`, this name means the parameter or
+/// table, not the mean spacing. Collective.
 ///
 /// # Errors
 /// If the horizon of the grid contains the mean spacing, although all bodies have their own horizon. On an

@@ -1,5 +1,9 @@
-//! Warnings about probable mistakes in a deck: unused names, unread columns of files, numbers in place of
-//! comparisons, and stages that change the mass of moving points.
+//! Warnings about probable mistakes in a deck:
+//!
+//! - unused names;
+//! - unread columns of files;
+//! - sets whose `where` is a number, not a condition;
+//! - stages that change the density scale, and with it the mass of moving points.
 
 use std::ops::Range;
 

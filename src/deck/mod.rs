@@ -193,7 +193,7 @@ impl Deck {
 /// Parse and validate the text of a deck.
 ///
 /// # Errors
-/// As [`Deck::new`] and [`Deck::problem`].
+/// Same as for [`Deck::new`] and [`Deck::problem`].
 pub fn parse(source: &Source) -> Result<Problem> {
     Deck::new(source.clone())?.problem()
 }

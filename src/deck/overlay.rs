@@ -13,7 +13,7 @@ use crate::error::Result;
 /// such a table, this key replaces the key of the deck.
 ///
 /// # Errors
-/// If there are overlays, and the deck or an overlay is not TOML.
+/// If the deck or an overlay is not TOML. Without overlays, this function does not parse the deck.
 pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
     if overlays.is_empty() {
         return Ok(deck.text.clone());
@@ -118,8 +118,8 @@ mod tests {
             .unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
 
-    /// Merge two tables key by key. Unlike in [`merge`], a different choice in `upper` does not replace the
-    /// choice in `lower`. A test compares the result of [`merge`] with this function.
+    /// Merge two tables key by key. If `lower` and `upper` make different choices, the result contains both
+    /// choices, unlike the result of [`merge`]. A test compares the result of [`merge`] with this function.
     fn over(lower: &mut Table, upper: &Table) {
         for (key, value) in upper {
             match (lower.get_mut(key), value) {

@@ -17,8 +17,10 @@ const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free
 /// Evaluate the parameters, and store their values in the scope.
 ///
 /// # Errors
-/// On a name that no expression can use, an invalid expression or value, an unknown name, or a circular
-/// definition.
+/// - If expressions cannot use the name of a parameter, see [`name_fault`].
+/// - If an expression or value is invalid.
+/// - If an expression contains an unknown name.
+/// - If the definition of a parameter is circular.
 pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<()> {
     for name in written.keys() {
         let text = name.get_ref();

@@ -133,7 +133,8 @@ impl<'a> Scope<'a> {
         Err(self.error(number.span(), message))
     }
 
-    /// Evaluate a number within a range; `words` describes the range in the error message.
+    /// Evaluate a number. Return an error if the value is outside `range`; `words` describes the range in the
+    /// error message.
     pub fn within(
         &self,
         number: &Number,

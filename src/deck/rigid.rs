@@ -15,7 +15,7 @@ use crate::problem::{self, RigidMotion, RigidShape, Shape};
 /// # Errors
 /// On a missing or surplus shape, and on a shape that cannot be rigid. If a driven body has a key that is
 /// only for free bodies, or a free body has the key `motion`. If a half space is a free body. If a run with a
-/// relaxation has a free body or friction. On numbers out of range.
+/// relaxation has a free body or friction. If a number is out of range.
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies
@@ -73,7 +73,7 @@ fn body(
     })
 }
 
-/// Return the shape of a rigid body relative to its centre, and the centre, m.
+/// Return the shape of a rigid body relative to its centre, and the position of the centre (m).
 fn solid(
     scope: &Scope,
     key: &str,

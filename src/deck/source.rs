@@ -33,7 +33,7 @@ pub struct Source {
     source_map: Option<Arc<SourceMap>>,
 }
 
-/// Note for an error whose line is in the merged deck but in no file.
+/// Note for an error in a line of the merged deck that comes from none of the merged files.
 const CHANGED: &str = "\nnote: lines are those of the deck as changed by --with and --set";
 
 impl Source {
@@ -125,8 +125,8 @@ impl Source {
         }
     }
 
-    /// Format file, line, column and message, then the line with carets below the bytes of `span`. The result
-    /// has at most about 800 characters, unless the path is very long.
+    /// Format the path, the line number, the column and the message. Append the text of the line, with carets
+    /// below the bytes of `span`. The result has at most about 800 characters, unless the path is very long.
     fn marked(&self, span: Range<usize>, message: &str) -> String {
         let message = shortened(message, LONGEST_MESSAGE);
         let (path, text, span, note) = self.place(span);
@@ -156,7 +156,7 @@ impl Source {
     }
 }
 
-/// Excerpt of a line in an error.
+/// Excerpt of the marked line, for an error message.
 struct Window {
     text: String,
     /// Blanks of the same width as the text before the marked column; tabs are kept as tabs.

@@ -8,7 +8,8 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{self, Method, StepRule};
 
-/// Relative tolerance of times that are computed in different ways.
+/// Relative tolerance for comparisons of times. Times that are equal in exact arithmetic can differ by
+/// round-off.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
 /// Largest allowed value of `max_halvings`; 20 halvings divide a load step into about a million parts.

@@ -156,7 +156,7 @@ impl Expression {
         Self::with(text, &POSITION_AND_TIME)
     }
 
-    /// Parse an expression of a length `r` (m), without parameters.
+    /// Parse an expression without parameters. The only variable is `r`, a length in m.
     ///
     /// # Errors
     /// If the text is not a valid expression.
@@ -190,7 +190,7 @@ impl Expression {
     ///
     /// # Errors
     ///
-    /// Same as [`Self::parse`], and if the text uses a table where `t` is not allowed.
+    /// Same as [`Self::parse`], and also if the text uses a table although `variables` does not contain `t`.
     pub fn parse_with_tables(
         text: &str,
         parameters: &dyn Fn(&str) -> Option<f64>,
@@ -289,7 +289,8 @@ impl Expression {
         evaluate::is_truth(&self.code)
     }
 
-    /// Test whether the expression contains this variable; a table counts as `t`.
+    /// Test whether the expression contains this variable. An expression with a table counts as containing
+    /// `t`, because the value of a table depends on the time.
     pub fn uses(&self, variable: Variable) -> bool {
         self.code.contains(&Instruction::Variable(variable))
             || variable == Variable::T && !self.tables.is_empty()

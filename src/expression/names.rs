@@ -17,11 +17,11 @@ pub(super) enum Function {
     Binary(Binary),
     /// Three arguments.
     Ternary(Ternary),
-    /// Two or more arguments, combined from the left.
+    /// Two or more arguments. The operation is applied to the first two arguments, then to this result and
+    /// the third argument, and so on.
     Several(Binary),
 }
 
-/// All functions by name.
 const FUNCTIONS: &[(&str, Function)] = &[
     ("sin", Function::Unary(Unary::Sine)),
     ("cos", Function::Unary(Unary::Cosine)),
@@ -65,7 +65,6 @@ pub(super) struct Scope<'a> {
     pub(super) tables: &'a [(&'a str, &'a Arc<Table>)],
 }
 
-/// Test whether a function of this name exists.
 pub(super) fn is_function(name: &str) -> bool {
     FUNCTIONS.iter().any(|(known, _)| *known == name)
 }
@@ -93,7 +92,6 @@ impl Scope<'_> {
         Err(message)
     }
 
-    /// Find the index of the table of this name.
     fn table(&self, name: &str) -> Option<usize> {
         self.tables.iter().position(|(known, _)| *known == name)
     }

@@ -48,7 +48,6 @@ pub(super) fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
     Ok(names)
 }
 
-/// State of the parser.
 struct Parser<'a> {
     /// The whole text.
     text: &'a str,
@@ -96,7 +95,6 @@ impl Parser<'_> {
             .map_or(0, |last| self.tokens[last].end)
     }
 
-    /// Append an instruction to the code.
     fn append(&mut self, instruction: Instruction) {
         append(&mut self.code, instruction);
     }
@@ -273,8 +271,8 @@ impl Parser<'_> {
         token.error(message)
     }
 
-    /// Return the error for a parenthesis `open` that is not closed: the next token comes after a value in
-    /// the parenthesis, and is not `)`.
+    /// Return the error if a value in the parenthesis `open` is not followed by `)`. The next token is the
+    /// token after this value.
     fn unclosed(&self, open: Token) -> ExpressionError {
         if self.peek().kind == Kind::End {
             return open.error("unbalanced parenthesis: this `(` is never closed");
@@ -297,7 +295,8 @@ impl Parser<'_> {
     }
 }
 
-/// Return the loosest precedence that is allowed in the right operand of an operator.
+/// Return the loosest precedence that operators may have in the right operand of an operator with the given
+/// precedence.
 fn tighter(precedence: Precedence) -> Precedence {
     match precedence {
         Precedence::Or => Precedence::And,

@@ -13,8 +13,9 @@ impl Table {
     ///
     /// # Errors
     /// If there are fewer than two rows, the counts differ, or the times do not increase. The error holds
-    /// a row index, from 0, and a message. The row is the first whose time is not larger than the time of the
-    /// row before it. For the other two errors, it is the last row.
+    /// a row index, from 0, and a message. If the times do not increase, the index belongs to the first row
+    /// whose time is not larger than the time of the row before it. For the other two errors, it belongs to
+    /// the last row.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
         if times.len() < 2 || times.len() != values.len() {
             let message = format!("needs two rows or more, has {}", times.len());
@@ -59,8 +60,8 @@ impl Table {
         from + (to - from) * ((time - self.times[k]) / (self.times[k + 1] - self.times[k]))
     }
 
-    /// Compute the change of the value from `time` to `time + step` (s); `step` may be negative. Within a
-    /// segment, round-off is relative to the change, not to the value.
+    /// Compute the change of the value from `time` to `time + step` (s); `step` may be negative. If both
+    /// times lie in the same segment, the round-off error is proportional to the change, not to the value.
     pub(super) fn increment(&self, time: f64, step: f64) -> f64 {
         let end = time + step;
         let k = self.segment(0.5 * (time + end));

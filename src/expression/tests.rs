@@ -495,7 +495,8 @@ impl Tree {
         }
     }
 
-    /// Return the precedence of the outermost operator; larger binds more tightly.
+    /// Return the precedence of the outermost operator. An operator with a larger precedence binds more
+    /// tightly.
     fn precedence(&self) -> u8 {
         match self {
             Self::Infix("||", ..) => 1,
@@ -554,7 +555,6 @@ impl Tree {
     }
 }
 
-/// Return the smaller value, `right` if both are equal, and NaN if either is NaN.
 fn lesser(left: f64, right: f64) -> f64 {
     if left.is_nan() || right.is_nan() {
         f64::NAN

@@ -81,7 +81,8 @@ pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     domain.reorder(&order, interior);
 }
 
-/// Split points that are sorted by `GridPoint::line` into groups of up to eight points adjacent along x.
+/// Split points into groups of up to eight points that are adjacent along x. The points must be sorted by
+/// `GridPoint::line`.
 fn vectors_mut(points: &mut [GridPoint]) -> impl Iterator<Item = &mut [GridPoint]> {
     let adjacent = |a: &GridPoint, b: &GridPoint| {
         let (grid, [z, y, x]) = a.line();

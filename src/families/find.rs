@@ -14,8 +14,10 @@ use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 /// `blocks` × `blocks` matrix of longest bonds, m; 0 for a pair without bonds.
 ///
 /// # Errors
-/// If two points coincide, a point would have too many neighbours, a grid layout has too many holes, or
-/// memory is insufficient.
+/// - If two points coincide.
+/// - If a point would have too many neighbours.
+/// - If a grid layout has too many holes.
+/// - If memory is insufficient.
 pub fn find(
     domain: &Domain,
     frames: &[GridFrame],

@@ -2,8 +2,8 @@
 //! memory, and so are their neighbours at the same offset.
 //!
 //! - A slot is an index in this layout. It contains one point or is a hole.
-//! - A line is a range of slots with equal y and z and ascending x, from its first local point to its last.
-//!   Lines are stored one after the other without gaps.
+//! - A line is a range of slots with equal y and z and ascending x. The first and the last slot of a line
+//!   contain local points. Lines are stored one after the other without gaps.
 //! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two bands.
 //!   Each line lies within one band, so no line covers the space between bands.
 
@@ -75,17 +75,17 @@ pub struct Grid {
     pub(super) lines: Vec<Line>,
     /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
-    /// Two entries: one for the owned points, one for the ghosts. An entry contains the runs, sorted by slot,
-    /// and the index of the first run of each chunk of [`CHUNK`] slots. The list of these indices ends with
-    /// the number of runs.
+    /// Two entries: one for the owned points, one for the ghosts. An entry has two lists. The first list
+    /// contains the runs, sorted by slot. The second list contains the index of the first run in each chunk;
+    /// a chunk has [`CHUNK`] slots. The second list ends with the number of runs.
     runs: [(Vec<Run>, Vec<u32>); 2],
     /// The runs of the owned points, sorted by local index.
     by_point: Vec<Run>,
 }
 
 impl Grid {
-    /// Lay out the points of `domain` that belong to the blocks on the grid. `longest` is the length of the
-    /// longest bond, m.
+    /// Create the layout for the points of `domain` that belong to the blocks of `frame`. `longest` is the
+    /// length of the longest bond, m.
     ///
     /// # Errors
     /// If two points coincide, or the layout has too many holes.

@@ -19,7 +19,8 @@ use super::vectors::{LatticeTables, Vector, Vectors, vectors};
 /// Number of lane groups that one task sets up.
 const CHUNK: usize = 256;
 
-/// The bonds from points i of one block to points j of one block, both on the same grid.
+/// The bonds from the points i of a block to the points j of the same block or of another block. All these
+/// points are on the same grid.
 #[derive(Debug, Clone)]
 pub struct BondLattice {
     /// Block of the points i, whose sums run over these bonds.
@@ -35,7 +36,7 @@ pub struct BondLattice {
     /// Volume of each point i, m³.
     pub own_volume: f64,
     offsets: Vec<Offset>,
-    /// Whether weights may differ from 1, and whether the weights of i and j may differ.
+    /// Whether weights may differ from 1, and whether the weights of j may differ from the weights of i.
     weighted: [bool; 2],
     /// The lane groups, sorted by local index.
     vectors: Vec<Vector>,
@@ -393,8 +394,8 @@ impl BondLattice {
         }
     }
 
-    /// Compute the bits that mark the lanes with a bond, intact or broken: one byte for each lane group and
-    /// offset.
+    /// Compute one byte for each lane group and offset. Bit k of a byte is set if lane k has a bond, intact
+    /// or broken.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
         let mut filled = vec![0; self.store.intact.len()];
@@ -410,7 +411,8 @@ impl BondLattice {
     }
 }
 
-/// One bit for each of the eight slots from `slot` on, set if the slot contains a point of a block.
+/// Return one bit for each of the eight slots from `slot` on. A bit is 1 if its slot contains a point of the
+/// block with the index `block`.
 fn mask(grid: &Grid, slot: usize, block: usize) -> u8 {
     let blocks = &grid.blocks[slot..slot + WIDTH];
     let bit = |k: usize| u8::from(blocks[k] as usize == block) << k;

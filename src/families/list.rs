@@ -21,8 +21,8 @@ pub struct BondList {
     pub(super) points: Vec<u32>,
     /// Index of the first group of each row, followed by the total number of groups.
     pub(super) starts: Vec<usize>,
-    /// Local indices of the neighbours, sorted by global id in each row. The local index of the row's point
-    /// pads the last group of the row.
+    /// Local indices of the neighbours, sorted by global id in each row. The last group of a row is padded
+    /// with the local index of the row's point.
     pub(super) neighbours: Neighbours,
     /// State of the bonds; the intact bits of padding are clear.
     pub(super) store: Store,
@@ -247,7 +247,8 @@ impl BondList {
         }
     }
 
-    /// Write a row to a checkpoint: group after group, each with its intact bits and then its history.
+    /// Write the checkpoint data of a row to `bytes`. For each group of bonds, the intact bits come first,
+    /// then the history of each bond.
     pub fn save_row(&self, row: usize, bytes: &mut [u8]) {
         let width = self.store.history_bytes_per_bond();
         let groups = self.starts[row]..self.starts[row + 1];

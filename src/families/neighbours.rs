@@ -17,7 +17,8 @@ const IN_FULL: u32 = 1 << 31;
 /// A group of eight indices.
 #[derive(Debug, Clone, Copy)]
 struct Compact {
-    /// Smallest of the eight indices; with [`IN_FULL`], an index into the full groups.
+    /// Smallest of the eight indices. If the flag [`IN_FULL`] is set, the other bits are an index into the
+    /// full groups instead.
     first: u32,
     /// Differences from the smallest index; unused with [`IN_FULL`].
     differences: [u16; WIDTH],
@@ -103,7 +104,7 @@ impl Neighbours {
         self.compact.len()
     }
 
-    /// A range of the groups.
+    /// Return the groups with the indices in `range`.
     pub fn groups(&self, range: Range<usize>) -> NeighbourGroups<'_> {
         NeighbourGroups {
             compact: &self.compact[range],
@@ -146,7 +147,7 @@ impl<'a> NeighbourGroups<'a> {
         self.compact.len()
     }
 
-    /// A range of the groups.
+    /// Return the groups with the indices in `range`.
     #[inline(always)]
     pub fn range(self, range: Range<usize>) -> Self {
         Self {

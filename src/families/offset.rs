@@ -43,9 +43,9 @@ pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimensio
     within.min(widths.product())
 }
 
-/// Return the offsets up to the length `cutoff` (m), sorted by z, y and x. Also return the line offsets (the
-/// steps along y and z) of these offsets, each of them once. `extent` is the extent of the points per
-/// direction, m.
+/// Return the offsets up to the length `cutoff` (m), sorted by z, y and x. Also return the line offsets: the
+/// pairs of steps along y and z that occur in these offsets, without repeats. `extent` is the extent of the
+/// points per direction, m.
 pub(super) fn offsets(
     spacing: [f64; 3],
     cutoff: f64,

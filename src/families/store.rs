@@ -15,7 +15,7 @@ pub struct Store {
     pub(super) breakable: Option<Vec<u8>>,
     /// Number of history values per bond.
     width: usize,
-    /// History values of the bonds: `width` entries of eight lanes per group.
+    /// History values of the bonds: `width` entries per group. Each entry has one lane per bond of the group.
     history: Vec<Lanes>,
 }
 

@@ -37,7 +37,7 @@ pub struct VectorBonds<'a> {
     pub offsets: &'a [Offset],
     /// State of the bonds, with one group per offset.
     pub groups: Groups<'a>,
-    /// Whether weights may differ from 1, and whether the weights of i and j may differ.
+    /// Whether weights may differ from 1, and whether the weights of j may differ from the weights of i.
     pub weighted: [bool; 2],
     shifts: &'a [i32],
 }
@@ -57,7 +57,8 @@ pub(super) struct LatticeTables<'a> {
     pub(super) offsets: &'a [Offset],
     pub(super) weighted: [bool; 2],
     pub(super) shifts: &'a [i32],
-    /// Number of line offsets.
+    /// Number of line offsets: the offsets in y and z of the lines that contain neighbours. `shifts` has this
+    /// number of entries for each line of the grid.
     pub(super) lines: usize,
 }
 

@@ -23,8 +23,8 @@ const SLICES: u32 = 256;
 /// Resolution of the offsets in the cache, as a fraction of the edge of a cell.
 const RESOLUTION: f64 = 1e-6;
 
-/// A quarter of the edge in units of [`RESOLUTION`]. Offsets between points of the same or adjacent
-/// refinement levels are multiples of a quarter.
+/// A quarter of a cell's edge, in units of [`RESOLUTION`]. The components of offsets between points of the
+/// same or adjacent refinement levels are multiples of a quarter of the edge.
 const QUARTER: i64 = 250_000;
 
 /// Maximum number of entries of the lookup table.
@@ -160,8 +160,8 @@ impl VolumeFactors {
     }
 }
 
-/// Sort the components, the largest first. The factor does not depend on the order of the axes, so fewer
-/// values are cached.
+/// Sort the components, the largest first. The volume correction factor does not depend on the order of the
+/// components. Offsets that differ only in this order therefore share one cached value.
 fn ordered(mut steps: [i64; 3]) -> [i64; 3] {
     steps.sort_unstable_by(|a, b| b.cmp(a));
     steps

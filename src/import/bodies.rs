@@ -41,7 +41,7 @@ pub struct DamageModel {
     pub read: String,
     /// Criterion that breaks bonds.
     pub criterion: Criterion,
-    /// Node of the criterion's value.
+    /// Node of the source deck that contains the value of the criterion.
     pub node: Node,
 }
 
@@ -166,7 +166,8 @@ pub struct Body {
     pub damage: Option<String>,
     /// Horizon, m.
     pub horizon: Value,
-    /// Key and value of the points; the key is `points`, or the shape such as `shape.box`.
+    /// Key and value in the new deck that give the points. The key is `points`, or a shape such as
+    /// `shape.box`.
     pub points: (String, Value),
 }
 

@@ -33,8 +33,8 @@ pub fn bond_filters(translation: &mut Translation, filters: &Node) -> Result<()>
     Ok(())
 }
 
-/// Read the components of a vector from three keys. Their names are `key` and an axis, such as `Normal X` if
-/// `key` is `Normal`. In 2-D the last key may be missing.
+/// Read the components of a vector from three keys. If `key` is `Normal`, the three keys are `Normal X`,
+/// `Normal Y` and `Normal Z`. In 2-D the last of them may be missing.
 fn vector(translation: &Translation, filter: &Node, key: &str, note: &str) -> Result<[f64; 3]> {
     let mut vector = [0.0; 3];
     for (k, axis) in ["X", "Y", "Z"].iter().enumerate() {

@@ -213,8 +213,8 @@ impl Conditions {
         Ok(())
     }
 
-    /// Write the initial values, one table per set. At a point in several sets, the last table counts. Log
-    /// the initial values that a later table may replace by 0.
+    /// Write the initial values, one table per set. If a point is in several sets, the last of their tables
+    /// applies to the point. Log the initial values that a later table may replace by 0.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self

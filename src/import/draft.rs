@@ -67,7 +67,7 @@ impl Value {
         }
     }
 
-    /// Return a number or expression without quotes.
+    /// Return a number or expression as text, without quotes around an expression.
     pub fn plain(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -176,7 +176,7 @@ impl Draft {
         self.top.push((key.to_owned(), value));
     }
 
-    /// Test whether the draft has this key before all sections.
+    /// Test whether this key is one of the keys before all sections.
     pub fn has_top(&self, key: &str) -> bool {
         self.top.iter().any(|(known, _)| known == key)
     }

@@ -167,10 +167,10 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// Translate the statements from `at` to the end or a `}`. The statements assign expressions to the name
-    /// `value` of the source language. The parameter `value` is the expression that earlier statements have
-    /// assigned to this name. Return the expression after the last statement, and the index after this
-    /// statement.
+    /// Translate the statements from index `at` to the first unmatched `}` or to the end of `tokens`. The
+    /// statements assign expressions to the name `value` of the source language. The parameter `value` is the
+    /// expression that earlier statements have assigned to this name. Return the expression after the last
+    /// statement, and the index after this statement.
     fn block(
         &self,
         tokens: &[Token],
@@ -191,7 +191,8 @@ impl Rewriter<'_> {
         Ok((value, at))
     }
 
-    /// Translate the statement at `at`. Parameters and result are those of [`block`](Self::block).
+    /// Translate the statement that starts at index `at` of `tokens`. Parameters and result are those of
+    /// [`block`](Self::block).
     fn statement(
         &self,
         tokens: &[Token],
@@ -436,7 +437,6 @@ mod tests {
         rewrite(text, dialect, &|_| None, &POSITION_AND_TIME)
     }
 
-    /// Evaluate at x = 0.3, y = −2, z = 5, t = 1.5.
     fn value(text: &str, dialect: Dialect) -> f64 {
         let text = rewritten(text, dialect).unwrap();
         Expression::of(&text)

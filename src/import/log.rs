@@ -41,7 +41,7 @@ pub struct Entry {
     pub fate: Fate,
     /// The corresponding key in the new deck, or the reason why the source key is approximated or left out.
     pub note: String,
-    /// Whether the key is an initial value, a load or a support that is left out.
+    /// Whether the key is left out and describes an initial value, a load or a support.
     pub is_lost_load: bool,
 }
 
@@ -266,7 +266,8 @@ impl Log {
         self.note(node, Fate::Taken, note);
     }
 
-    /// Log that the new deck expresses a key (`node`) with a similar meaning.
+    /// Log that the new deck expresses a key (`node`) only approximately: the meaning is similar, but not the
+    /// same.
     pub(super) fn approximated(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Approximated, note);
     }
@@ -276,7 +277,7 @@ impl Log {
         self.note(node, Fate::LeftOut, note);
     }
 
-    /// Log that the new deck lacks an initial value, a load or a support (`node`).
+    /// Log that the new deck does not express a key (`node`) that sets an initial value, a load or a support.
     pub(super) fn lose_load(&self, node: &Node, note: impl Into<String>) {
         self.left_out(node, note);
         self.lost_loads.borrow_mut().insert(node.id);
@@ -358,7 +359,7 @@ fn value(node: &Node) -> String {
     }
 }
 
-/// Return a value on one line, shortened.
+/// Return a value as text on one line. A long text is cut.
 fn shown(text: &str) -> String {
     let text = text.trim();
     if text.is_empty() {

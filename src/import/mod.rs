@@ -67,7 +67,7 @@ pub struct Import {
     pub code: Code,
     /// Text of the new deck.
     pub text: String,
-    /// Outcome of each key.
+    /// Outcome of each key of the source deck.
     pub entries: Vec<Entry>,
     /// Files that the new deck reads.
     pub files: Vec<PathBuf>,
@@ -91,7 +91,8 @@ impl Import {
 }
 
 /// Translate the deck at `path`. `target` is the path of the new deck; paths of files in the new deck are
-/// relative to the folder of the new deck. Without `code`, the code is detected from the text.
+/// relative to the folder of the new deck. `code` is the code for which the source deck was written; if
+/// `None`, the code is detected from the text.
 ///
 /// # Errors
 /// If the file cannot be read or parsed, the code is unknown, or data that a run needs are missing or wrong.

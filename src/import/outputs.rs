@@ -9,7 +9,7 @@ use super::tree::{Node, is_key};
 use crate::error::Result;
 
 /// Output variables. An entry has the name of the variable, the name of its field, and a text that says
-/// how the field differs from the variable. The text is empty if both are equal.
+/// how the field differs from the variable. The text is empty if the field equals the variable.
 const FIELDS: [(&str, &str, &str); 33] = [
     ("Displacement", "displacement", ""),
     ("Displacements", "displacement", ""),
@@ -66,7 +66,7 @@ const FIELDS: [(&str, &str, &str); 33] = [
     ),
 ];
 
-/// Output variables that need no field, and the reason.
+/// Output variables of the source deck that need no field in the new deck, with their notes for the log.
 const ALWAYS: [(&str, &str); 8] = [
     ("Element Id", "`id` is always there"),
     ("Block Id", "`block` is always there"),
@@ -161,7 +161,7 @@ struct Frequency {
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
-    /// Interval of each output, except those in `history_intervals`.
+    /// Interval of each output, except the outputs with an interval in `history_intervals`.
     intervals: Vec<Frequency>,
     /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,
@@ -183,7 +183,7 @@ impl Outputs {
     }
 
     /// Read a table of computed quantities. The name of a quantity is the value of its key
-    /// `Output Label`. Without this key, it is the name of the table of the quantity. Each pair in `bodies`
+    /// `Output Label`. Without this key, the quantity has the name of its table. Each pair in `bodies`
     /// is the name of a block and the name of its body.
     ///
     /// # Errors
@@ -406,7 +406,6 @@ fn is_longer(one: &Frequency, other: &Frequency) -> bool {
     }
 }
 
-/// Write an interval to an output section.
 fn set_interval(section: &mut Section, interval: Option<Interval>, length: f64) {
     match interval {
         Some(Interval::Steps(steps)) => {

@@ -40,7 +40,8 @@ pub struct Script {
     pub commands: Vec<Command>,
 }
 
-/// Time step before the first `timestep`, s: the default of LAMMPS in SI units.
+/// Time step before the first command `timestep` of a script, s. This value is the default of LAMMPS in SI
+/// units.
 const DEFAULT_STEP: f64 = 1e-8;
 
 /// Values that the variables and the time step have at one command of a script.
@@ -284,7 +285,8 @@ impl Variables {
         })
     }
 
-    /// Return a number, or the formula of a variable `v_name` as an expression of time.
+    /// Return `word` unchanged if it is a number. If `word` is a variable `v_name`, return the formula of the
+    /// variable as an expression of time.
     ///
     /// # Errors
     /// If the variable is unknown, or its formula cannot be translated.

@@ -46,9 +46,9 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Store the names of the node sets of the mesh, each with the ids of its points. Call this function for
-    /// PeriLab, in which an element belongs to a node set only if all nodes of the element are in the set. A
-    /// set that is not in `sets` is written as a set of the mesh and logged as approximated.
+    /// Store the name of each node set of the mesh, with the ids of the points in the set. Call this function
+    /// for PeriLab, in which an element belongs to a node set only if all nodes of the element are in the
+    /// set. A set that is not in `sets` is written as a set of the mesh and logged as approximated.
     pub fn set_ids_by_name(&mut self, sets: Vec<(String, Vec<u64>)>) {
         self.ids_by_name = Some(sets);
     }
@@ -60,7 +60,8 @@ impl<'n> Sets<'n> {
     }
 
     /// Add a node set of the source deck. `is_declared` says whether Peridigm or PeriLab treats the entry as
-    /// a node set because of its name or position. Any other entry is a node set only if something uses it.
+    /// a node set because of its name or position. Any other entry is a node set only if
+    /// another entry of the source deck uses it as one.
     pub fn define(&mut self, name: &str, node: &'n Node, is_declared: bool) {
         self.defined.push(Defined {
             name: name.to_owned(),
@@ -161,8 +162,8 @@ impl<'n> Sets<'n> {
         self.last_number.is_none_or(|last| number <= last)
     }
 
-    /// Log the declared node sets that nothing uses. Unused entries that are not declared as node sets stay
-    /// without a note.
+    /// Log the declared node sets that nothing uses. An unused entry that is not declared as a
+    /// node set is not logged, because such an entry is a node set only if something uses it.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
             if set.written.is_none() && set.is_declared {
@@ -183,7 +184,8 @@ fn numbers_of_file(translation: &Translation, file: &str) -> Option<Vec<u64>> {
     Some(ids)
 }
 
-/// Write the definition of a node set; return its name. With `last`, drop the numbers above it.
+/// Write the definition of a node set; return its name. If `last` is given, drop the
+/// point numbers above `last`.
 fn define(
     translation: &mut Translation,
     name: &str,

@@ -46,8 +46,8 @@ pub struct Stage {
     pub method: Method,
     /// Number by which conditions refer to this solver step; `None` if the source deck gives no number.
     pub step_id: Option<u64>,
-    /// Damping of the solver per step, divided by the time step, 1/s; `None` without damping or if the time
-    /// step is unknown.
+    /// Damping rate, 1/s: the damping factor of the solver per step, divided by the time step. `None` if
+    /// there is no damping or the time step is unknown.
     pub damping: Option<f64>,
     /// Whether damage models are active.
     pub is_damage_enabled: bool,

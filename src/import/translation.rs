@@ -34,7 +34,8 @@ pub struct Translation<'a> {
     pub start: f64,
     /// Files that the new deck reads, relative to the working directory or absolute.
     pub files: RefCell<Vec<PathBuf>>,
-    /// Start of the first solver step in which the current condition acts, in the time of the run, s.
+    /// Start of the first solver step in which the current condition acts, measured from the start of the
+    /// run, s.
     pub step_start: f64,
     /// Names of tables: section, name in the source deck, and name in the new deck.
     names: Vec<(&'static str, String, String)>,
@@ -205,7 +206,7 @@ impl<'a> Translation<'a> {
         written
     }
 
-    /// Return the path of a file of the source deck, relative to the working directory.
+    /// Return the path, relative to the working directory, of a file that the source deck names.
     pub fn path(&self, file: &str) -> PathBuf {
         let folder = self.source.path.parent().unwrap_or("".as_ref());
         folder.join(file)

@@ -7,8 +7,11 @@ use super::tree::{Content, DEEPEST, MOST_NODES, Mistake, Node};
 /// Parse the parameter list of an XML text.
 ///
 /// # Errors
-/// If the text is not XML, an element is not a parameter, a parameter lacks name or value, a list occurs
-/// twice, or the lists are too deep.
+/// - If the text is not XML.
+/// - If an element is neither a parameter nor a list.
+/// - If an element has no name, or a parameter has no value.
+/// - If a list has the same name as another entry of its parent list.
+/// - If lists are nested too deeply.
 pub fn parse(text: &str) -> Result<Node, Mistake> {
     let options = ParsingOptions {
         nodes_limit: MOST_NODES as u32,

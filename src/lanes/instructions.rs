@@ -38,8 +38,8 @@ impl Instructions {
     /// Select the largest set that all ranks have, limited by [`VARIABLE`]. Collective.
     ///
     /// # Errors
-    /// If the variable is set and names no set, or if a rank has none of the sets; the error is the same on
-    /// all ranks.
+    /// If [`VARIABLE`] is not empty and its value does not name an instruction set in [`BUILT`]. If a rank
+    /// has none of these instruction sets. The error is the same on all ranks.
     pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
         let allowed = match std::env::var(VARIABLE) {
             Ok(name) if !name.is_empty() => named(&name),
@@ -57,8 +57,8 @@ impl Instructions {
         Self::up_to(BUILT.len() - 1)
     }
 
-    /// Return the largest set of this machine whose index in [`BUILT`] is at most `level`; `None` if the
-    /// machine has none of the sets.
+    /// Return the largest set that this machine has, of the sets up to index `level` in [`BUILT`]; `None` if
+    /// the machine has none of these sets.
     #[cfg(target_arch = "x86_64")]
     fn up_to(level: usize) -> Option<Self> {
         match Avx512::detect() {

@@ -13,7 +13,7 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Whether quantities may lack a column; such quantities are read as 0.
     const PADDED: bool = false;
 
-    /// One column per quantity, to read.
+    /// One column per quantity, for reading values.
     type Columns<'a>: Copy + Send + Sync;
 
     /// One column per quantity, for adding values.

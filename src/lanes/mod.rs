@@ -41,7 +41,8 @@ impl Lanes {
         Self([of(a), of(b), of(c), of(d), of(e), of(f), of(g), of(h)])
     }
 
-    /// Apply a function to each pair of lanes. As in [`Self::map`], the code has one call per pair.
+    /// Apply a function to each pair of lanes. The code has one call per pair instead of a loop, for the same
+    /// reason as in [`Self::map`].
     #[inline(always)]
     fn zip(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         let (a, b) = (self.0, other.0);

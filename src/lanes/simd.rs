@@ -135,7 +135,7 @@ mod x86 {
             has.then_some(Self(()))
         }
 
-        /// Return the proof of AVX2, which every machine with AVX-512 has.
+        /// Return the proof that this machine has AVX2. Every machine with AVX-512 has AVX2.
         pub fn avx2(self) -> Avx2 {
             Avx2(())
         }

@@ -46,8 +46,8 @@ impl Counts {
         }
     }
 
-    /// Return the larger of the two values of each count. `central` is true only if it is true in both
-    /// arguments.
+    /// For each count, return the larger of the values in `self` and `other`. `central` is true only if it is
+    /// true in both.
     const fn or_more(self, other: Self) -> Self {
         const fn more(a: usize, b: usize) -> usize {
             if a > b { a } else { b }
@@ -88,7 +88,7 @@ fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))
 }
 
-/// Pad a shorter tuple with zeros.
+/// Return the entries of a shorter tuple, padded with zeros to `B::COUNT` entries.
 #[inline(always)]
 fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
     B::each(|k| {
@@ -167,8 +167,8 @@ impl AnyLaw {
 }
 
 impl PairLaw {
-    /// Return [`Law::toughness_scale`] of eight bonds, from the numbers of points i and j; `None` if the law
-    /// does not define this factor, or if the laws of points i and j differ.
+    /// Return [`Law::toughness_scale`] of eight bonds. `points` has the point numbers of i and j. Return
+    /// `None` if the law does not define this factor, or if the laws of points i and j differ.
     #[inline(never)]
     pub fn toughness_scale<const D: usize>(
         &self,

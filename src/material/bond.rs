@@ -9,8 +9,8 @@
 //!
 //! For |x| ≤ [`NEAR`] both functions are computed as Taylor series. The first omitted term is below 6·10⁻¹⁸
 //! times the result. For larger |x|, the code uses closed forms that avoid cancellation:
-//! P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)). Both ends of a bond compute the same bits of
-//! x, and therefore of P and Q.
+//! P = x/((1 + x) + √(1 + x)) and Q = x/(1 + √(1 + x)). Both ends of a bond compute bit-identical values of
+//! x, and therefore also of P and Q.
 
 use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
@@ -60,8 +60,8 @@ pub struct Bond<const D: usize> {
     pub eta: [Lanes; D],
     /// Y by component, m. For linear laws, ξ by component instead.
     pub deformed: [Lanes; D],
-    /// One bit per intact bond whose |x| exceeds the `limit` of [`deform`]; for linear laws, one bit per
-    /// intact bond.
+    /// Mask of the intact bonds whose |x| exceeds the `limit` of [`deform`]. For linear laws, mask of all
+    /// intact bonds.
     pub beyond_series: u8,
 }
 
@@ -78,8 +78,8 @@ pub enum Weights {
 
 impl Weights {
     /// Return two masks, for points i and j. In the mask of a point, the bits of the bonds within the horizon
-    /// of this point are set. Broken bonds are included. The force state of point i or j acts only on the
-    /// bonds in the mask of this point.
+    /// of this point are set. The force state of the point acts only on these bonds. Broken bonds are
+    /// included in the masks.
     #[inline(always)]
     pub fn acting(self) -> [u8; 2] {
         match self {
@@ -297,9 +297,9 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// Return the quotient x/(√(1 + x) + o) in the lanes of `beyond_series` with |x| above [`NEAR`], and `near`
-/// in all other lanes. `other` computes o and the rounding error of o. Its input is 1 + x and the rounding
-/// error of this sum.
+/// Return x/(√(1 + x) + o) in each lane whose bit in `beyond_series` is set and whose |x| is above [`NEAR`].
+/// Return `near` in all other lanes. `other` computes o and the rounding error of o. Its input is 1 + x and
+/// the rounding error of this sum.
 #[inline(always)]
 fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,

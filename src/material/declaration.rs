@@ -10,7 +10,7 @@ use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
-/// Declaration of a law for one of its names in decks.
+/// Declaration of a law under one name. A law with several names in decks has one declaration per name.
 pub struct Declaration {
     /// Name of the law in decks.
     pub name: &'static str,

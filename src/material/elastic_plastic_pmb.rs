@@ -1,6 +1,6 @@
-//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) Y/|Y|, with the micromodulus c, and the
-//! stretch s and the plastic stretch s_p of the bond. s_p changes so that |s − s_p| never exceeds the yield
-//! stretch s_y.
+//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) Y/|Y|. Here c is the micromodulus, s is
+//! the stretch of the bond, and s_p is the plastic stretch of the bond. s_p changes so that |s − s_p| never
+//! exceeds the yield stretch s_y.
 //!
 //! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005). The slope of
 //! the force over the stretch is c during unloading, as in elastic loading.

@@ -9,8 +9,8 @@
 //! In the sources, a bond has one ellipsoid, and each semi-axis is the mean of the values at both ends. Here
 //! each end has its own ellipsoid, because the force state of a point depends on the numbers of this point
 //! only. In bond-based laws, the factor of a bond is then the mean of the radii at both ends. If the
-//! semi-axes at the ends differ, this factor deviates from the sources by a term of second order in the
-//! difference.
+//! semi-axes at the two ends differ, this mean differs from the factor of the sources. The deviation is of
+//! second order in the difference of the semi-axes.
 //!
 //! The factors depend on the coordinate axes, so they are not exact for extensions along other directions.
 
@@ -24,13 +24,13 @@ use crate::lanes::Lanes;
 /// one plane would be unbounded.
 const LARGEST: f64 = 30.0;
 
-/// Diagonal entry of the tensor of a point that has no bonds within its own horizon. The radii of the
-/// point's ellipsoid are then nearly 0. Therefore the point contributes nothing to its bonds with points that
-/// have a larger horizon.
+/// Diagonal entry of the tensor of a point that has no bonds within its own horizon. With this entry, the
+/// radii of the point's ellipsoid are nearly 0. Therefore the point contributes nothing to its bonds with
+/// points that have a larger horizon.
 pub const WITHOUT_BONDS: f64 = 1e300;
 
-/// Return the semi-axis g_a = `wanted`/`found`, at most [`LARGEST`]. `wanted` is the value of the sum in the
-/// solid, and `found` is the value of the family.
+/// Return the semi-axis g_a = `wanted`/`found`, at most [`LARGEST`]. `wanted` is the value of the quantity in
+/// the classical solid, and `found` is the sum over the family.
 pub fn semi_axis(wanted: f64, found: f64) -> f64 {
     if found * LARGEST > wanted {
         wanted / found

@@ -1,4 +1,5 @@
-//! Force states T⟨ξ⟩ of eight bonds: vectors in general, one number per bond for forces along the bond.
+//! Force states T⟨ξ⟩ of eight bonds. In general, a force state is a vector. A force along the bond needs only
+//! one number per bond.
 
 use super::{Bond, rotation};
 use crate::lanes::{LaneTuple, Lanes, Simd};
@@ -15,7 +16,7 @@ pub trait ForceState<const D: usize>: Copy {
     /// Multiply by one factor per bond.
     fn times(self, factor: Lanes) -> Self;
 
-    /// Add `other`, which is −T_j⟨−ξ⟩ of the other end.
+    /// Add `other`, which is −T_j⟨−ξ⟩ of neighbour j.
     fn plus(self, other: Self) -> Self;
 
     /// Add to `sums` the force density (N/m³) of the bonds whose bit in `bits` is set: the force state times

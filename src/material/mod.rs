@@ -10,9 +10,9 @@
 //!
 //! A law declares the counts of its point numbers and history values, and computes these values. An *end* of
 //! a bond is point i or point j. An *untruncated* family is a full ball of neighbours, without surfaces or
-//! cracks. The *initial* family of a point is its family before any bond breaks: the bonds over which step 1
-//! of [`Law`] sums. ξ is the undeformed bond, η the relative displacement of its ends, and Y = ξ + η the
-//! deformed bond. ω is the influence function, and Ṽ the corrected volume of j.
+//! cracks. The *initial* family of a point is its family before any bond breaks. It consists of the bonds
+//! over which step 1 of [`Law`] sums. ξ is the undeformed bond, η the relative displacement of its ends, and
+//! Y = ξ + η the deformed bond. ω is the influence function, and Ṽ the corrected volume of j.
 
 mod any;
 pub mod bond;
@@ -126,8 +126,9 @@ pub trait Described {
 /// 1. Once, over the bonds that pre-cracks do not cut (over all bonds if [`Self::needs_shape`]):
 ///    [`Self::reference_contribution`] → sums → [`Self::constants`], and [`Self::truncation_factor`] if a
 ///    damage criterion reads this factor.
-/// 2. Before each force evaluation, over the intact bonds, [`Self::PASSES`] times:
-///    [`Self::pass_contribution`] → sums → [`Self::update_point`]. Then the numbers are sent to the ghosts.
+/// 2. Before each force evaluation, in each of the [`Self::PASSES`] passes over the intact bonds:
+///    [`Self::pass_contribution`] → sums → [`Self::update_point`]. After the last pass, the numbers are sent
+///    to the ghosts.
 /// 3. In the force evaluation: [`Self::bond_history`] and [`Self::force_state`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Numbers of a point that the loops over bonds read for both ends of a bond. The
@@ -141,7 +142,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Sums over the initial family, computed once.
     type ReferenceSum: LaneTuple;
 
-    /// Sums of a pass over the intact bonds. A pass with fewer sums sets the rest to 0.
+    /// Sums of a pass over the intact bonds. If a pass needs fewer sums than this type contains,
+    /// it sets the other sums to 0.
     type Sum: LaneTuple;
 
     /// Type of the force state.
@@ -150,7 +152,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Count of the constants among the numbers of a point.
     const CONSTANTS: usize = 0;
 
-    /// Number of passes over the bonds before the force evaluation.
+    /// Number of passes over the bonds before the pass that computes the forces.
     const PASSES: usize = 0;
 
     /// Count of a point's own numbers. Only functions that are called per point, such as
@@ -171,7 +173,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     const SUM_READS_STRETCH: bool = true;
 
     /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds. Lanes without a bond
-    /// have neither. The loops therefore set the contributions of these lanes to 0.
+    /// have no direction and no length. The loops therefore set the contributions of these lanes to 0.
     const SUM_READS_DIRECTION: bool = false;
 
     /// Whether forces act along ξ and are linear in η. Otherwise forces depend on the deformed bonds.
@@ -208,7 +210,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// entries of `_numbers`.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
-    /// Return the contribution of an intact bond to the sums of pass `S`. The contribution may read the
+    /// Return the contribution of an intact bond to the sums of pass `S`. The contribution may depend on the
     /// numbers that earlier passes computed.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
@@ -274,9 +276,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) -> Self::Force;
 
     /// Return the force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩ (N/m⁶), with the weights of both
-    /// ends. A force along the bond is divided by a length, as in [`Self::force_state`]. The results for
-    /// points i and j have the same bits, except for the sign. Laws may override this function to save
-    /// operations.
+    /// ends. If the force acts along the bond, the result is the force density divided by |Y|, or by |ξ| for
+    /// linear laws (N/m⁷). The results for points i and j have the same bits, except for the sign. Laws may
+    /// override this function to save operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -328,7 +330,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Return the contribution of a bond to the strain energy density of one end, J/m⁶.
+    /// Return the contribution of a bond to the strain energy density of one end, per volume of the point at
+    /// the other end, J/m⁶.
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Lanes;
 
     /// Return the part of a point's strain energy density (J/m³) that is not a sum over bonds.
@@ -415,7 +418,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Return a spring constant k (N/m⁷) per bond that bounds the strain energy density W (J/m³) of one end:
     /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. If [`Self::resists_across`] returns true, k satisfies only the weaker bound
-    /// that is stated there. For bond-based laws k = |∂T/∂η|.
+    /// W ≤ ½ Σ k |η|² Ṽ. For bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes;
 
     /// Test whether the springs of [`Self::stiffness`] must also resist displacements across the bonds. The

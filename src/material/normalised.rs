@@ -127,7 +127,7 @@ impl Described for Normalised {
 }
 
 impl<const D: usize> Law<D> for Normalised {
-    /// 1/Σ ω|ξ| Ṽ, 1/m⁴. The influence function ω is 1 for `form = "energy"`.
+    /// The number of a point is 1/Σ ω|ξ| Ṽ (1/m⁴). The influence function ω is 1 for `form = "energy"`.
     type Point = [Lanes; 1];
     type BondHistory = [Lanes; 0];
     /// Σ ω|ξ| Ṽ, m⁴.

@@ -66,7 +66,7 @@ impl Ordinary {
         })
     }
 
-    /// Create the law of a body with this influence function, in the plane or in space.
+    /// Create the law with this influence function for a body in the plane or in space.
     pub(super) fn of(given: &Given, influence: Influence) -> Self {
         let untruncated_weighted_volume = influence.weighted_volume(given.dimension, given.horizon);
         Self::new(given.dimension, given.elastic, untruncated_weighted_volume)
@@ -343,8 +343,8 @@ impl<const D: usize> Law<D> for Ordinary {
         self.truncation_factor_of(sums[0])
     }
 
-    /// By Cauchy–Schwarz θ² ≤ (d²/m) Σ ω e² Ṽ. Therefore the spring constant (A + max(κ, 0) d²)/m bounds the
-    /// energy.
+    /// By Cauchy–Schwarz, θ² ≤ (d²/m) Σ ω e² Ṽ. Therefore W ≤ ½ k Σ ω e² Ṽ, with the spring constant
+    /// k = (A + max(κ, 0) d²)/m.
     #[inline(always)]
     fn stiffness(&self, _: &Bond<D>, [extension_factor, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;

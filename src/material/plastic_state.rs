@@ -8,8 +8,7 @@ pub struct PlasticState {
     pub strain: [f64; 6],
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,
-    /// Relative change of the yield stress by strain rate and temperature in the last step: their factor on
-    /// the yield stress, minus 1.
+    /// Factor of strain rate and temperature on the yield stress in the last step, minus 1.
     pub yield_change: f64,
     /// Energy that the zero-energy control would have if plastic flow did not reduce the control, J/m³.
     pub control: f64,

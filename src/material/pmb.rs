@@ -168,7 +168,8 @@ impl<const D: usize> Law<D> for Pmb {
 mod tests {
     use super::*;
 
-    /// Return ½ ∫ w dV over an untruncated family at isotropic strain ε: c ε² times ∫ |ξ| dV / 4.
+    /// Return the energy density ½ ∫ w dV of an untruncated family at isotropic strain ε. It is equal to
+    /// ¼ c ε² ∫ |ξ| dV.
     fn energy_density(dimension: Dimension, horizon: f64, strain: f64) -> f64 {
         let c = Pmb::new(dimension, 1.0, horizon).micromodulus;
         let moment = match dimension {

@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use crate::lanes::{Lanes, Simd};
 
-/// q by component, then q₀.
+/// Unit quaternion of a rotation: the components of q, then q₀.
 pub type Rotation = [f64; 4];
 
 /// The identity, R = I.
@@ -27,8 +27,8 @@ const MOST_ITERATIONS: usize = 40;
 /// the order of the square of this number.
 const CONVERGED: f64 = 1e-9;
 
-/// Return R of a deformation gradient in the plane or in space. In space, the result is the identity if
-/// det F ≤ 0 or if the iteration does not converge. In the plane, see `in_plane`.
+/// Return the rotation R of a deformation gradient F in the plane or in space. In the plane, `in_plane`
+/// computes R. In space, R is the identity if det F ≤ 0 or if the iteration does not converge.
 pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     let mut f = Matrix3::identity();
     f.view_mut((0, 0), (D, D)).copy_from(gradient);

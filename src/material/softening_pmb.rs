@@ -251,8 +251,8 @@ fn critical_stretch(given: &Given, strength: f64) -> f64 {
     })
 }
 
-/// Number of iterations that compute s0 from f_t. The largest stress depends weakly on sc/s0. Therefore each
-/// iteration gains more than half a digit of s0.
+/// Number of iterations that compute s0 from f_t. For a given s0, the largest stress in uniaxial tension
+/// depends only weakly on sc/s0. Therefore each iteration gains more than half a digit of s0.
 const STRENGTH_ITERATIONS: u32 = 8;
 
 /// Return s0 and sc from the keys of the deck. sc is above s0 only if the keys give a valid softening curve.
@@ -541,7 +541,8 @@ impl<const D: usize> Law<D> for SofteningPmb {
         squares * bond.length * (0.25 * self.elastic.micromodulus)
     }
 
-    /// Return the work of loading to κ, minus the work that unloading from κ returns.
+    /// Return the work that stretches a bond to κ, minus the work that the bond returns when it unloads
+    /// from κ.
     #[inline(always)]
     fn dissipated(&self, length: Lanes, [largest]: &[Lanes; 1]) -> Lanes {
         if largest.above(self.strength_stretch) == 0 {

@@ -9,7 +9,7 @@ use super::{BLOCK, Group, Members, Mesh, Runs, SIDE_SET, fault, position};
 use crate::error::{Result, excerpt};
 
 /// Node orders of Exodus that differ from the orders of [`super::kind`]. An order has one entry for each node
-/// after the corners: the corners between which this node lies.
+/// that follows the corners. The entry lists the corners between which this node lies.
 mod orders {
     use super::Between;
 
@@ -85,8 +85,7 @@ fn kind(name: &str, nodes: usize) -> Option<Kind> {
     is_known.then_some(Kind::new(form, nodes))
 }
 
-/// Return the position of each node of an element type in the node order of Exodus. The result has the node
-/// order of [`super::kind`].
+/// For each node in the order of [`super::kind`], return the position of this node in the order of Exodus.
 fn order(kind: Kind) -> Vec<usize> {
     kind.permutation(match (kind.form, kind.nodes) {
         (Form::Hexahedron, 20) => orders::HEXAHEDRON_20,
@@ -282,8 +281,9 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
 }
 
 /// Return the number (from 1), id and name of each block or set. Ids and names are in variables whose names
-/// start with `prefix`, such as `eb`. If the file has no ids, there is one block or set for each of the
-/// variables `VARIABLE1`, `VARIABLE2`, …. The id of each block or set is then its number. A missing name
+/// start with `prefix`, such as `eb`. If the file has no ids, there is one block or set for each
+/// variable whose name is `variable` and a number from 1, such as `connect1` and `connect2`. The id of each
+/// block or set is then its number. A missing name
 /// is replaced by `default`, an underscore and the id, such as `block_3`.
 fn entities(
     file: &Netcdf,

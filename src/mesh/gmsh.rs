@@ -67,7 +67,7 @@ mod orders {
     ];
 }
 
-/// Return the element type with this number in the format, and the order of the nodes after the corners.
+/// Return the element type that has this number in Gmsh files, and the order of its nodes after the corners.
 /// Return `None` for an unsupported type.
 fn kind(number: i64) -> Option<(Kind, &'static [Between])> {
     let (form, nodes) = match number {
@@ -559,7 +559,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Return an error unless the last word is on the line `line`, on which the node or element `number`
-    /// begins. `what` is the kind of this entry. In binary files, the line number does not change.
+    /// begins. `what` is `"node"` or `"element"`. In binary files, the line number does not change.
     fn is_on_line(&self, line: u64, what: &str, number: u64) -> Result<()> {
         if self.line == line {
             return Ok(());
@@ -568,8 +568,8 @@ impl<'a> Cursor<'a> {
         Err(fault(self.path, line, message))
     }
 
-    /// Return an error if further words follow on the line of the node or element `number`. `what` is the
-    /// kind of this entry. Binary files have no lines.
+    /// Return an error if further words follow on the line of the node or element `number`. `what` is
+    /// `"node"` or `"element"`. Binary files have no lines.
     fn end_of_line(&self, what: &str, number: u64) -> Result<()> {
         let is_text = matches!(self.encoding, Encoding::Text);
         let mut rest = self.bytes[self.at..].iter();
@@ -678,8 +678,8 @@ impl<'a> Cursor<'a> {
     }
 
     /// Read a `size_t`. If the number is a count of entries, it may be larger than the number of entries in
-    /// the file. In this case, reading the entries fails at the end of the file, because every entry takes
-    /// bytes.
+    /// the file. In this case, reading the entries fails at the end of the file. The end is always reached,
+    /// because each entry occupies at least one byte.
     fn size(&mut self) -> Result<u64> {
         match self.encoding {
             Encoding::Text => {

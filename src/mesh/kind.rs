@@ -159,8 +159,8 @@ impl Kind {
         &all[..self.nodes - self.corners()]
     }
 
-    /// Return, for each node in VTK's order, its position in another order. `other` lists the nodes after the
-    /// corners in the other order, in the form of [`Self::between`].
+    /// Return, for each node in VTK's order, its position in another order. Both orders begin with the same
+    /// corners. `other` lists the remaining nodes of the other order, in the form of [`Self::between`].
     ///
     /// # Panics
     /// If `other` lacks a node.

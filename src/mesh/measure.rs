@@ -109,7 +109,8 @@ fn gauss(points: usize) -> Vec<(f64, f64)> {
     }
 }
 
-/// Return the Gauss rule of a type, exact for volume and first moments; empty for a point.
+/// Return the Gauss rule of an element type; empty for a point. The rule is exact for the volume and the
+/// first moments of the element.
 fn rule(kind: Kind) -> Vec<GaussPoint> {
     let second_order = kind.nodes > kind.corners();
     // A Gauss rule of n points is exact up to the degree 2n − 1 in each coordinate. Collapsing the

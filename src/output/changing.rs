@@ -1,5 +1,5 @@
-//! Points of a result with adaptive refinement: each step has its own points. A step is an output here, as in
-//! VTKHDF.
+//! Points of a result with adaptive refinement: each step has its own points. In this file, the word step
+//! means an output, as in VTKHDF.
 
 use hdf5_metno::H5Type;
 

@@ -14,8 +14,8 @@ use std::io::ErrorKind;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
-/// Upper bound on the space of a group or dataset with its attributes and its group entry, bytes. The rows of
-/// datasets and the texts in attributes are counted separately.
+/// Upper bound on the space of a group or dataset in the file, bytes. It includes the attributes, and the
+/// entry in the parent group. The rows of datasets and the texts in attributes are counted separately.
 const OBJECT_BYTES: u64 = 8192;
 
 /// An HDF5 file written collectively; without MPI, a serial file.
@@ -344,8 +344,8 @@ impl<'a> CollectiveFile<'a> {
 
     /// Flush to the file system, so the file survives a kill of the process.
     ///
-    /// If the file has grown, the flush includes an fsync. Without an fsync, a loss of power could leave the
-    /// metadata partly written, which could destroy the file.
+    /// If the file has grown since the last fsync, the flush includes an fsync. Without an fsync, a loss of
+    /// power could leave the metadata partly written, which could destroy the file.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.

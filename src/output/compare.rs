@@ -1,8 +1,8 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
 //! Outputs and history rows are matched by time, points by id. Values are read in blocks of points; the
-//! history is read as a whole. The ids of two outputs are also read as a whole if the two lists of ids
-//! differ and at least one list does not ascend, as on refined grids.
+//! history is read as a whole. If the lists of ids of two outputs differ and at least one
+//! list does not ascend, both lists are also read as a whole. This case occurs on refined grids.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};
@@ -12,11 +12,12 @@ use std::ops::Range;
 /// Number of points that are read at once.
 const BLOCK: usize = 1 << 16;
 
-/// Largest difference of matched times, as a fraction of the interval between outputs or rows.
+/// Largest allowed difference between two matched times, as a fraction of the interval between outputs or
+/// rows.
 const TIME_TOLERANCE: f64 = 1e-6;
 
-/// Largest difference of matched times, as a fraction of the last time. This limit allows for the round-off
-/// of a sum over many steps.
+/// Largest allowed difference between two matched times, as a fraction of the last time. This limit allows
+/// for the round-off of a sum over many steps.
 const ROUND_OFF: f64 = 1e-13;
 
 /// Name of the field with the reference positions.
@@ -150,7 +151,7 @@ impl Comparison {
 }
 
 /// Compare two results. After each pair of outputs, `progress` is called with the count of compared pairs,
-/// the total count of pairs and the time (s).
+/// the total count of pairs and the time of the outputs (s).
 ///
 /// # Errors
 /// If a file is damaged. If the points of two outputs cannot be matched in order, and one of these outputs
@@ -235,8 +236,8 @@ enum Matching {
     /// The points are matched one block after the other. The ids of both outputs ascend, or both outputs have
     /// the same sequence of ids.
     InOrder,
-    /// By these pairs of rows. A pair has one row of each output. The pairs are sorted by the row of the
-    /// first output.
+    /// The points are matched by these pairs of rows. A pair has one row of each output. The pairs are sorted
+    /// by the row of the first output.
     Rows(Vec<[usize; 2]>),
 }
 
@@ -331,7 +332,7 @@ impl OutputPair<'_> {
         ))
     }
 
-    /// Compare some of the fields at pairs of rows, one row of each output.
+    /// Compare some of the fields at pairs of rows. Each pair has one row of each output.
     fn compare_rows(
         &self,
         pairs: &[[usize; 2]],
@@ -397,9 +398,9 @@ impl OutputPair<'_> {
 }
 
 /// Match two lists of ids, one list of each result. Both lists must ascend, or the lists must be equal.
-/// `is_last` is true for a list that ends with the last ids of its result. When the matching reaches the end
-/// of such a list, the remaining ids of the other list have no partner and count as used. Return the pairs of
-/// indices of equal ids, and the number of used ids of each list.
+/// `is_last` is true for a list that ends with the last ids of its result. If the matching reaches the end of
+/// such a list, the remaining ids of the other list have no partner. These ids also count as used. Return the
+/// pairs of indices of equal ids, and the number of used ids of each list.
 fn match_in_order(ids: &[Vec<u64>; 2], is_last: [bool; 2]) -> (Vec<[usize; 2]>, [usize; 2]) {
     let (mut pairs, mut used) = (Vec::new(), [0; 2]);
     loop {

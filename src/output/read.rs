@@ -168,7 +168,7 @@ impl ResultReader {
     }
 
     /// Return the rows of a dataset that belong to a range of points at one of the [times](Self::times).
-    /// `offsets` is the path of the table that holds, for each step, its first row in the dataset.
+    /// `offsets` is the path of a table with one entry per step: the first row of the step in the dataset.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);

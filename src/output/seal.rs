@@ -1,8 +1,9 @@
 //! A seal: a checksum appended to a file, to detect truncation and corruption.
 //!
 //! HDF5 ignores the bytes of the seal, because they follow the last object of the file. To compute the
-//! checksum, each rank reads a share of the file. The checksum is a sum over 8-byte words, each mixed with
-//! its index, so the checksum does not depend on the shares.
+//! checksum, each rank reads a share of the file. Each 8-byte word is mixed with its index in the file, and
+//! the checksum is the sum of the mixed words. Therefore the checksum does not depend on how the file is
+//! divided into shares.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -41,7 +42,7 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// Return the number in the seal of a file, as the caller of [`seal`] gave it. Return `None` if the file has
+/// Return the number that the caller of [`seal`] stored in the seal of a file. Return `None` if the file has
 /// no seal. The sealed bytes are not checked.
 ///
 /// # Errors

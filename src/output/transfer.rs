@@ -1,7 +1,7 @@
 //! Collective transfers of rows. No other file calls HDF5's C interface.
 //!
-//! The safe wrappers of HDF5 use the default transfer properties, with which the transfers of a parallel file
-//! are independent.
+//! The safe wrappers of HDF5 use the default transfer properties. With these properties, the transfers of a
+//! parallel file are independent instead of collective.
 
 use crate::comm;
 use hdf5_metno as hdf5;
@@ -32,7 +32,7 @@ pub(super) fn initialised_before_mpi() -> bool {
     BEFORE_MPI.load(Ordering::Relaxed)
 }
 
-/// Transfer properties: independent or collective transfers.
+/// Transfer properties of HDF5, which select independent or collective transfers.
 #[derive(Debug)]
 pub(super) struct Transfer {
     list: ManuallyDrop<hdf5::PropertyList>,

@@ -7,7 +7,7 @@ use crate::points::bins::boxes;
 /// This number of cells is allowed on any number of ranks.
 const ALWAYS_ALLOWED: usize = 100_000;
 
-/// Above this number of cells per rank, the borders between ranks do not get smoother.
+/// Sufficient number of cells per rank: with more cells, the borders between ranks do not get smoother.
 const SUFFICIENT_PER_RANK: usize = 2000;
 
 /// Above this total number of cells, the number of cells per rank is reduced. The reason: one rank partitions
@@ -103,8 +103,8 @@ impl Cells {
         x + self.counts[0] * (y + self.counts[1] * z)
     }
 
-    /// Sort key of a position (m): cell first, then box. Points that are close in space are then close in
-    /// memory.
+    /// Sort key of a position (m): cell first, then box. After points are sorted by this key, points that are
+    /// close in space are close in memory.
     pub fn order(&self, position: [f64; 3]) -> u64 {
         let [x, y, z] = self.box_of(position).map(|at| at % self.boxes);
         let within = x + self.boxes * (y + self.boxes * z);
@@ -112,7 +112,8 @@ impl Cells {
     }
 
     /// The cells that share a face, an edge or a corner with `cell`. Each item is the index of such a cell
-    /// and three flags. The flags state whether the cell is displaced from `cell` along x, y and z.
+    /// and three flags, one for each of the directions x, y and z. A flag is true if the cell with this index
+    /// is displaced from `cell` along the direction.
     pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
         let position = [cell % nx, cell / nx % ny, cell / nx / ny];

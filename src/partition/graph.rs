@@ -24,12 +24,12 @@ const FEW_CELLS_PER_PART: usize = 30;
 /// of cells with points is at most the number of ranks, each of these cells gets its own rank.
 ///
 /// - `occupation` is the number of points in each cell.
-/// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of an
-///   edge is proportional to the estimated number of bonds across it, multiplied by `ALONG_X` if its cells
-///   have different x positions.
-/// - With measured loads, the weight of a cell is multiplied by a time per bond: the measured time of the
-///   present owner of the cell, divided by the estimated number of bonds of this owner. Parts are numbered so
-///   that few points migrate.
+/// - The weight of a cell is proportional to the estimated number of bonds of its points. The weight of a
+///   graph edge is proportional to the estimated number of bonds between its two cells. If these cells have
+///   different x positions, the weight of the edge is multiplied by `ALONG_X`.
+/// - With measured loads, the weight of a cell is multiplied by the time per bond of the present owner of the
+///   cell. The time per bond is the measured time of the owner, divided by the estimated number of its bonds.
+///   Parts are numbered so that few points migrate.
 ///
 /// # Errors
 /// If METIS fails.
@@ -167,7 +167,7 @@ fn to_integers(weights: &[f64]) -> Vec<metis::Idx> {
         .collect()
 }
 
-/// Move a cell of the largest part to each empty part.
+/// For each empty part, move one cell from the largest part to the empty part.
 fn fill_empty_parts(part: &mut [metis::Idx], ranks: usize) {
     let mut sizes = vec![0_usize; ranks];
     for rank in part.iter() {
@@ -261,7 +261,7 @@ mod tests {
     }
 
     /// Points in a dense region have more bonds, and therefore take more time. The weights must not count
-    /// both this time and the bonds. If both ranks take the same time, few cells move.
+    /// both this time and the bonds. In this test, both ranks take the same time, so few cells must move.
     #[test]
     fn dense_regions_count_once() {
         let mut plate = Plate::new();

@@ -40,7 +40,7 @@ const HEAD: [f64; 2] = [0.5, 0.2];
 
 const WHITE: Colour = [255; 3];
 
-/// Draw arrows whose middles are at the points, and the legend.
+/// Draw arrows centred at the points, and draw the legend.
 ///
 /// The length of an arrow is proportional to the length of the projected vector. If a projected vector is
 /// longer than `longest`, its arrow is cut to the length of the longest arrow. Only some points have arrows,
@@ -189,7 +189,8 @@ fn legend(pen: &mut Pen, vectors: &Vectors, longest: f64, any_cut: bool, layout:
     pen.write(texts[1], [column + lengths[1] / 2.0, row], Running::Across);
 }
 
-/// Return a round vector length of at most `longest`, and the text of this length with its unit.
+/// Return the vector length for the legend, and the text of this length with its unit. The length is the
+/// largest number up to `longest` that is 1, 2 or 5 times a power of ten. It is 0 if `longest` is 0 or less.
 fn legend_entry(longest: f64, unit: &str) -> (f64, String) {
     if longest <= 0.0 {
         return (0.0, format!("0 {unit}").trim_end().to_owned());

@@ -1,9 +1,9 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
 //! These cells are the Voronoi cells of the points. The volume of a point limits the distance between the
-//! point and the border of its cell, so borders, holes and open cracks of a body stay visible. At pixels with
-//! points on all sides, cells extend farther to close gaps. A slice shows the sections of the 3-D Voronoi
-//! cells with the plane of the slice.
+//! point and the border of its cell, so borders, holes and open cracks of a body stay visible. This limit is
+//! larger at pixels that have points on all sides, so the cells close the gaps between points. A slice shows
+//! the sections of the 3-D Voronoi cells with the plane of the slice.
 
 use super::canvas::{Colour, Image};
 use super::layout::Layout;
@@ -70,8 +70,8 @@ struct Pixel {
     colour: Colour,
     /// A point is within [`REACH`] of the pixel.
     is_near: bool,
-    /// One bit per eighth of a full turn around the pixel, set if a point within [`REACH_INSIDE`] lies in
-    /// this direction.
+    /// One bit per eighth of a full turn around the pixel. The bit is set if a point within [`REACH_INSIDE`]
+    /// of the pixel lies in this eighth.
     directions: u8,
 }
 
@@ -159,7 +159,7 @@ fn eighth(along: f64, down: f64) -> u32 {
     }
 }
 
-/// Test whether there are points on all sides. This is true if each group of three adjacent eighths of a
+/// Test whether a pixel has points on all sides. This is true if each group of three adjacent eighths of a
 /// full turn contains at least one point. Every half turn then has a point, because a half turn contains
 /// three whole eighths.
 fn is_surrounded(directions: u8) -> bool {

@@ -242,7 +242,7 @@ mod tests {
         116.0 * luminance.cbrt() - 16.0
     }
 
-    /// Return the lightness of a map at 33 equally spaced fractions.
+    /// Return the lightness of a map at 33 equally spaced fractions from 0 to 1.
     fn lightnesses(map: ColourMap) -> Vec<f64> {
         (0..=32)
             .map(|step| lightness(map.colour(f64::from(step) / 32.0)))

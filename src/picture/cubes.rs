@@ -12,7 +12,7 @@ const BACKING: f64 = 1.3;
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
 const LEAST_CUBE: f64 = 2.0;
 
-/// Brightness of a face of a cube, for a face normal along x, y and z.
+/// Brightness of the three faces of a cube whose normals are along x, y and z, in this order.
 const BRIGHTNESS: [f64; 3] = [0.7, 0.86, 1.0];
 
 /// Smallest edge of a cube with uniform brightness on each face, pixels. For smaller cubes, the brightness of
@@ -22,9 +22,9 @@ const SMALL_CUBE: f64 = 10.0;
 /// Largest difference in depth between pixels whose brightness is averaged, divided by the edge of the cube.
 const SAME_SURFACE: f32 = 2.0;
 
-/// Limit of the cosine of the angle between the direction of view and the normal of a face. If the cosine is
-/// below this limit, the larger cube behind a cube is enlarged less along this normal. The limit is half the
-/// cosine in the isometric view.
+/// Limit of the cosine of the angle between the direction of view and the normal of a face. [`BACKING`]
+/// defines a larger cube behind each cube. Along a normal whose cosine is below the limit, this larger cube
+/// extends less far. The limit is half the cosine in the isometric view.
 const STEEP_COSINE: f64 = 0.288_675_134_594_812_9;
 
 /// Smallest cosine of the angle between the direction of view and the normal of a painted face. Faces with a
@@ -50,7 +50,7 @@ pub struct Cubes<'a> {
 /// The part of a cube that a pixel shows.
 #[derive(Debug, Clone, Copy)]
 struct Surface {
-    /// Depth times the scale of the picture, pixels. The larger of two depths is nearer to the viewer.
+    /// Depth times the scale of the picture, pixels. A larger depth is nearer to the viewer.
     depth: f32,
     /// Brightness of the face.
     brightness: f32,
@@ -105,9 +105,10 @@ impl<'a> Cubes<'a> {
         }
     }
 
-    /// Paint the (up to three) visible faces of a cube, and of a larger cube behind it. `centre` is the
-    /// position of the centre of the cube, `depth` the depth of this centre, and `edge` the edge of the cube,
-    /// all in pixels. A cube with an edge below [`LEAST_CUBE`] is painted as a square.
+    /// Paint the visible faces of a cube, and the visible faces of a larger cube behind it. Each of the two
+    /// cubes has at most three visible faces. `centre` is the position of the centre of the cube, `depth` the
+    /// depth of this centre, and `edge` the edge of the cube, all in pixels. A cube with an edge below
+    /// [`LEAST_CUBE`] is painted as a square.
     pub fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
         if edge < LEAST_CUBE {
             let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
@@ -192,7 +193,7 @@ impl<'a> Cubes<'a> {
     ///
     /// Small cubes on a deformed surface form steps. Without averaging, the sides of these steps would look
     /// like specks. A pixel of a small cube therefore gets the mean brightness of the surface in a square
-    /// window, which extends half an edge of the cube to each side.
+    /// window around the pixel. The window extends by half the edge of the cube to each side.
     pub fn shade(self) {
         let [width, height] = [self.image.width, self.image.height].map(i64::from);
         for row in 0..height {

@@ -42,13 +42,13 @@ const LEFT: f64 = 5.2;
 const TOP: f64 = 3.4;
 /// Margin for the labels below the frame, in text sizes.
 const BOTTOM: f64 = 4.2;
-/// Room in text sizes for a vertical colour bar and its labels.
+/// Room for a vertical colour bar and its labels, in text sizes.
 const UPRIGHT_BAR: f64 = 8.0;
-/// Room in text sizes for a horizontal colour bar and its labels.
+/// Room for a horizontal colour bar and its labels, in text sizes.
 const LYING_BAR: f64 = 5.4;
 /// Additional room for a ruler between the frame and the colour bar, in text sizes.
 const RIGHT: f64 = 3.0;
-/// Height in text sizes of the legend of the arrows, at the bottom of the picture.
+/// Height of the arrow legend at the bottom of the picture, in text sizes.
 const LEGEND: f64 = 1.5;
 /// Margin at a side without labels, in text sizes.
 const EMPTY: f64 = 2.2;

@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// Return the first and last column, and the first and last row, with ink.
+    /// Return the first and last column and the first and last row that contain dark pixels.
     fn inked(image: &Image) -> [u32; 4] {
         let dark: Vec<(u32, u32)> = (0..image.height)
             .flat_map(|row| (0..image.width).map(move |column| (column, row)))

@@ -84,7 +84,7 @@ pub struct Scene<'a> {
     pub is_logarithmic: bool,
     /// Title above the frame.
     pub title: &'a str,
-    /// Values at the ends of the colour bar; `None` for the smallest and the largest value.
+    /// Values at the ends of the colour bar. With `None`, these are the smallest and the largest drawn value.
     pub range: Option<(f64, f64)>,
     /// The view of the points.
     pub view: View,
@@ -274,7 +274,7 @@ fn index_limit(points: usize) -> Result<u32> {
     })
 }
 
-/// Fraction of the vectors, counted from the shortest one, whose arrows are never cut.
+/// Fraction of the vectors whose arrows are never cut. These vectors are the shortest ones.
 const WHOLE_ARROWS: f64 = 0.995;
 
 /// Largest ratio L/w at which no arrow is cut. L is the length of the longest of all vectors, and w is the

@@ -76,8 +76,8 @@ impl Bins {
         });
     }
 
-    /// Append to `found` the index of every point with 0 < distance² ≤ `square` (m²) from a position. Return
-    /// the number of points at the position itself.
+    /// Append to `found` the index of every point whose squared distance from `position` is above 0 and at
+    /// most `square` (m²). Return the number of points at the position itself.
     pub fn collect(&self, position: [f64; 3], square: f64, found: &mut Vec<u32>) -> usize {
         let mut coincident = 0;
         self.for_each_run(position, square, |entries| {
@@ -142,8 +142,8 @@ impl Bins {
     }
 }
 
-/// Return the edge (m) of boxes, at least `min_edge` (m), and the number of boxes per direction. The total
-/// number of boxes is at most twice the number of points (`points`), plus 64.
+/// Return the edge (m) of boxes, and the number of boxes per direction. The edge is at least `min_edge` (m).
+/// The total number of boxes is at most twice the number of points (`points`), plus 64.
 pub fn boxes(lower: [f64; 3], upper: [f64; 3], min_edge: f64, points: usize) -> (f64, [usize; 3]) {
     let mut edge = min_edge * (1.0 + 1e-6);
     loop {

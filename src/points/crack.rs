@@ -104,9 +104,9 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     })
 }
 
-/// Return the part of a bond between the faces of a crack whose mid-plane contains `origin`; `None` if there
-/// is no such part. For a crack without width, both ends of the part are the point where the bond crosses the
-/// plane.
+/// Return the part of a bond that lies between the faces of a crack; `None` if there is no such part. The
+/// mid-plane of the crack contains `origin`. For a crack without width, both ends of the part are the point
+/// where the bond crosses the plane.
 fn between_faces(
     origin: Vector,
     normal: Vector,
@@ -122,7 +122,7 @@ fn between_faces(
 }
 
 /// Return the part of a segment on which a linear coordinate lies in an interval; `None` if there is no such
-/// part. The interval [low, high] has length 1, and is enlarged by [`RIM`] at both ends.
+/// part. The interval extends from low − [`RIM`] to high + [`RIM`]. The difference high − low is 1.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,

@@ -59,8 +59,8 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     Ok(ids)
 }
 
-/// Return the first line with the entry `number`; lines are counted from 1. `None` if there is no such line
-/// or the file cannot be read. Comments and the heading do not count.
+/// Return the number of the first line with the entry `number`; lines are counted from 1. `None` if there is
+/// no such line or the file cannot be read. Comments and the heading are counted as lines, but not searched.
 pub fn line_of(path: &Path, number: u64) -> Option<u64> {
     let heading = heading(path).ok()?.map(|heading| heading.line);
     let text = std::fs::read_to_string(path).ok()?;

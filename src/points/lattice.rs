@@ -234,8 +234,8 @@ fn even_samples(samples: u64, count: u64) -> impl Iterator<Item = u64> {
     (0..if count == 0 { 0 } else { samples }).map(at)
 }
 
-/// Generate this rank's piece of a body's points, all with the id 0. Cells are ordered with x fastest. Each
-/// rank generates the points of consecutive cells.
+/// Generate this rank's piece of a body's points, all with the id 0. Cells are ordered so that x varies
+/// fastest. Each rank generates the points of consecutive cells.
 ///
 /// # Errors
 /// If cells are too far from the origin to be numbered.

@@ -190,7 +190,8 @@ pub(super) struct MeshAndPoints {
     point_of: Vec<u32>,
 }
 
-/// Read a mesh and generate its points, on one rank. The sets of the deck are not needed.
+/// Read a mesh and generate its points, on one rank. Unlike [`read`], this function does not use the sets of
+/// the deck.
 ///
 /// # Errors
 /// Same as for [`read`], except that coinciding elements and ambiguous names of sets are not detected.
@@ -309,10 +310,10 @@ fn bodies_of_elements(
 /// volume. Return the name of the part; `None` if there is no such part. `rest` is the index of the body that
 /// selects no block.
 ///
-/// The rest of the mesh consists of the elements that belong to no other body. If it has only single-node
-/// elements, the part is the whole rest of the mesh. In files of Exodus, the part may also be a block of
-/// spheres that no other body selects. In other files, single-node elements may define sets, so the part can
-/// only be the whole rest of the mesh.
+/// The rest of the mesh consists of the elements that belong to no other body. If all of these elements are
+/// single-node elements, the part is the whole rest of the mesh. In files of Exodus, the part may also be a
+/// block of spheres that no other body selects. In other files, single-node elements may define sets, so the
+/// part can only be the whole rest of the mesh.
 fn without_volume(mesh: &Mesh, bodies: &[u16], rest: u16) -> Option<String> {
     let is_left = |element: usize| bodies[element] == NO_BODY;
     let is_single = |element: usize| mesh.elements.kind(element).dimension() == 0;
@@ -506,7 +507,7 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
 /// Return the ids of the points of a group. A group has the points of
 ///
 /// - the elements of the group;
-/// - elements that have all corners of a face, edge or point element of the group;
+/// - elements whose nodes include all corners of a face, edge or point element of the group;
 /// - elements that have a node of the group.
 ///
 /// `marks` has one entry per node; all entries are false before and after the call.

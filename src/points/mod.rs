@@ -167,8 +167,9 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     Ok((points, total))
 }
 
-/// Displace points randomly from the centres of their cells, by at most `jitter.largest_shift` edges in each
-/// direction. `spacing` contains the edges of the cells, m.
+/// Displace points randomly from the centres of their cells. In each direction, the displacement is at most
+/// `jitter.largest_shift` times the edge length of a cell. `spacing` has the edge length (m) in each
+/// direction.
 fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     for point in points {
         for (k, edge) in spacing.iter().enumerate() {
@@ -183,7 +184,8 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
 ///
 /// # Errors
 /// If no mesh has the group that a set names, or if the points of a set differ from those of an earlier call.
-/// Only rank 0 knows the names of the groups and can suggest similar names.
+/// The message suggests similar names on rank 0 only, because the other ranks do not know the names of the
+/// groups.
 fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::PointsAndSets, u64)]) -> Result<()> {
     for (index, set) in problem.sets.iter().enumerate() {
         let Selector::Mesh(group) = &set.selector else {

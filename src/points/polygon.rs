@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-/// Upper limit on the mean number of boundaries between strips that an edge crosses.
+/// Upper limit on the number of strip boundaries that an edge crosses, as a mean over all edges.
 const MOST_ENTRIES: f64 = 8.0;
 
 /// Round-off of the distance to an edge, as a fraction of the polygon's extent.

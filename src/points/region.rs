@@ -43,7 +43,8 @@ struct Span {
     each: u64,
     /// Number of cells of all layers.
     all: u64,
-    /// Spans of each layer: along y in a span along z, along x in a span along y; empty in a span along x.
+    /// Spans within each layer. They lie along y if this span lies along z, and along x if this span lies
+    /// along y. Empty if this span lies along x.
     within: Vec<Span>,
 }
 

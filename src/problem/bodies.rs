@@ -47,7 +47,7 @@ impl Body {
         jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })
     }
 
-    /// Test whether the cells have several points.
+    /// Test whether each cell of the body's lattice has several points.
     pub fn has_gauss_points(&self) -> bool {
         self.quadrature() == Quadrature::Gauss
     }
@@ -97,7 +97,7 @@ pub enum VolumeCorrection {
     None,
     /// The factor falls linearly with the distance, from 1 at δ − dx/2 to 0 at δ + dx/2.
     Linear,
-    /// The same linear factor up to the distance δ, and 0 beyond it.
+    /// The factor of [`Self::Linear`] up to the distance δ, and 0 beyond this distance.
     LinearInside,
     /// The factor is the fraction of the cell that lies within the horizon.
     Exact,
@@ -108,7 +108,7 @@ pub enum VolumeCorrection {
 pub enum Quadrature {
     /// One point at the centre.
     Midpoint,
-    /// Two points along each axis, at a distance of √3/3 of half the edge from the centre.
+    /// Two points along each axis. In each direction, a point lies at ±√3/3 of half the edge from the centre.
     Gauss,
 }
 
@@ -227,14 +227,14 @@ impl InterfacePair {
     }
 }
 
-/// Elastic constants and horizon of the bonds between two blocks.
+/// Rule for the elastic constants and the horizon of the bonds between two blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InterfaceRule {
     /// No bonds join the blocks.
     None,
-    /// The mean of the two moduli, and the mean of the two horizons.
+    /// The mean of the two Young's moduli, and the mean of the two horizons.
     Average,
-    /// The smaller of the two moduli, and the smaller of the two horizons.
+    /// The smaller of the two Young's moduli, and the smaller of the two horizons.
     Minimum,
     /// Each end computes its half of the bond force with the constants of its own body.
     Own,
@@ -272,8 +272,8 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The mean of the stress measures of the bond's ends. An end counts only if it acts on the bond and its
-    /// point carries stress.
+    /// The mean of the stress measures of the bond's ends. An end counts only if its force state acts
+    /// on the bond and its point carries stress.
     Stress(StressRule),
 }
 
@@ -348,7 +348,7 @@ pub enum Shape {
         /// Radius, m.
         radius: f64,
     },
-    /// A cylinder between the centres of its ends.
+    /// A cylinder, given by its radius and the centres of its ends.
     Cylinder {
         /// Centre of one end.
         from: [f64; 3],

@@ -16,7 +16,8 @@ pub struct Contact {
 pub struct ContactPair {
     /// Name in the deck.
     pub name: String,
-    /// Names of the two bodies; the same name twice for the points of one body.
+    /// Names of the two bodies. If the rule is for the points of one body, both names are the name of this
+    /// body.
     pub bodies: [String; 2],
     /// The rule; `None` for no contact.
     pub rule: Option<ContactRule>,

@@ -30,7 +30,7 @@ pub enum CheckpointRule {
     Simulation(Interval),
 }
 
-/// Schedule and threshold of rebalancing points between ranks.
+/// Schedule and threshold for the rebalancing of points between ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
     /// Number of steps between comparisons of rank times.
@@ -272,9 +272,9 @@ pub enum Field {
     NewlyBrokenBonds,
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for correspondence laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 if the point carries no force, otherwise 0. A point carries no force if its intact bonds are too few
-    /// or too stiff for its law. It also carries no force if the law defines no stress at the deformation of
-    /// the point or of one of its bonds.
+    /// 1 if the point carries no force, otherwise 0. A point carries no force if it has too few intact bonds
+    /// for its law, or if the intact part of its family is too stiff. It also carries no force if the law
+    /// defines no stress at the deformation of the point or of one of its bonds.
     Singular,
     /// Temperature, K. Points without a prescribed temperature have the reference temperature of their
     /// material.

@@ -49,7 +49,7 @@ impl Statistic {
         }
     }
 
-    /// Return the SI unit of this number for the values of a field.
+    /// Return the SI unit of this statistic of a field.
     pub fn unit(self, field: Field) -> &'static str {
         match self {
             Self::Sum | Self::Mean | Self::Minimum | Self::Maximum => field.unit(),

@@ -23,7 +23,7 @@ pub struct Adaptive {
     /// Largest number of bonds of one point that may break in a step. If more bonds break, the step is
     /// repeated with a smaller Δt.
     pub most_broken: u64,
-    /// A step is calm if at most this number of bonds of each point break.
+    /// A step is calm if it breaks at most this number of bonds at each point.
     pub stable_broken: u64,
     /// Number of consecutive calm steps before Δt is raised.
     pub steps: u64,

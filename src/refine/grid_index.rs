@@ -21,8 +21,8 @@ pub(super) fn parents(index: GridIndex) -> impl Iterator<Item = GridIndex> {
     between(low, high)
 }
 
-/// The indices around an index, at a distance of half a spacing along one or several axes: 2 in 1-D, 8 in
-/// 2-D, 26 in 3-D. The results are in spacings of the next finer level.
+/// The positions around a grid index, at a distance of half a spacing along one or several axes: 2 in 1-D,
+/// 8 in 2-D, 26 in 3-D. The results are grid indices in spacings of the next finer level.
 pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item = GridIndex> {
     let middle = index.map(|x| 2 * x);
     let step = |k: usize| i64::from(k < dimension);

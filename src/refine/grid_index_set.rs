@@ -43,7 +43,7 @@ impl GridIndexSet {
         self.word(word) >> bit & 1 == 1
     }
 
-    /// The bits of `word`. A bit is 1 if this set contains the index of the bit.
+    /// The bits of `word`. A bit is 1 if this set contains the grid index that belongs to the bit.
     pub(super) fn word(&self, word: GridIndex) -> u64 {
         self.words.get(&word).copied().unwrap_or(0)
     }

@@ -195,9 +195,9 @@ impl<'a> Grids<'a> {
         }
     }
 
-    /// For each suppressed node half-way between two adjacent nodes of a level: the face between the cells of
-    /// the two nodes. Each item contains the centre of the face (m), the edge lengths of the cells (m), and
-    /// the axis normal to the face.
+    /// Return one face per suppressed node that is half-way between two adjacent nodes of a level. It is the
+    /// face between the cells of these two nodes. Each item contains the centre of the face (m), the edge
+    /// lengths of the cells (m), and the axis normal to the face.
     pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
@@ -409,7 +409,7 @@ impl BodyGrid<'_> {
         self.pattern.node(&|cell| cells.has_cell(cell), index)
     }
 
-    /// Reference position (m) of a grid index in spacings of a level.
+    /// Return the reference position (m) of a grid index. The index counts spacings of the given level.
     fn position(&self, level: u32, index: GridIndex) -> [f64; 3] {
         let scale = 0.5_f64.powi(level as i32);
         self.cells.position(index.map(|x| x as f64 * scale))

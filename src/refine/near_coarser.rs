@@ -15,8 +15,8 @@ pub struct NearCoarser<'a> {
     /// contain indices of this grid.
     coarsest: u64,
     /// For each bit of a word, the words that contain indices near the index of the bit. An index is near if
-    /// it lies within the given distance. Each of these words is given by two values: the offset to this
-    /// word, and the bits of the near indices in this word.
+    /// it lies within the given distance. Each of these words is stored as two values: its offset from the
+    /// word of the bit, and its bits that belong to near indices.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
@@ -67,7 +67,8 @@ impl<'a> NearCoarser<'a> {
     }
 
     /// Test whether a coarser node lies within the given distance from the node at `index`. The result is
-    /// true if, at an index within this distance, a node of the level is possible but does not exist.
+    /// true if no node of the level exists at some index within this distance, although a node is possible
+    /// at this index (see [`Pattern::is_possible`]).
     ///
     /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {
@@ -84,8 +85,8 @@ impl<'a> NearCoarser<'a> {
         })
     }
 
-    /// Return the bits of a word; a bit is set if a node exists at its index. Bits of indices at which no
-    /// node is possible have no meaning.
+    /// Return one bit for each grid index of a word. A bit is set if a node exists at the grid index of the
+    /// bit. Bits of indices at which no node is possible have no meaning.
     fn occupied(&self, word: GridIndex) -> u64 {
         let steps = (1 << self.level).max(EDGE);
         let on_coarsest = word.iter().all(|x| x * EDGE % steps == 0);

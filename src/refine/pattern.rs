@@ -107,8 +107,8 @@ impl Pattern {
         node.filter(|node| !is_in(&self.permanent, node))
     }
 
-    /// The nodes that have been removed by coarsening the node at `index` of `level`, as grid indices in
-    /// spacings of the finest level.
+    /// The nodes that the coarsening of a node has removed, as grid indices in spacings of the finest level.
+    /// `level` is the level of the coarsened node, and `index` is its grid index in spacings of this level.
     pub fn removed(
         &self,
         body: &impl Fn(GridIndex) -> bool,
@@ -242,8 +242,8 @@ impl Pattern {
         self.suppressed.iter().copied()
     }
 
-    /// The nodes of canonical level `level` that exist now but not in `earlier`, as indices of this level,
-    /// unordered. `level` is at least 1.
+    /// The nodes with the canonical level `level` that exist now but not in `earlier`, unordered. Each node
+    /// is given by its grid index at this level. `level` is at least 1.
     pub fn created_since(
         &self,
         earlier: &Self,

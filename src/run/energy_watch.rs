@@ -2,7 +2,8 @@
 //!
 //! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
 //! last load step. In a run without an earlier load step, it is the change since the start of the run.
-//! Negative fracture energy is left out of this change. The energy input is `EnergyWatch::input`.
+//! If breaking bonds have added energy, the fracture energy is negative. The energy gain does not include a
+//! negative fracture energy. The energy input is `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -85,8 +86,8 @@ pub struct EnergyWatch {
 }
 
 impl EnergyWatch {
-    /// Create the watch for a run before its first step. `largest` is the largest energy of earlier rows, if
-    /// the run is a restart (J); otherwise 0. Collective.
+    /// Create the watch for a run before its first step. `largest` is the largest energy of the rows before a
+    /// restart, J; 0 if there are none. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>, largest: f64) -> Self {
         let (problem, model) = (simulation.problem, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
@@ -129,8 +130,8 @@ impl EnergyWatch {
         Ok(growth.into_iter().chain(of_breaking).collect())
     }
 
-    /// Record the row of a load step. The errors of load steps do not come from the time step, so they do not
-    /// count as an energy gain of later time steps.
+    /// Record the row of a load step. The energy error of a load step does not come from the size of a time
+    /// step. This error therefore does not count as an energy gain of later time steps.
     fn note_load_step(&mut self, row: &HistoryRow) {
         self.add_input(row);
         self.gain_of_load_steps = gain_since_start(row);

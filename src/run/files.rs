@@ -74,8 +74,8 @@ impl Files {
         paths.iter().try_for_each(|path| remove(path))
     }
 
-    /// If the main result of an earlier run has been removed, remove the other files of this run: further
-    /// results, side-cars, the history, tables of cracks, and the files `stale`. Called on rank 0.
+    /// If the main result of an earlier run has been removed, remove the other files of the earlier run:
+    /// further results, side-cars, the history, tables of cracks, and the files `stale`. Called on rank 0.
     ///
     /// # Errors
     /// If a file cannot be removed.

@@ -405,7 +405,8 @@ impl<'a> Job<'a> {
         Ok(LoopEnd::Complete)
     }
 
-    /// Return the error of an invalid request of an observer. The error is the same on all ranks. Collective.
+    /// Return the error that an invalid request of an observer causes. The error is the same on all ranks.
+    /// Collective.
     fn wrong_request<const D: usize>(&self, stepper: &Stepper<'a, D>) -> Error {
         let own = stepper.wrong_request().cloned().map_or(Ok(()), Err);
         match agree(self.comm, own) {

@@ -43,7 +43,7 @@ pub enum Message {
     SetUp {
         /// Time step of the first stage, s.
         step: f64,
-        /// Stable step of the first stage, with the scaled density of this stage, s.
+        /// Stable step of the first stage (s), computed with the scaled density of this stage.
         stable_step: f64,
         /// Figures and warnings.
         survey: Survey,
@@ -158,7 +158,7 @@ pub trait RunState {
     /// Return the energies of all points, J. A request needs one or two passes over the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
-    /// Stop the run before its end, with a checkpoint. A request by one rank stops all ranks. If the
+    /// Write a checkpoint and stop the run before its end. A request by one rank stops all ranks. If the
     /// request is made in [`Observer::row`], the run stops at the step of this row. Otherwise, the run stops
     /// up to ten explicit steps, or up to ten iterations of load steps, later.
     fn stop(&mut self);

@@ -142,7 +142,8 @@ impl<'a> Recorder<'a> {
         outputs.any(|file| file.schedule.is_due(clock)) || self.rows.is_due(clock)
     }
 
-    /// Write the due outputs and history row, and pass the row to `observer`. Collective.
+    /// Write the outputs that are due. If a history row is due, write the row and pass it to `observer`.
+    /// Collective.
     ///
     /// # Errors
     /// If a write fails, for example because the disk is full.

@@ -27,7 +27,7 @@ pub struct Restart {
 /// # Errors
 /// - If there is no intact checkpoint.
 /// - If the checkpoint was written for a deck with other physics. The message lists the differences.
-/// - If the checkpoint was written for other points, or if the points of a set were different.
+/// - If the points, or the points of a set, differ from those for which the checkpoint was written.
 /// - If the end time of the run is not after the start of the last step before the checkpoint.
 pub fn restart<const D: usize>(
     simulation: &mut Simulation<'_, D>,
@@ -91,7 +91,8 @@ pub fn restart<const D: usize>(
     })
 }
 
-/// Return the sets of both fingerprints whose points differ, as sections of the deck.
+/// Compare the sets that both fingerprints contain. For each set whose points differ, return the name of its
+/// section in the deck.
 fn changed_sets(old: &Fingerprint, new: &Fingerprint) -> Vec<String> {
     let has_changed = |(name, hash): &&(String, u64)| {
         let mut known = old.sets.iter();

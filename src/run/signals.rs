@@ -22,8 +22,8 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Further stop signals within this interval after the first are ignored, because the launcher and the
-    /// batch system may both send a stop signal.
+    /// Time after the first stop signal during which further stop signals are ignored. They are ignored
+    /// because the launcher and the batch system may both send a stop signal.
     pub const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
     /// Start a thread that receives the signals.

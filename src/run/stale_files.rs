@@ -1,6 +1,6 @@
-//! Files of an earlier run in the output folder that a new run does not replace. Each of these files
-//! is a further result or the table of a crack. The deck no longer contains the output or the crack to which
-//! the file belongs.
+//! Stale files in the output folder: an earlier run wrote them, and a new run does not replace them. Each of
+//! these files is a further result or the table of a crack. The deck no longer contains the output or the
+//! crack to which the file belongs.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};
@@ -16,8 +16,8 @@ use super::files::Files;
 const LONGEST_HEADING: u64 = 1 << 20;
 
 /// Find the files of earlier runs that a run of this problem does not replace: further results with their
-/// side-cars, and tables of cracks. A file with the name of a further result or of a table of a crack is
-/// omitted if no earlier run wrote it. The names of the earlier cracks are read from the history file.
+/// side-cars, and tables of cracks. A file that no earlier run wrote is omitted, even if it has the name of a
+/// further result or of a table of a crack. The names of the earlier cracks are read from the history file.
 /// Therefore the function must be called before the run replaces this file. Only rank 0 calls the function.
 ///
 /// # Errors

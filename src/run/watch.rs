@@ -124,8 +124,8 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Create the watch. `limit` is the start and the duration of a wall-clock limit. The default inside a
-    /// Slurm job is the limit of the job.
+    /// Create the watch. `limit` is the start and the duration of a wall-clock limit. If `limit` is `None`
+    /// inside a Slurm job, the time limit of the job applies.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
@@ -151,8 +151,8 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration. Return whether a decision is due. If the iteration has completed a step, `step` is
-    /// the clock after this step, otherwise `None`.
+    /// Count an iteration. Return whether a decision is due. `step` is the clock after the step that the
+    /// iteration has completed; `None` if it has completed no step.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;
         self.iterations >= self.next_decision || self.is_scheduled(step)

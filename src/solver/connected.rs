@@ -41,8 +41,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Return the fragment id of each owned point: the smallest id among this point and all points that
-    /// chains of intact bonds connect to this point. Collective.
+    /// Return the fragment id of each owned point. The fragment id is the smallest id of the point itself and
+    /// of all points that are connected to it by chains of intact bonds. Collective.
     pub fn fragment_ids(&mut self) -> Vec<f64> {
         let mut ids: Vec<f64> = self.model.ids.iter().map(|id| *id as f64).collect();
         self.spread_least(&mut [&mut ids]);

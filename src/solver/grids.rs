@@ -84,8 +84,8 @@ pub fn grids(
     Ok(grids)
 }
 
-/// Record that the points of a block lie on a grid: mark the block in a known grid that coincides with this
-/// grid, or add a new grid.
+/// Record that the points of a block lie on a grid. If a known grid coincides with this grid, mark the block
+/// in the known grid. Otherwise, add this grid to `grids`.
 fn add(
     grids: &mut Vec<GridFrame>,
     Cells { centre, edges }: Cells,
@@ -123,7 +123,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
 
 /// Detect the grid of a body's points. The result is `None` unless all points lie on the grid and have the
 /// same volume. This volume must equal the volume of a cell, with the relative tolerance [`VOLUME`]. If the
-/// points form a single layer in any direction, their volume is not compared with a cell. Collective.
+/// points form a single layer in at least one direction, their volume is not compared with the volume of a
+/// cell. Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,

@@ -57,7 +57,8 @@ impl Expansion {
 }
 
 impl<const D: usize> Model<D> {
-    /// Create the model from a distributed point cloud with `coarsest` points of level 0 over all ranks.
+    /// Create the model from a distributed point cloud. `coarsest` is the number of points of level 0 over
+    /// all ranks.
     pub fn new(problem: &Problem, domain: &Domain, coarsest: u64) -> Self {
         let owned = &domain.points[..domain.owned];
         Self {
@@ -129,9 +130,9 @@ impl<const D: usize> Model<D> {
         self.damping[usize::from(self.block[point])]
     }
 
-    /// Return the sum of `force` and the viscous damping −r ρ u̇ of an owned point, N/m³. `force` is a
-    /// component of the force density on the point, and `velocity` is the same component of the velocity u̇
-    /// (m/s).
+    /// Return the sum of `force` and the viscous damping −r ρ u̇ of an owned point, N/m³. r is the rate of
+    /// [`Self::damping_of`], and ρ is the density of [`Self::density_of`]. `force` is a component of the
+    /// force density on the point, and `velocity` is the same component of the velocity u̇ (m/s).
     #[inline]
     pub fn with_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
         let damping = self.damping_of(point);

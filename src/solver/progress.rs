@@ -18,7 +18,7 @@ pub struct Progress {
     pub step_control: StepControl,
     /// Totals of the refinements during the run.
     pub refined: Refined,
-    /// Kinetic energy that changes of the density scale between stages have added, J.
+    /// Kinetic energy added by changes of the density scale between stages, J.
     pub density_scale_energy: f64,
     /// Progress of the load step; `is_settled` is true in explicit stages.
     pub load_step: LoadStep,

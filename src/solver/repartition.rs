@@ -52,8 +52,8 @@ impl BalanceWatch {
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
-    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
-    /// are freed.
+    /// memory for its bonds. The error is the same on all ranks. After an error, the run cannot continue,
+    /// because its points have been freed.
     pub fn rebalance_if_due<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -92,7 +92,7 @@ impl BalanceWatch {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Create the owned points in the form in which they migrate.
+    /// Return the owned points as [`Point`] values, the form in which points migrate.
     pub(super) fn pieces(&self) -> Vec<Point> {
         let model = &self.model;
         let point = |k: usize| {
@@ -122,8 +122,8 @@ impl<const D: usize> Simulation<'_, D> {
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
-    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
-    /// are freed.
+    /// memory for its bonds. The error is the same on all ranks. After an error, the run cannot continue,
+    /// because its points have been freed.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

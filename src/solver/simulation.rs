@@ -82,7 +82,7 @@ pub struct Undeformed {
     /// Number of intact bonds of the owned points before any bond could break. A bond between two owned
     /// points counts twice. `None` if no bond can break at the initial positions, see `starts_deformed`.
     pub intact: Option<u64>,
-    /// Stable step with the density of the materials, s.
+    /// Stable step with the unscaled density of the materials, s.
     pub stable_step: f64,
 }
 
@@ -95,8 +95,8 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration and conditions. The copy of displacements and thermal stretches for the bond passes is
-    /// included.
+    /// Integration and conditions. This includes the time to copy displacements and thermal stretches for
+    /// the bond passes.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -119,9 +119,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Create and distribute the points and bonds, and evaluate the forces at time 0. Collective.
     ///
     /// # Errors
-    /// If the problem cannot be run. Examples: the points cannot be created, a set of a condition is empty,
-    /// there is no stable step, or no support holds a loaded piece in a stage of load steps. The error is the
-    /// same on all ranks.
+    /// If the problem cannot be run, for example in these cases:
+    ///
+    /// - The points cannot be created.
+    /// - The set of a condition contains no points.
+    /// - There is no stable step.
+    /// - In a quasi-static stage, no support holds a piece on which a load acts.
+    ///
+    /// The error is the same on all ranks.
     pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
@@ -281,10 +286,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Make one step, with or without its second half kick, or one iteration of a load step.
-    /// `half_kick_pending` says whether the second half kick of the previous step must still be applied. This
-    /// argument must be false if a stage begins or if contact changes the step. Returns whether the second
-    /// half kick of this step must still be applied. Collective.
+    /// Make one explicit time step, or one iteration of a load step. An explicit step may leave its second
+    /// half kick to the next call. `half_kick_pending` says whether the second half kick of the previous step
+    /// must still be applied. This argument must be false if a stage begins or if contact changes the step.
+    /// Returns whether the second half kick of this step must still be applied. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
@@ -592,9 +597,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// Complete a step of length `step` (s) after the forces at the new positions have been evaluated: apply the
-/// loads, the second half kick and the supports, and add the work. Returns whether all velocities and
-/// reactions are finite.
+/// Complete a step of length `step` (s) after the forces at the new positions have been evaluated. Apply the
+/// loads, the second half kick and the supports. Then add the work of loads and supports, and the energy that
+/// viscous damping has dissipated. Return whether all velocities and reactions are finite.
 fn second_half<const D: usize>(
     part: &mut Part<'_, D>,
     conditions: &mut PartConditions<'_, D>,

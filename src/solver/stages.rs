@@ -131,8 +131,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// prescribed motion keep their velocity. Record the change of kinetic energy. Returns whether the
     /// velocities and reactions of supported points are finite. Collective.
     ///
-    /// If momentum is conserved, the change of density exerts no force. Constant velocities would need an
-    /// impulse. A constant kinetic energy would need an impulse that depends on the frame of reference.
+    /// If momentum is conserved, the change of density exerts no force. To conserve the velocities instead,
+    /// an impulse would be needed. To conserve the kinetic energy instead, an impulse would be needed that
+    /// depends on the frame of reference.
     fn keep_momentum(&mut self, factor: f64) -> bool {
         let before = self.kinetic_energy() / factor;
         let components = self.fields.velocity.iter_mut();

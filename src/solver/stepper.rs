@@ -15,17 +15,16 @@ use super::simulation::Times;
 
 /// Driver that makes the steps of a simulation.
 ///
-/// Velocities are defined at half steps, as in the leapfrog form of Verlet. A step ends with the forces at
-/// the new positions. The second half kick of this step is applied together with the first half kick of the
-/// next step, in one loop over the points. Until then, the velocities, reactions and external forces do not
-/// yet have their values at the full step. The same holds for the external work, and for the power and energy
-/// of damping. Therefore a caller gets the [`Simulation`] only from [`Self::at_full_step`], which applies the
-/// pending half kick first. The results do not depend on how often this function is called.
+/// Velocities are defined at half steps, as in the leapfrog form of Verlet. Each step evaluates the forces at
+/// the new positions before the second half kick. This half kick is applied together with the first half kick
+/// of the next step, in one loop over the points. Until then, the velocities, reactions and external forces
+/// do not yet have their values at the full step. The same holds for the external work, and for the power and
+/// energy of damping. Therefore a caller gets the [`Simulation`] only from [`Self::at_full_step`], which
+/// applies the pending half kick first. The results do not depend on how often this function is called.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
     /// Whether the second half kick of the last step must still be applied.
     half_kick_pending: bool,
-    /// Requests of an observer on this rank.
     requests: Requests,
 }
 
@@ -131,7 +130,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &self.simulation.progress.load_factors
     }
 
-    /// Return the index of the load with this name, among all conditions of the problem.
+    /// Return the index of the load `name` in the list of all conditions of the problem.
     ///
     /// # Errors
     /// If no condition has this name, or if the condition is not a load.

@@ -14,12 +14,12 @@ use super::motion::clock::steps_to;
 const MOST_STEPS: f64 = 1e15;
 
 /// Return the length of the first step of each stage (s), and the number of steps of the stage if no bond
-/// breaks. `stable` is the stable step with the density of the materials, s. An automatic step divides the
-/// stage evenly, unless `[time.adaptive] largest` limits the step.
+/// breaks. `stable` is the stable step (s) for the density of the materials, without `density_scale`. An
+/// automatic step divides the stage evenly, unless `[time.adaptive] largest` limits the step.
 ///
 /// # Errors
 /// - If no point has a bond, and a stage has load steps or an automatic step.
-/// - If a stage has too many steps to count.
+/// - If a stage could have more than `MOST_STEPS` steps.
 /// - If a step is too long for viscous damping.
 /// - If the adaptive rule could repeat one step more than `MOST_REPEATS` times.
 pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
@@ -148,8 +148,8 @@ fn damping(problem: &Problem) -> f64 {
     rates.fold(0.0, f64::max)
 }
 
-/// Return the largest automatic step of a stage, s. `stable` is the stable step with the density of the
-/// materials, s.
+/// Return the largest automatic step of a stage, s. `stable` is the stable step (s) without density
+/// scaling.
 pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) -> f64 {
     let damped = DAMPED / damping(problem);
     safety * (stable * time.density_scale.sqrt()).min(damped)

@@ -19,7 +19,7 @@ const OVERHEAD: f64 = 64.0 * 1024.0;
 /// indices takes 20 bytes.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
-/// Bytes of a bond in a lattice, at each end. An end of the bond takes one bit, which is 1/8 byte.
+/// Bytes of a bond in a lattice, at each end: one bit, which is 1/8 byte.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
 /// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which
@@ -68,7 +68,8 @@ pub struct Cost {
     /// contact search), without ghosts, bytes. The first entry is for runs on one rank, the second for runs
     /// on several ranks.
     pub time_loop: [f64; 2],
-    /// Disk space of the main result, including the history, and then of each further result.
+    /// Disk space of each result. The first entry is the main result, including the history. The other
+    /// entries are the further results.
     pub results: Vec<ResultCost>,
     /// Size of one checkpoint, bytes; a run keeps two checkpoints.
     pub checkpoint: f64,
@@ -104,7 +105,7 @@ struct Counts {
 
 impl Cost {
     /// Compute the cost of a run that is set up on one rank, with `columns` history columns and
-    /// `output_points` points in each result. Memory is estimated if it was not measured.
+    /// `output_points` points in each result. If `measured` is `None`, the memory is estimated.
     pub fn of<const D: usize>(
         simulation: &Simulation<'_, D>,
         columns: usize,

@@ -53,8 +53,8 @@ pub struct Seconds {
     pub outputs: Vec<f64>,
 }
 
-/// Set up a problem on one rank, and compute its figures for `ranks` ranks. With `measure`, also measure the
-/// times of a force evaluation, a history row and the outputs.
+/// Set up a problem on one rank, and compute the figures of a run on `ranks` ranks. With `measure`, also
+/// measure the times of a force evaluation, a history row and the outputs.
 ///
 /// # Errors
 /// Same as for a run before its first step.
@@ -100,7 +100,7 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
     })
 }
 
-/// Return the edges of the bounding box of all points, m.
+/// Return the edge lengths of the bounding box of all points, m.
 fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
     simulation.model.reference.each_ref().map(|coordinates| {
         let low = coordinates.iter().copied().fold(f64::INFINITY, f64::min);

@@ -249,7 +249,8 @@ fn safeties(problem: &Problem) -> Vec<f64> {
 }
 
 /// Return the stiffness of a family with bonds stretched by s = `stretch`, divided by the stiffness that the
-/// stable step assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
+/// stable step assumes. The tension of a stretched bond also resists displacements across the bond. The
+/// stiffness across the bond is s/(1 + s) of the stiffness along the bond.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }

@@ -6,7 +6,7 @@ use crate::points::{BodyPoints, LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
-/// Maximum number of lattice cells that are read to count neighbours, over all samples of a body.
+/// Maximum number of lattice cells that are read to count the neighbours of all sampled points of a body.
 const MAX_CELLS_READ: f64 = 4e6;
 
 /// Maximum number of points per body at which neighbours are counted.
@@ -86,7 +86,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
 }
 
 /// Return the mean number of neighbours that a point of a body has on the lattices of all bodies, from
-/// sampled points. `reach` is the longest bond to each of `others`, m.
+/// sampled points. `reach` has the length of the longest bond to each of `others`, m.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
@@ -120,7 +120,8 @@ struct Rows {
     output_points: Vec<f64>,
 }
 
-/// Return the figures of the bodies whose points come from files or meshes, by body.
+/// Return one entry per body. For a body whose points come from a file or a mesh, the entry has the figures
+/// of this body. For any other body, all numbers of the entry are 0.
 fn from_files(problem: &Problem) -> Vec<Rows> {
     let none = Rows {
         output_points: vec![0.0; 1 + problem.further_outputs.len()],

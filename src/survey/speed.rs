@@ -1,4 +1,4 @@
-//! Measurement of the time loop.
+//! Measurement of the speed of the time loop.
 
 use std::time::{Duration, Instant};
 
@@ -20,7 +20,7 @@ pub struct Speed {
     pub ghosts: u64,
     /// Number of bonds of owned points, counted at each owned end.
     pub directed_bonds: u64,
-    /// Number of bonds of owned points in lattice families, counted at each owned end.
+    /// Number of the [`Self::directed_bonds`] that are in lattice families.
     pub lattice_bonds: u64,
     /// Memory of the bonds, bytes.
     pub bond_bytes: u64,
@@ -45,7 +45,7 @@ pub struct Speed {
 /// settle. Collective.
 ///
 /// # Errors
-/// Same as for a run; also if the motion of a point is not finite.
+/// If the set-up of the simulation fails, if a value or a motion is not finite, or if a load step has failed.
 pub fn speed(
     problem: &Problem,
     comm: &dyn Communicator,

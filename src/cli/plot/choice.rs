@@ -1,4 +1,4 @@
-//! The output, the field and the view of a picture, from the arguments of the command.
+//! Choice of the output, the field and the view of a picture, according to the arguments of the command.
 
 use std::path::Path;
 
@@ -9,11 +9,13 @@ use fissure::picture::{Axis, Camera, ColourMap, View};
 
 use crate::cli::without_output;
 
-/// Largest distance from the nearest output, for a requested time before the first or after the last output.
-/// The distance is a fraction of the interval between the first two or the last two outputs, respectively.
+/// Largest distance of a requested time from the nearest output, if the time is before the first or after the
+/// last output. The distance is given as a fraction of an interval between outputs. Before the first output,
+/// this is the interval between the first two outputs. After the last output, it is the interval between the
+/// last two outputs.
 const TIME_REACH: f64 = 0.5;
 
-/// Fields that are drawn by default, in order of preference.
+/// Candidates for the field to draw if none is requested, in order of preference.
 const PREFERRED: [&str; 6] = [
     "damage",
     "von_mises_stress",

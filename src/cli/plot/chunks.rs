@@ -37,7 +37,7 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
 }
 
 /// For each body, return whether its points are scattered (not on a lattice) at output `index`. The list is
-/// empty in 1-D and without outputs.
+/// empty if the problem is 1-D or if the result has no outputs.
 ///
 /// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z
 /// coordinates of its points. A body of n points is scattered if its number of combinations is above

@@ -13,14 +13,14 @@ use crate::cli::{Verbosity, errln, file_error, outln};
 /// The default of `--x`.
 const TIME: &str = "time";
 
-/// Largest number of columns that the default file name of a picture contains.
+/// Largest number of column names in the default file name of a picture.
 const MOST_NAMED: usize = 3;
 
 /// The columns of a history.
 struct Table {
     path: PathBuf,
     columns: Vec<StoredColumn>,
-    /// Number of the last line of a CSV file if the line is ignored, see [`read_csv`].
+    /// Number of the last line of a CSV file if [`read_csv`] ignored this line; otherwise `None`.
     ignored_line: Option<usize>,
 }
 

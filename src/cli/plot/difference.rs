@@ -9,11 +9,12 @@ use fissure::output::ResultReader;
 use super::quantity::Quantity;
 use crate::cli::result_file;
 
-/// Relative tolerance of times. Two times count as equal if they differ by at most this fraction of the
-/// larger absolute time.
+/// Relative tolerance for the comparison of output times. The times t₁ and t₂ count as equal if |t₁ − t₂| is
+/// at most this constant times the larger of |t₁| and |t₂|.
 const SAME_TIME: f64 = 1e-9;
 
-/// The result that `--minus` names. Its values are subtracted from those of the minuend, the drawn result.
+/// The result that `--minus` names. Its values are subtracted from the values of the minuend. The minuend is
+/// the result that is drawn.
 pub struct Subtrahend {
     path: PathBuf,
     result: ResultReader,
@@ -69,8 +70,8 @@ impl Subtrahend {
         Ok(own)
     }
 
-    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the values
-    /// of the minuend: the quantity at the points `points` in the output `index`.
+    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the
+    /// values of `quantity` at `points` in output `index` of `minuend`.
     ///
     /// # Errors
     /// If the subtrahend has no output at the time of output `index` of `minuend`, if the two outputs have

@@ -10,7 +10,7 @@ use super::choice::{choose_field, number};
 /// The values for which `--contours` requests lines of equal value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contours {
-    /// A number of values at equal distances on the colour bar.
+    /// Number of contour values, which lie at equal distances on the colour bar.
     Count(usize),
     /// Given values.
     Values(Vec<f64>),
@@ -23,8 +23,9 @@ impl Contours {
     /// Read the argument of `--contours`: a whole number is a count, and any other text is a list of values.
     ///
     /// # Errors
-    /// If the text is neither a count nor a list of values, if the count is not from 1 to 100, or if a value
-    /// is not above 0 on a logarithmic scale.
+    /// - If the text is neither a count nor a list of values.
+    /// - If the count is not from 1 to 100.
+    /// - If the scale is logarithmic, and a value is not above 0.
     pub fn new(text: &str, is_logarithmic: bool) -> Result<Self> {
         if let Ok(count) = text.trim().parse::<usize>() {
             if (1..=MOST_CONTOURS).contains(&count) {

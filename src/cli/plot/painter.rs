@@ -1,4 +1,5 @@
-//! Pictures of the outputs of a result: the settings of the pictures, and the points that are drawn.
+//! Drawing of the outputs of a result. `Painter` has the settings of all pictures, and `Points` has the drawn
+//! points of one output.
 
 use std::ops;
 use std::path::Path;
@@ -17,8 +18,8 @@ use super::paths::{self, Line, NearestPoints};
 use super::picture::PictureArguments;
 use super::quantity::Quantity;
 
-/// Largest drawn displacement for `--deform auto`, as a fraction of the longest edge of the box of all
-/// points. The automatic factor is at least 1.
+/// Upper limit of the drawn displacement components for `--deform auto`, as a fraction of the longest edge
+/// of the bounding box of all points. The automatic factor is at least 1, even if the limit is then exceeded.
 const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 
 /// Settings of all pictures of a result.
@@ -40,7 +41,7 @@ pub struct Painter<'a> {
     clips: Vec<Clip>,
     pub(super) threshold: Option<Threshold>,
     contours: Option<Contours>,
-    /// Field of the arrows.
+    /// Vector field that is drawn as arrows; `None` without `--vectors`.
     vectors: Option<StoredField>,
     pub(super) factor: f64,
     /// Whether `--deform auto` found displacements other than 0; true if `--deform` gives a factor.
@@ -204,7 +205,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Test whether a colour bar with a linear scale starts at 0. This is true for damage, which is never
-    /// negative. It is false for a difference of damages and for all other fields.
+    /// negative. The result is false for all other fields, and for a difference of two damage fields.
     fn starts_at_zero(&self) -> bool {
         self.minus.is_none() && is_damage(&self.quantity.field)
     }
@@ -252,8 +253,8 @@ impl<'a> Painter<'a> {
         Ok(Some(step.unwrap_or(1.0) * power))
     }
 
-    /// Test whether the slice shows the point at a position (m); true without a slice. `size` is the edge of
-    /// the cell of the point, m.
+    /// Test whether the slice shows the point at a position (m). If the view is not a slice, the result is
+    /// true. `size` is the edge of the cell of the point, m.
     pub(super) fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
         match self.view {
             View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),

@@ -15,8 +15,8 @@ pub type Line = Vec<[f64; 2]>;
 /// form one line.
 ///
 /// # Errors
-/// If the file cannot be read, a column is missing, or a row has an invalid number or another number of
-/// values than the first row.
+/// If the file cannot be read, or if the column `x` or `y` is missing. If a coordinate is not a finite
+/// number, or if a row has more or fewer values than the first row.
 pub fn read(path: &Path) -> Result<Vec<Line>> {
     let text = std::fs::read_to_string(path).map_err(|error| file_error(path, "read", &error))?;
     let wrong = |line: usize, message: String| {
@@ -68,8 +68,8 @@ fn bare_name(name: &str) -> &str {
     name.rsplit_once('[').map_or(name, |(bare, _)| bare).trim()
 }
 
-/// Search for the point nearest to each vertex of the lines. A vertex is drawn with the displacement of this
-/// point.
+/// Search for the point nearest to each vertex of the lines. Each vertex is drawn with the displacement of
+/// its nearest point.
 pub struct NearestPoints<'a> {
     /// The lines, each with the index of its file.
     lines: Vec<(usize, &'a Line)>,

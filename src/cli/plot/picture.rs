@@ -64,8 +64,8 @@ pub struct PictureArguments {
     pub(super) threshold_field: Option<String>,
 
     /// Draw the lines of a CSV file, such as crack_NAME.csv, over the picture of a plane body. The file
-    /// must have the columns x and y (m). With a column branch, consecutive rows with the same entry in this
-    /// column form one line. May be repeated.
+    /// must have the columns x and y (m). If the file also has the column branch, consecutive rows with the
+    /// same entry in this column form one line. May be repeated.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) path: Vec<PathBuf>,
 

@@ -43,8 +43,9 @@ fn positive<const N: usize>(sizes: [f64; N]) -> Option<()> {
     sizes.iter().all(|h| *h > 0.0).then_some(())
 }
 
-/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio; `None` if h₁, h₂ and h₃ neither increase nor
-/// decrease, or if there is no root between −[`LARGEST_RATE`] and [`LARGEST_RATE`].
+/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio. Return `None` if h₁, h₂, h₃ is neither an
+/// increasing nor a decreasing sequence. Also return `None` if there is no root between −[`LARGEST_RATE`] and
+/// [`LARGEST_RATE`].
 fn rate_of_differences([h1, h2, h3]: [f64; 3], ratio: f64) -> Option<f64> {
     let (up, down) = ((h1 / h2).ln(), (h3 / h2).ln());
     let monotonic = up * down < 0.0;

@@ -62,10 +62,10 @@ fn split(text: &str) -> Vec<String> {
 }
 
 /// Parse a list of rows such as `1-4,7`. Row numbers in the list start at 1; the returned indices start at 0.
-/// `count` is the number of all rows.
+/// `count` is the number of rows of the design.
 ///
 /// # Errors
-/// If a part of the list is not a row from 1 to `count` or a range of such rows.
+/// If a part of the list is neither a row from 1 to `count` nor a range of such rows.
 pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
     let mut rows = Vec::new();
     for part in list.split(',').map(str::trim) {
@@ -203,8 +203,8 @@ impl Design {
     }
 
     /// Return the index of the abscissa: the axis over which pictures are drawn and rates of convergence are
-    /// computed. This is the axis `name`. Without a `name`, it is the first axis with several values that are
-    /// all numbers; the result is `None` if no axis has such values.
+    /// computed. With a `name`, it is the axis of this name. Without a `name`, it is the first axis with
+    /// several values that are all numbers; the result is `None` if no axis has such values.
     ///
     /// # Errors
     /// If the named axis is missing, has one value, or has values that are not numbers.

@@ -69,8 +69,8 @@ pub struct SweepArguments {
     #[arg(long, value_name = "[PICK:]COLUMN", value_parser = value::column)]
     value: Vec<Column>,
 
-    /// Expected number for a --value. With several --value options, VALUE names one of them, such as
-    /// max:kinetic_energy=2.5. May be repeated.
+    /// Expected number for a --value. If there are several --value options, give one of them as VALUE before
+    /// the number, as in max:kinetic_energy=2.5. May be repeated.
     #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
     reference: Vec<Reference>,
 
@@ -95,7 +95,7 @@ pub struct SweepArguments {
     #[arg(long, value_name = "LIST")]
     rows: Option<String>,
 
-    /// Replace complete runs, and runs of another deck in the same folder.
+    /// Repeat complete runs, and replace runs of another deck in the folders of this sweep.
     #[arg(long)]
     overwrite: bool,
 }
@@ -117,7 +117,7 @@ impl SweepArguments {
 /// has every column that a `--value` option names.
 ///
 /// # Errors
-/// If the deck is invalid with the values of a combination, or if a value has an unknown column. The message
+/// If the deck of a combination is invalid, or if a `--value` option names an unknown column. The message
 /// names the combination.
 fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
     let run = |(row, name): (&Vec<usize>, String)| {
@@ -148,8 +148,10 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
 /// Write the table and pictures of all combinations.
 ///
 /// # Errors
-/// If the deck or an argument is wrong, a run fails, a file cannot be written, or a signal or a time limit
-/// stops a run.
+/// - If the deck or an argument is wrong.
+/// - If a run fails.
+/// - If a file cannot be written.
+/// - If a signal or a time limit stops a run.
 pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
     let design = Design::new(&arguments.set, arguments.zip)?;
     let chosen = match &arguments.rows {

@@ -17,7 +17,8 @@ use crate::cli::file_error;
 /// File with the text that a run prints.
 pub const LOG: &str = "log.txt";
 
-/// File with the deck of a run and all defaults. Two runs with equal files count as the same run.
+/// File with the deck of a run, with every default written out. Two runs with equal files count as the same
+/// run.
 const DECK: &str = "deck_in_full.toml";
 
 /// File with the result of a run.
@@ -73,12 +74,12 @@ pub enum State {
 }
 
 impl Run {
-    /// Check that the folder holds this run, or neither a run of a sweep nor a result. With `overwrite`, the
-    /// folder may hold any run of a sweep.
+    /// Check that this run may use its folder: the folder holds this run, or it holds neither a run of a
+    /// sweep nor a result. With `overwrite`, the folder may hold any run of a sweep.
     ///
     /// # Errors
-    /// If the folder holds a result that is not of a sweep. Without `overwrite`, also if the folder holds
-    /// another run of a sweep.
+    /// If the folder holds a result that does not belong to a sweep. Without `overwrite`, also if the folder
+    /// holds another run of a sweep.
     pub fn check(&self, overwrite: bool) -> Result<()> {
         let path = self.folder.join(DECK);
         match std::fs::read_to_string(&path) {
@@ -106,8 +107,8 @@ impl Run {
         self.is_begun() && self.folder.join(COMPLETE).exists()
     }
 
-    /// Return the first line of the last error message of the run, or the last printed line if there is no
-    /// error message.
+    /// Return the first line of the last error message in the log of the run. If the log has no error
+    /// message, return the last line that is not blank.
     pub fn last_words(&self) -> String {
         let log = std::fs::read(self.folder.join(LOG)).unwrap_or_default();
         let log = String::from_utf8_lossy(&log);

@@ -1,4 +1,4 @@
-//! The table of a sweep and its pictures.
+//! The table and the pictures of a sweep.
 
 use std::path::Path;
 
@@ -284,7 +284,8 @@ fn printed(cells: &[Cells]) -> String {
     lines.join("\n")
 }
 
-/// Format the table as CSV, with headings such as `max_kinetic_energy [J]`, as in history.csv.
+/// Format the table as CSV. The headings have the same form as in history.csv, such as
+/// `max_kinetic_energy [J]`.
 fn csv(cells: &[Cells]) -> String {
     let quoted = |text: &str| {
         if text.contains([',', '"', '\n']) {

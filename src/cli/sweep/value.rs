@@ -45,8 +45,8 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// Expected number for a picked value. `name` is the column and rule of this value. If `name` is `None`, the
-/// number belongs to the only picked value of the sweep.
+/// Expected number for a picked value. `name` identifies this value by its column and its rule. If `name` is
+/// `None`, the number belongs to the only picked value of the sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     name: Option<Column>,
@@ -149,8 +149,8 @@ pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
     }
 }
 
-/// Read the picked values and their units from the history in a folder; `None` for a value that is not
-/// finite, or if the history has no rows.
+/// Read the picked value of each column, and its unit, from the history in a folder. A value is `None` if it
+/// is not finite, or if the history has no rows.
 ///
 /// # Errors
 /// If the history cannot be read or lacks a column.

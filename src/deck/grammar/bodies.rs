@@ -137,7 +137,7 @@ pub struct Set {
     /// Id that the file gives to the first point; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
-    /// Name or number of a group in the meshes that define the points of bodies.
+    /// Name or number of a group in a mesh that defines the points of a body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Spanned<GroupName>>,
 }

@@ -19,8 +19,8 @@ pub struct Initial {
     /// Velocity in m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
-    /// Path, relative to the deck, of a text file with a row of values for each point. The file replaces
-    /// `displacement` and `velocity`.
+    /// Path, relative to the deck, of a text file with a row of values for each point. With `file`, the keys
+    /// `displacement` and `velocity` are not allowed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
 }

@@ -17,16 +17,17 @@ pub struct Contact {
     /// contact only for the pairs of bodies for which a table `[contact.pair.NAME]` gives another `model`.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// With `"penalty"`, Young's modulus of the layer in Pa. The default is 2E₁E₂/(E₁ + E₂), where E₁ and E₂
-    /// are Young's moduli of the two materials. This is the modulus of two equally thick layers of these
-    /// materials in series. With `"short-range"`, the spring constant in Pa. The default is 15 times the
+    /// With `"penalty"`, two points repel one another as if a layer of material lay between them; `stiffness`
+    /// is Young's modulus of this layer in Pa. The default is 2E₁E₂/(E₁ + E₂), where E₁ and E₂ are Young's
+    /// moduli of the two materials. This is the modulus of two equally thick layers of these materials in
+    /// series. With `"short-range"`, the spring constant in Pa. The default is 15 times the
     /// smaller bulk modulus of the two materials.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// Distance in m between two points at which contact begins. The default is the mean edge of the cells of
     /// the two points, or 1.35 times this edge with `"short-range"`. Contact never begins at more than the
-    /// initial distance of the two points (with `"short-range"`, 0.9 times the initial distance), even if
-    /// `radius` is larger.
+    /// initial distance of the two points, even if `radius` is larger. With `"short-range"`, this limit is
+    /// 0.9 times the initial distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
@@ -51,23 +52,23 @@ pub struct ContactPair {
     /// Names of the two bodies; the same name twice for contact of a body with itself. The order matters only
     /// for the sign of the contact force in the history.
     pub bodies: Spanned<Vec<Text>>,
-    /// As in `[contact]`; the value of `[contact]` if not given.
+    /// Defined as in `[contact]`. The default is the value of this key in `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<Spanned<ContactName>>,
-    /// As in `[contact]`; the value of `[contact]` if not given.
+    /// Defined as in `[contact]`. The default is the value of this key in `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// As in `[contact]`; the value of `[contact]` if not given.
+    /// Defined as in `[contact]`. The default is the value of this key in `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
-    /// As in `[contact]`; the value of `[contact]` if not given.
+    /// Defined as in `[contact]`. The default is the value of this key in `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
     /// Coefficient of static friction. The default is `friction` of this pair. If the pair has no `friction`
     /// either, the default is the coefficient of static friction of `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// As in `[contact]`; the value of `[contact]` if not given.
+    /// Defined as in `[contact]`. The default is the value of this key in `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
 }

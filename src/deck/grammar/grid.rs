@@ -41,10 +41,10 @@ pub struct Grid {
     /// Seed of the random shifts of `jitter`; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
-    /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid; points
-    /// from a file can form a regular grid. `"list"` works for any points. `"auto"` uses a lattice where
-    /// possible. Bonds between bodies on different grids are always stored in lists. The choice changes
-    /// results by rounding only.
+    /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid. Points
+    /// from a file are allowed if they form a regular grid. `"list"` works for any points. `"auto"` uses a
+    /// lattice where possible. Bonds between bodies on different grids are always stored in lists. The choice
+    /// changes results by rounding only.
     #[serde(default = "automatic")]
     pub family: Spanned<Family>,
 }
@@ -113,7 +113,8 @@ pub struct Interface {
 pub struct Pair {
     /// Names of the two bodies, in any order.
     pub bodies: Spanned<Vec<Text>>,
-    /// As in `[interface]`; the rule of `[interface]` if not given.
+    /// Constants of these bonds; the values have the same meaning as in `[interface]`. The default is the
+    /// `rule` of `[interface]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
     /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"`

@@ -145,8 +145,8 @@ pub struct History {
     /// the whole run is explicit, this default writes rows only at multiples of 20 steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
-    /// Steps between rows. If `every` is also given, rows are written only at multiples of this number of
-    /// steps.
+    /// Steps between rows. If `every` is also given, a row is written only at steps whose number is a
+    /// multiple of `every_steps`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
     /// Sets whose reaction force is recorded, by component.
@@ -155,8 +155,8 @@ pub struct History {
     /// Reaction forces of sets, projected on a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether fragments are recorded: the number of fragments, and the mass and momentum of the fragment
-    /// that has the most points. False if not given.
+    /// Whether fragments are recorded; false if not given. The recorded values are the number of fragments,
+    /// and the mass and momentum of the fragment that has the most points.
     #[serde(default)]
     pub fragments: bool,
     /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not
@@ -237,8 +237,8 @@ pub struct SupportForce {
     pub direction: Vector,
 }
 
-/// A crack path: the centre lines of a damaged region, one line for each branch. The region is connected to a
-/// start position. In 3-D, the area and the front of this region are computed.
+/// A crack path: the centre lines of a damaged region, one line for each branch. The region is the damage
+/// that is connected to a start position. In 3-D, the area and the front of this region are computed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {

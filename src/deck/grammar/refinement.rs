@@ -23,8 +23,8 @@ pub struct Refinement {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
     /// Factor on the horizon of points that have points of a coarser level inside their horizon. Without this
-    /// factor, the families of these points may lose volume. The default is √2 with `"delta"` and 1 with
-    /// `"delta-m"`.
+    /// factor, the families of these points may lose volume. The default is √2 with `rule = "delta"`, and 1
+    /// with `rule = "delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
     /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with

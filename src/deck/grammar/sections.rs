@@ -146,7 +146,7 @@ impl Section {
 
 /// A named table of the deck.
 pub struct NamedTable<'a> {
-    /// Path of the section of the table.
+    /// Path of the section that contains the table, such as `material` or `history.probe`.
     pub section: &'static str,
     /// Name of the table.
     pub name: &'a str,

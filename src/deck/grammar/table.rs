@@ -31,7 +31,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Create a table with these rows.
+    /// Create a table from the times and values of its rows.
     pub fn of_rows(times: &[f64], values: &[f64]) -> Self {
         let list = |numbers: &[f64]| {
             let numbers = numbers.iter().copied().map(default_number).collect();

@@ -8,10 +8,10 @@ use crate::import::translation::Translation;
 /// Largest number of lattice sites that are tested for atoms.
 const MOST_SITES: usize = 10_000_000;
 
-/// Reason for leaving out a command whose group has no counterpart.
+/// Reason for leaving out a command whose group has no counterpart in the new deck.
 pub(super) const NO_SET: &str = "its group is no body or region";
 
-/// Selection of a group.
+/// Atoms that a group selects: all atoms, the atoms of a type, or the atoms in a named region.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Group {
     All,
@@ -29,8 +29,8 @@ fn find(model: &Model, name: &str) -> Option<Group> {
     found.map(|(_, group, _)| group.clone())
 }
 
-/// Return a region by its name, with bounds of the box in place of infinite bounds. Return `None` for a
-/// region without a shape.
+/// Return a region by its name, with bounds of the box in place of infinite bounds. Return `None` if no
+/// region with this name has been translated.
 fn named_region(model: &Model, name: &str) -> Option<Region> {
     let mut regions = model.regions.iter();
     let (_, region, _) = regions.find(|(other, ..)| other == name)?;
@@ -110,8 +110,8 @@ pub(super) fn set_in_region(
     Ok(write_set(translation, model, &wanted, &shape))
 }
 
-/// Write a set with the points of a region unless the new deck has the set already. Return its name. `wanted`
-/// identifies the set.
+/// Return the name of a set with the points of a region. Write the set if the new deck does not have it yet.
+/// The name follows from `wanted`; calls with the same `wanted` return the same set.
 pub(super) fn write_set(
     translation: &mut Translation,
     model: &Model,
@@ -129,7 +129,8 @@ pub(super) fn write_set(
 }
 
 /// Test whether a region has an atom at the start. If the region has more than `MOST_SITES` lattice sites,
-/// test only every n-th site in each direction. Return `None` if there is no atom at these sites.
+/// test only every n-th site in each direction. If none of the tested sites of such a region has an atom,
+/// return `None`, because the other sites are not tested.
 pub(super) fn has_atoms(model: &Model, region: &Region) -> Option<bool> {
     let spacing = model.spacing.unwrap_or(1.0);
     let bounds = region.bounds();

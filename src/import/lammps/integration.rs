@@ -12,7 +12,7 @@ use crate::import::translation::Translation;
 /// Fix styles that integrate the motion of atoms, without the part of a style after `/`, as in `nve/limit`.
 const INTEGRATORS: [&str; 8] = ["move", "nph", "npt", "nve", "nvk", "nvt", "poems", "rigid"];
 
-/// Name of the set and of the condition of points that no fix integrates.
+/// Name of the set of points that no fix integrates, and of the condition that holds these points.
 const HELD: &str = "held";
 
 /// Write a condition that holds the points that no fix integrates. `fixes` are the fixes that act in the

@@ -251,7 +251,7 @@ pub(super) fn initial_value(command: &Command) -> Option<&str> {
     keys.find(|key| INITIAL_VALUES.contains(key))
 }
 
-/// Read `set`: densities and volumes.
+/// Read the densities and volumes of a `set` command.
 fn properties(
     translation: &mut Translation,
     variables: &Variables,

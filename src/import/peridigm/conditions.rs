@@ -102,9 +102,9 @@ fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
 
 /// Write a prescribed temperature.
 ///
-/// Thermal expansion is relative to the temperature at the start. If `uniform`, the start temperature is
-/// the reference temperature of all materials that expand. Otherwise, the start temperature is subtracted
-/// from the prescribed temperature.
+/// In Peridigm, thermal expansion is relative to the temperature at the start of the run. If `uniform`, this
+/// temperature is the reference temperature of all materials that expand. Otherwise, it is subtracted from
+/// the prescribed temperature.
 fn temperature<'n>(
     translation: &mut Translation,
     sets: &mut Sets<'n>,

@@ -94,7 +94,7 @@ pub(super) fn contact(
 }
 
 /// Test whether the deck omits all bonds between blocks. Peridigm allows the values `All` and `None` for the
-/// key.
+/// key `Omit Bonds Between Blocks`.
 fn omits_all(translation: &Translation, discretization: &Node, blocks: usize) -> bool {
     let Some(node) = discretization.get(OMITTED_BONDS) else {
         return false;

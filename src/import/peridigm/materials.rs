@@ -79,7 +79,7 @@ const EXPANSION: &str = "Thermal Expansion Coefficient";
 /// Laws with a selectable influence function; other laws have ω = 1.
 const INFLUENCED: [&str; 2] = ["ordinary", "ordinary_viscoelastic"];
 
-/// Log the outcome of the influence function.
+/// Log whether the influence function of the source deck is taken, approximated or left out.
 pub(super) fn note_influence(
     translation: &Translation,
     influence: &Influence,

@@ -10,7 +10,7 @@ use crate::import::tree::{Node, is_key};
 /// Columns of a text file without header.
 const COLUMNS: [&str; 5] = ["x", "y", "z", "block", "volume"];
 
-/// Source of the points of the blocks.
+/// Source of the blocks' points.
 pub(super) enum Points {
     /// A text file, and its summary. The summary is `None` if the file cannot be read.
     File(Value, Option<PointFile>),

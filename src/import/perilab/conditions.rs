@@ -118,8 +118,9 @@ pub(super) fn conditions(
     Ok(conditions.has_temperature)
 }
 
-/// Return the number and the start time of each step in which a condition acts. The start time is measured
-/// from the start of the run. `steps` are the step numbers that the condition gives; empty for all steps.
+/// Return the step number and the start time of each step in which a condition acts. The start time is
+/// measured from the start of the run. `steps` are the step numbers that the condition gives; empty for all
+/// steps.
 fn acting_steps(stages: &[solver::Stage], steps: &[u64], run_start: f64) -> Vec<(u64, f64)> {
     let mut acting: Vec<(u64, f64)> = Vec::new();
     let mut start = 0.0;

@@ -39,8 +39,8 @@ impl MeshBlocks {
     }
 }
 
-/// Return the names of the element sets of an Abaqus file that are blocks in PeriLab, in the order of the
-/// block numbers. Return `None` if the file cannot be read.
+/// Read the element sets of an Abaqus file. Return the names of the sets that are blocks in PeriLab, in the
+/// order of the block numbers. Return `None` if the file cannot be read.
 ///
 /// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
 /// last. PeriLab has no fixed order for the other sets, so here their order is that of the file.

@@ -97,7 +97,8 @@ impl Described for BondAssociated {
 /// bonds (m⁻³), H, and Z K⁻¹ (N/m⁷).
 type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
-/// Indices of the numbers of a point: the numbers of [`Point`], then K⁻¹, then a flag.
+/// Indices of the numbers of a point. The order is: the numbers of [`Point`], the entries of K⁻¹, and the
+/// flag of [`Self::singular`].
 struct Places;
 
 impl Places {
@@ -114,14 +115,15 @@ impl Places {
     }
 
     /// Return the index of the flag for a point without force: K is nearly singular, the intact part of the
-    /// family is too stiff, or a bond has no stress.
+    /// family is too stiff, or the stress of a bond does not exist.
     const fn singular<const D: usize>() -> usize {
         Self::inverse::<D>() + 2 * D
     }
 }
 
 impl BondAssociated {
-    /// Compute the stresses at the displacement gradients H_ξ of the bonds, from H of the point.
+    /// Compute the stress of each bond from the displacement gradient H_ξ of the bond. `gradient` is the
+    /// displacement gradient H of the point.
     #[inline(always)]
     fn stresses<const D: usize>(&self, bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
         self.stress.of_bonds(&own_gradient(bond, gradient))

@@ -23,9 +23,9 @@ const PLANE: [usize; 3] = [0, 1, 5];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hooke {
     matrix: Matrix6<f64>,
-    /// Factors of the in-plane strains xx, yy and 2 xy.
+    /// Factors a, b and c of the in-plane strains xx, yy and 2 xy.
     ///
-    /// The sum of factors times strains is the stress zz (Pa) in plane strain, and the strain zz in plane
+    /// The sum a E_xx + b E_yy + 2 c E_xy is the stress zz (Pa) in plane strain, and the strain zz in plane
     /// stress. `None` in 3-D and 1-D, and if the constants of the deck do not determine these factors.
     out_of_plane_factors: Option<[f64; 3]>,
 }
@@ -279,7 +279,8 @@ fn used(dimension: Dimension) -> Vec<usize> {
     }
 }
 
-/// Return the smallest eigenvalue of C : I (Pa); `None` for isotropic constants.
+/// Return the smallest eigenvalue of C : I (Pa), with Hooke's matrix C and the unit tensor I. `None` for
+/// isotropic constants.
 pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64> {
     let hooke = Hooke {
         matrix: unturned(values, dimension)?,

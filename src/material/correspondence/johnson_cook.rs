@@ -25,7 +25,8 @@
 //! is solved by Newton's method. The variable of the iteration is ln u, with u = x/(1 + x c), where c is the
 //! largest stiffness of the parts. In 3-D and plane strain there is one part, and u is proportional to Δε̄.
 //! Then F is convex in ln u, also at ε̄ = 0, where the slope of ε̄ⁿ is infinite for n < 1. Newton's method
-//! therefore converges from above. In plane stress, a bracket safeguards the method.
+//! therefore converges to the solution from larger values of u. In plane stress, a bracket safeguards the
+//! method.
 
 use super::super::{Key, Kind, LawFault, PlasticState, Property, Values};
 use super::plastic::{HARDENING, YIELD_STRESS};
@@ -381,8 +382,8 @@ impl JohnsonCook {
 }
 
 impl Surface {
-    /// Return the factor of rate and temperature on A + B ε̄ⁿ, and the derivative of the factor by `growth`.
-    /// `growth` is the increment of ε̄.
+    /// Return the factor by which strain rate and temperature multiply A + B ε̄ⁿ. Also return the derivative
+    /// of this factor with respect to `growth`, the increment of ε̄.
     fn by_rate(&self, coefficient: f64, growth: f64) -> [f64; 2] {
         if growth > self.threshold {
             let rate = 1.0 + coefficient * libm::log(growth / self.threshold);

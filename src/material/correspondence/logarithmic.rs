@@ -118,9 +118,9 @@ pub fn eigenvalues(m: &Matrix3<f64>) -> Vector3<f64> {
     eigen(*m).0
 }
 
-/// Return the eigenvalues of a symmetric matrix, and its eigenvectors by columns. Jacobi's method uses
-/// additions, multiplications, divisions and square roots only. The results are therefore bitwise equal
-/// on every machine.
+/// Return the eigenvalues of a symmetric matrix, and a matrix whose columns are the eigenvectors. Jacobi's
+/// method uses additions, multiplications, divisions and square roots only. The results are therefore bitwise
+/// equal on every machine.
 fn eigen(mut m: Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
     let mut axes = Matrix3::identity();
     for _ in 0..MOST_SWEEPS {

@@ -13,9 +13,10 @@
 //! Σ ω z⊗ξ Ṽ = 0.
 //!
 //! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point. B is then multiplied
-//! by a factor s, which decreases as plastic flow proceeds ([`Plastic::control_left`]). An elastic control
-//! would carry load that the solid cannot carry. When s changes by Δs, the control dissipates the energy
-//! −Δs · ½ Σ ω z·B z Ṽ. In this energy, B is the matrix before the multiplication by s.
+//! by a factor s, which decreases as plastic flow proceeds ([`Plastic::control_left`]). Without this
+//! factor, the control would stay elastic and carry load that the yielding solid cannot carry. When s changes
+//! by Δs, the control dissipates the energy −Δs · ½ Σ ω z·B z Ṽ. In this energy, B is the matrix before the
+//! multiplication by s.
 
 mod bond_associated;
 mod control;
@@ -143,7 +144,7 @@ fn invariants(values: &Values) -> Invariants {
     }
 }
 
-/// Return the invariants of the law without control and without plastic flow.
+/// Return the invariants of the law without plastic flow and without control of zero-energy modes.
 fn of_stress(values: &Values) -> Invariants {
     let by_word = values.word(STRESS.name) == "willberg2022";
     Invariants {
@@ -183,8 +184,8 @@ type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// Count of the point's [own numbers](Law::OWN_NUMBERS): W − ½ P : H (J/m³), and a flag, which is 1 if the
-/// point has no force.
+/// Largest count of a point's [own numbers](Law::OWN_NUMBERS). Every point has two of them: W − ½ P : H
+/// (J/m³), and a flag, which is 1 if the point has no force.
 ///
 /// If the law has plasticity and a zero-energy control, two more numbers follow. The first is
 /// ½ tr(B H K Hᵀ), the part of
@@ -248,8 +249,14 @@ struct Family<const D: usize> {
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state. `sums` are the sums of the first
     /// pass, `initial_spring_constant` is the spring constant of the initial family (N/m⁷), and `step` is the
-    /// length of the step (s). `None` if K is nearly singular, the intact part of the family is stiffer than
-    /// the stable step allows ([`ShapeTensor::inverse_of_rest`]), or the law has no stress at H.
+    /// length of the step (s).
+    ///
+    /// The result is `None` in three cases:
+    ///
+    /// - K is nearly singular;
+    /// - the intact part of the family is stiffer than the stable step allows
+    ///   ([`ShapeTensor::inverse_of_rest`]);
+    /// - the law has no stress at H.
     fn family<const D: usize>(
         &self,
         sums: &[f64],
@@ -286,7 +293,7 @@ impl Correspondence {
     }
 }
 
-/// Return η·B η, N/m⁵.
+/// Return η·B η, N/m⁵. B is the matrix `control`, and η is `eta`.
 #[inline(always)]
 fn of_control<const D: usize>(control: &Symmetric<D>, eta: &[Lanes; D]) -> Lanes {
     let mut sum = Lanes::splat(0.0);
@@ -307,8 +314,8 @@ impl<const D: usize> Law<D> for Correspondence {
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
     const CONSTANTS: usize = CONSTANTS;
-    /// The second pass computes the energy of the control. The pass is needed only if the control decreases
-    /// with plastic flow.
+    /// The second pass computes the energy of the zero-energy control. This pass is needed only if the
+    /// control decreases with plastic flow.
     const PASSES: usize = 2;
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;

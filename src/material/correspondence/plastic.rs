@@ -14,8 +14,8 @@
 //! Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In plane stress, the out-of-plane stress stays 0.
 //! Then ΔE_p = x S_d, where S_d is the deviator of the final stress, and x solves a scalar equation (§3.4).
 //!
-//! [`johnson_cook`](super::johnson_cook) implements hardening by a power of the strain and by the strain
-//! rate, and softening by heat.
+//! [`johnson_cook`](super::johnson_cook) implements the hardening of Johnson & Cook. With this hardening,
+//! the yield stress grows with a power of ε̄ and with the rate of ε̄. It decreases with the temperature.
 //!
 //! The whole plastic work ∫ q dε̄ is dissipated.
 
@@ -324,10 +324,11 @@ impl Plastic {
 
     /// Return the [`Modes`] of a trial stress (Pa) in plane stress.
     ///
-    /// The plastic strain increases by ΔE_p = x S_d, with the deviator S_d of the final stress S. Let Π be
-    /// the projection to the deviator, so that S_d = Π S. With the stiffness C in plane stress, the final
-    /// stress is S = S_trial − x C Π S. C and Π have the same eigenvectors. Each eigencomponent of the trial
-    /// stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of C Π.
+    /// The plastic strain increases by ΔE_p = x S_d. Here x is a scalar (1/Pa), and S_d is the deviator of
+    /// the final stress S. Let Π be the projection to the deviator, so that S_d = Π S. With the stiffness C
+    /// in plane stress, the final stress is S = S_trial − x C Π S. C and Π have the same eigenvectors. Each
+    /// eigencomponent of the trial stress is therefore multiplied by 1/(1 + x c), with the
+    /// eigenvalue c of C Π.
     fn modes_of_sheet(&self, trial: &Matrix3<f64>) -> Modes {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
         Modes {
@@ -339,7 +340,8 @@ impl Plastic {
         }
     }
 
-    /// Return the final stress (Pa) in plane stress, from a trial stress (Pa) and x (1/Pa).
+    /// Return the final stress (Pa) in plane stress, from a trial stress (Pa). `x` (1/Pa) is the factor in
+    /// ΔE_p = x S_d, see [`Self::modes_of_sheet`].
     fn final_stress_in_sheet(&self, trial: &Matrix3<f64>, x: f64) -> Matrix3<f64> {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
         let [equibiaxial, in_plane_shear] = self.modes_of_sheet(trial).stiffnesses;
@@ -352,10 +354,11 @@ impl Plastic {
         stress
     }
 
-    /// Return Δε̄ and ΔE_p = x S_d in plane stress with linear hardening. `limit` is the yield stress before
-    /// the flow, and `modulus` the hardening modulus, both in Pa.
+    /// Return Δε̄ and ΔE_p in plane stress with linear hardening. `limit` is the yield stress before the
+    /// flow, and `modulus` the hardening modulus, both in Pa.
     ///
-    /// q decreases with x and is convex, so Newton's method converges to the root from one side.
+    /// Here ΔE_p = x S_d, with the unknown x of [`Self::modes_of_sheet`]. The final equivalent stress q
+    /// decreases with x and is convex, so Newton's method converges to the root from one side.
     fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64, modulus: f64) -> (f64, Matrix3<f64>) {
         let Modes {
             squares,
@@ -449,7 +452,7 @@ mod tests {
         law_with(dimension, &[])
     }
 
-    /// Return the length of a step of the random walk, s. The strain rates are below the reference strain
+    /// Return the duration of a step of the random walk, s. The strain rates are below the reference strain
     /// rate in some steps, and above it in others.
     fn duration(number: usize) -> f64 {
         [0.01, 1e4, 1.0, 100.0][number % 4]

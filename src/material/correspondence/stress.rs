@@ -61,7 +61,7 @@ impl Stress {
         }
     }
 
-    /// Displayed name of the stress law of bodies that yield.
+    /// Displayed name of the stress law of bodies with plasticity.
     pub const OF_PLASTIC: &'static str = "St. Venant–Kirchhoff";
 
     /// Return the name for display.
@@ -73,7 +73,8 @@ impl Stress {
         }
     }
 
-    /// Return the largest modulus c of the undeformed solid, Pa: W ≤ ½ c |H|² for small H.
+    /// Return the largest modulus c of the undeformed solid, Pa. For small displacement gradients H,
+    /// W ≤ ½ c |H|².
     pub fn largest_modulus(&self) -> f64 {
         match self {
             Self::StVenantKirchhoff(hooke) | Self::Willberg2022(hooke) => hooke.largest(),
@@ -81,8 +82,8 @@ impl Stress {
         }
     }
 
-    /// Return P (Pa) and W (J/m³) at a displacement gradient H = F − I; `None` if the law has no stress:
-    /// neo-Hooke at det F ≤ 0, Willberg et al. at det F = 0.
+    /// Return P (Pa) and W (J/m³) at a displacement gradient H = F − I. Return `None` if the stress is not
+    /// defined. This is the case for neo-Hooke at det F ≤ 0, and for Willberg et al. at det F = 0.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,

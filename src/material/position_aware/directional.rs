@@ -1,7 +1,8 @@
-//! Functions ω and σ that are radii of ellipsoids. The ellipsoid of ω/ω₀ has a semi-axis along each
-//! coordinate axis a. This semi-axis is a ratio of dilatations at a unit strain along a: the dilatation of
-//! the solid, divided by the dilatation of the family with ω₀. Semi-axis a of σ/σ₀ is a ratio of deviatoric
-//! energies at the same strain: the energy of the solid, divided by the energy of the family with σ₀.
+//! Functions ω and σ of the bond direction. ω/ω₀ and σ/σ₀ are the radii of two ellipsoids in this direction.
+//! The ellipsoid of ω/ω₀ has a semi-axis along each coordinate axis a. This semi-axis is a ratio of
+//! dilatations at a unit strain along a: the dilatation of the solid, divided by the dilatation of the family
+//! with ω₀. Semi-axis a of σ/σ₀ is a ratio of deviatoric energies at the same strain: the energy of the
+//! solid, divided by the energy of the family with σ₀.
 
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use super::{Fit, Form};
@@ -51,8 +52,8 @@ fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; 
 }
 
 /// Return bounds for [`super::largest_ratio`]: upper bounds of R and Q, and a lower bound of τ. `omega` and
-/// `sigma` are the semi-axes of ω/ω₀ and σ/σ₀. `sums` are the sums of |ξ|² Ṽ times the monomials of n.
-/// `reference` is σ₀, N/m⁷.
+/// `sigma` are the semi-axes of the ellipsoids of ω/ω₀ and σ/σ₀. `sums` are the sums of |ξ|² Ṽ times the
+/// monomials of n. `reference` is σ₀, N/m⁷.
 ///
 /// Let g be the radius of an ellipsoid with the semi-axes g_a, in the direction n of a bond. Then g and g²
 /// are convex functions of the numbers n_a², whose sum is 1. Therefore g ≤ Σ g_a n_a² and g² ≤ Σ g_a² n_a²

@@ -18,8 +18,8 @@
 //!
 //! The functions of [`Ordinary`] are ω₀ = d/m and σ₀ = A/m. The [`Form`] of ω and σ determines how they are
 //! fitted to these conditions. With ω = ω₀ and σ = σ₀ the law is [`Ordinary`], as long as no bond of the
-//! family is broken. The influence function of the deck is a further factor of each bond in all sums.
-//! Therefore the loops over bonds multiply ω and σ by it.
+//! family is broken. In all sums, the term of each bond is also multiplied by the influence function of the
+//! deck. Therefore the loops over bonds multiply ω and σ by this function.
 //!
 //! A critical stretch s_c that follows from a fracture energy is scaled to s_c √(2σ_w/(σ_i + σ_j)). Here σ_w
 //! is σ of an untruncated family. Breaking the bond then takes the same energy as in an untruncated family.
@@ -67,11 +67,11 @@ pub struct Fit<const D: usize> {
 
 /// Form of the functions ω and σ.
 pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Diagonal entries of the tensors of a point without bonds within its own horizon. These entries make ω
-    /// and σ nearly 0.
+    /// Diagonal entries of the tensors of ω and σ, for a point that has no bonds within its own horizon.
+    /// These entries make ω and σ nearly 0.
     const WITHOUT_BONDS: f64;
 
-    /// Fit ω and σ to `conditions`, the conditions on ω and on σ. `sums[0]` are the sums of |ξ|² Ṽ times the
+    /// Fit ω to `conditions[0]` and σ to `conditions[1]`. `sums[0]` are the sums of |ξ|² Ṽ times the
     /// monomials of degree 4 in the components of the bond direction n. `sums[1]` are the same sums with N
     /// instead of n, where N_a = n_a². `reference` is σ₀, N/m⁷.
     fn fit<const D: usize>(
@@ -159,10 +159,11 @@ type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 ///
 /// Let ⟨a, b⟩ = Σ σ a b Ṽ be a scalar product. Then θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|. The
 /// inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. Let e₁ be the component of e along r.
-/// Let e₂ be the component of e normal to r, in the plane of r and |ξ|. If R, Q and τ equal the three scalar
-/// products, these components of ε are (1 − τ/d) e₁ and e₂ − g e₁, with g² = (RQ − τ²)/d². Then λ is the
-/// larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]]. Because λ ≥ 1, this eigenvalue grows with R
-/// and Q and decreases with τ. It is therefore an upper bound if the inputs are bounds.
+/// Let e₂ be the component of e normal to r, in the plane of r and |ξ|. Let R, Q and τ
+/// equal the three scalar products. Then ε has the component (1 − τ/d) e₁ along r and the component
+/// e₂ − g e₁ normal to r, with g² = (RQ − τ²)/d². In this case, λ is the larger eigenvalue of
+/// [[k′R + (1 − τ/d)² + g², −g], [−g, 1]]. Because λ ≥ 1, this eigenvalue grows with R and Q and decreases
+/// with τ. It is therefore an upper bound if the inputs are bounds.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
     let determinant = bulk_modulus * r + (1.0 - tau / d).powi(2);
@@ -183,8 +184,8 @@ fn squares<const D: usize>(bond: &Bond<D>) -> [Lanes; D] {
 }
 
 impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
-    /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Changing numbers:
-    /// k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
+    /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Numbers that are
+    /// recomputed before each force evaluation: k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
     /// Sums of |ξ|² Ṽ times each monomial of degree 4 of n, followed by sums of |ξ|² Ṽ times each monomial of
@@ -456,7 +457,8 @@ mod tests {
     }
 
     /// A point without bonds within its own horizon contributes nothing to a bond from a point with a larger
-    /// horizon. The critical stretch of this bond therefore changes only by the factor √2.
+    /// horizon. The critical stretch of this bond is therefore only √2 times that of a bond to which both
+    /// ends contribute.
     #[test]
     fn points_without_bonds_have_no_share() {
         for functions in [

@@ -36,7 +36,7 @@ pub struct Nearest;
 impl Form for Nearest {
     const WITHOUT_BONDS: f64 = 0.0;
 
-    /// Return Λ and S.
+    /// Return the tensors Λ of ω and S of σ, and the arguments R, Q and τ of `largest_ratio`.
     fn fit<const D: usize>(
         [of_directions, of_squares]: [&[f64]; 2],
         [dilatational, deviatoric]: [&Conditions<D>; 2],
@@ -154,7 +154,8 @@ fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     tensor.map(|entry| 1.0 + share * (entry - 1.0))
 }
 
-/// Return the sum Σ σ|ξ|² Ṽ for σ = N·S N, from the sums of |ξ|² Ṽ times the monomials of N.
+/// Return Σ σ|ξ|² Ṽ for σ = N·S N, with S = `tensor`. `sums` are the sums of |ξ|² Ṽ times the monomials of
+/// degree 4 in the components of N.
 fn sigma_weighted_volume<const D: usize>(sums: &[f64], tensor: &SMatrix<f64, D, D>) -> f64 {
     let pairs = (0..D).flat_map(|a| (0..D).map(move |b| (a, b)));
     let polynomial: Vec<_> = pairs

@@ -1,6 +1,6 @@
-//! The function h as the radius of an ellipsoid. The semi-axes are fitted to the energy densities at unit
-//! extension along each axis a. These energy densities are half of the components C_aaaa of the elastic
-//! tensor C. In the solid, these components are 3μ.
+//! A [`Form`] in which h(n) is the radius of an ellipsoid, in the direction n of the bond. The semi-axes are
+//! fitted to the energy densities at unit extension along each axis a. These energy densities are half of the
+//! components C_aaaa of the elastic tensor C. In the solid, these components are 3μ.
 
 use nalgebra::SMatrix;
 
@@ -15,7 +15,7 @@ use crate::material::{Bond, ellipsoid};
 pub struct Directional;
 
 impl Form for Directional {
-    /// Return the tensor of the ellipsoid with the radius ½ h.
+    /// Return the tensor of the ellipsoid whose radius in the direction n is ½ h(n).
     fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
         let found: [f64; D] = std::array::from_fn(|a| {
             // n_a⁴ = n_a⁴ n·n, a sum of monomials of degree 6.

@@ -101,7 +101,7 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
     /// The tensor that determines ½ h.
     type Point = Symmetric<D>;
     type BondHistory = [Lanes; 0];
-    /// Sums of |ξ| Ṽ c/μ times the monomials of degree 6 of n.
+    /// Sums of |ξ| Ṽ c/μ times the monomials of degree 6 in the components of n.
     type ReferenceSum = [Lanes; MONOMIALS];
     type Sum = [Lanes; 0];
     type Force = Along;

@@ -55,7 +55,8 @@ fn isotropic(exponents: [usize; 3]) -> f64 {
 
 /// Fit H of a point in `D` dimensions: the least-squares solution of
 /// ½ Σ (c/μ) |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc.
-/// `sums` are the sums of |ξ| Ṽ c/μ times the monomials of degree 6 of n.
+/// `sums` has an entry for each monomial of degree 6 in the components of n. The entry is the sum of
+/// |ξ| Ṽ c/μ times this monomial over the family.
 fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();

@@ -75,7 +75,7 @@ pub(super) struct Instance {
     pub(super) position_lines_read: usize,
 }
 
-/// Return the name of a set in an instance; the name itself if the name of the instance is empty.
+/// Return the full name of a set of an instance: `instance.name`, or only `name` if `instance` is empty.
 fn qualified(instance: &str, name: &str) -> String {
     match instance {
         "" => name.to_owned(),
@@ -309,8 +309,8 @@ impl Reader {
         }
     }
 
-    /// Find the members of a surface in a union by its name. `own` is the index in `placed` of the instance
-    /// or model that contains the union.
+    /// Return the members of the surface `name` in a union of surfaces. `own` is the index in `placed` of the
+    /// instance or model that contains the union.
     fn find_surface(&self, of: MemberKind, name: &str, union: &Set, own: usize) -> Option<&Runs> {
         let own = &self.placed[own].name;
         let name = qualified(union.instance.as_ref().unwrap_or(own), name);

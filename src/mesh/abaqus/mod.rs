@@ -72,13 +72,14 @@ struct Reader {
     /// Nodes, elements and sets outside of parts and instances.
     model: Part,
     parts: FxHashMap<String, Part>,
-    /// The part or instance that is being read.
+    /// Nodes, elements and sets of the part or instance that is being read.
     current: Option<Part>,
     instance: Option<Instance>,
     /// Position of `*ASSEMBLY` while the assembly is being read.
     assembly: Option<Place>,
     placed: Vec<Placed>,
-    /// Members of the surfaces in `placed`, by kind and by name in capitals, such as `INSTANCE.NAME`.
+    /// Members of the surfaces in `placed`. The key is the kind of the members and the name of the surface in
+    /// capitals, such as `INSTANCE.NAME`.
     surfaces: FxHashMap<(MemberKind, String), Runs>,
     data: Data,
     /// Number of the element that is being read, followed by the numbers of its nodes that have been read.
@@ -371,7 +372,8 @@ impl Reader {
         set.expect("the keyword has begun a set")
     }
 
-    /// Skip the further data lines of the last set, and keep the error for the case that the set is used.
+    /// Skip the remaining data lines of the last set. Store an error with this message, which is reported if
+    /// the set is used.
     fn leave_out_set(&mut self, message: impl std::fmt::Display) {
         let error = self.fault(message);
         self.last_set().unsupported = Some(error);

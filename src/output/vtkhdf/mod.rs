@@ -115,7 +115,7 @@ struct Rule {
 pub struct Contents<'a> {
     /// Range of rows of this rank.
     pub piece: Piece,
-    /// Each step has its own points, set by [`ResultFile::set_points`].
+    /// Whether each step has its own points, which [`ResultFile::set_points`] sets.
     pub changing: bool,
     /// Reference positions of this rank's points, m.
     pub positions: &'a [[f64; 3]],

@@ -28,8 +28,8 @@ struct Retained {
 type RetainedHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
-    /// Resume a result. Retain its first `steps` steps and the number of history rows that `history` gives,
-    /// and drop later steps and rows. Return the retained history rows.
+    /// Resume a result. Retain its first `steps` steps, and drop later steps. `history` gives the number of
+    /// history rows that are retained; later rows are dropped. Return the retained history rows.
     ///
     /// A file is continued in place if the points never change, the file has the deck and the version of this
     /// run, and it has space for all expected steps. In addition, dropping the later rows must not free a
@@ -39,8 +39,9 @@ impl<'a> ResultFile<'a> {
     /// replaces the old file.
     ///
     /// # Errors
-    /// If the old file cannot be read, has fewer than `steps` steps, or has other points or fields. If a
-    /// write fails, for example because the disk is full.
+    /// - If the old file cannot be read or has fewer than `steps` steps.
+    /// - If the points or fields of the old file differ from those of `contents`.
+    /// - If a write fails, for example because the disk is full.
     pub fn resume(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -113,8 +114,8 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// Copy the retained part to a new file, which replaces the old file by a rename. If the process is
-    /// killed, either the old or the new file remains.
+    /// Copy the retained part to a new file. Then rename the new file, so that it replaces the old file. If
+    /// the process is killed, either the old or the new file remains.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -306,8 +307,8 @@ fn has_room(
     Ok(true)
 }
 
-/// Return the path of each dataset that has one row per written step or per history row, and the length of
-/// this dataset after truncation.
+/// List the datasets that have one row per written step or per history row. An item of the list is the path
+/// of a dataset and the length of this dataset after truncation.
 fn counted_rows(retained: Retained) -> Vec<(String, u64)> {
     let mut counted = vec![
         (format!("{STEPS}/Values"), retained.steps),

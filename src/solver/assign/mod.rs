@@ -177,8 +177,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// For bonds to other bodies, return which data of this body's points the failure criteria read. Only pairs
-/// of bodies with a separate damage law count.
+/// Return the kinds of point data of `body` that the failure criteria of bonds to other bodies read. Only
+/// pairs of bodies with a separate damage law count.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -202,8 +202,8 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
-/// Return the damage law at one end of bonds, from the damage in the deck. `body` and `constants` are the
-/// body and the constants of this end.
+/// Return the damage law at one end of a bond, computed from the damage in the deck. `body` and `constants`
+/// are the body and the constants of this end.
 fn damage_law(
     problem: &Problem,
     body: &Body,

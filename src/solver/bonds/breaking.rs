@@ -13,7 +13,7 @@ use super::measures::wanted;
 ///
 /// - the number of these bonds;
 /// - the energy that they release at the point, J;
-/// - the part of this energy above the criterion, J;
+/// - the point's part of the overshoot energy of these bonds, J;
 /// - their forces, N/m³.
 ///
 /// Few bonds break, so all laws share this kernel and its loops.
@@ -105,8 +105,8 @@ pub struct BrokenSums {
 /// Number of sums of [`BreakingBonds`] in three dimensions.
 pub const MAX_BROKEN_SUMS: usize = 6;
 
-/// The groups of one row or lane group that contain breaking bonds. An entry has the index of a group of
-/// eight bonds, and one bit per bond of this group. The bit is 1 if the bond breaks.
+/// The breaking bonds of one row or lane group. Each group of eight bonds that contains breaking bonds
+/// has one entry: the index of the group, and one bit per bond. The bit is 1 if the bond breaks.
 pub type BreakingBits = Vec<(usize, u8)>;
 
 /// Note the breaking bonds of a group. Out of line to save registers.

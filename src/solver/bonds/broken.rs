@@ -1,7 +1,7 @@
 //! Consequences of broken bonds.
 //!
-//! A bond breaks in the pass that sums the forces, if it meets its criterion. Both ends evaluate the
-//! criterion with the same operations, so they get the same result. The force sums exclude the bonds that
+//! A bond that meets its criterion breaks in the pass that sums the forces. Both ends evaluate the criterion
+//! with the same operations, so they get the same result. The force sums exclude the bonds that
 //! break. Then point numbers and the forces that depend on them are recomputed, but only at the points that a
 //! broken bond affects.
 
@@ -229,8 +229,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Merge points into ascending ranges of whole lane groups. A range may also contain other points, see
-    /// [`GAP`].
+    /// Return ascending ranges of points that contain the whole lane group of each of `points`. A range may
+    /// also contain other points, see [`GAP`].
     fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
         let mut ranges: Vec<Range<usize>> = points.map(|point| self.lane_group(point)).collect();
         ranges.sort_unstable_by_key(|range| range.start);

@@ -58,7 +58,7 @@ impl<const D: usize> Kernel<D> for MomentSums {
     }
 }
 
-/// The sums of `MomentSums` of a point, in the same order.
+/// The sums that `MomentSums` computes for a point, in the same order.
 pub struct Moments(pub(super) [f64; 14]);
 
 impl Moments {

@@ -86,7 +86,8 @@ pub struct Acting<'a, const D: usize> {
 impl<const D: usize> Forces<D> {
     /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
     /// written the data of the owned points. `bond_update` says whether bonds break, and how the bond history
-    /// advances. Afterwards, [`Self::broken`] returns the changes that broken bonds have caused. Collective.
+    /// advances. Afterwards, [`Self::broken`] returns the changes caused by bonds that broke in this
+    /// evaluation. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -184,7 +185,8 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Return the columns that change before each force sum, and that laws or criteria read at both ends of a
-    /// bond: point numbers, rotations and stress measures. Also return the number of these columns.
+    /// bond. These columns hold point numbers, rotations and stress measures. Also return the number of these
+    /// columns.
     pub(super) fn changing_columns(&mut self) -> HaloColumns<'_> {
         let first = self.numbers.first_changing;
         let changing = first..self.numbers.read.max(first);
@@ -226,7 +228,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Return the name and the number of columns of each halo exchange of a force evaluation. If bonds break,
-    /// the point numbers are sent a second time.
+    /// the point numbers are sent a second time. The result does not contain this second exchange.
     pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
         let mut thermal_stretch = Vec::new();
         let mut sizes = Vec::new();

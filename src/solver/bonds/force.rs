@@ -47,7 +47,7 @@ pub struct Force<L> {
     pub criterion: Criterion,
     /// Whether the weights of the bonds contain only the influence function, without volume correction.
     pub no_volume_correction: bool,
-    /// Changes of the bond state.
+    /// How this sweep changes the bond state.
     pub bond_update: BondUpdate,
 }
 
@@ -111,8 +111,8 @@ impl<L> Force<L> {
         }
     }
 
-    /// Return one bit per bond, set if the bond breaks by its history. The history for an end counts only if
-    /// the force state of this end acts on the bond.
+    /// Return one bit per bond, set if the bond breaks because of its history at one end. The history at an
+    /// end counts only if the force state of this end acts on the bond.
     #[inline(always)]
     fn worn_out<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> u8
     where

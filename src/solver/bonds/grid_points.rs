@@ -1,4 +1,5 @@
-//! Point data of a grid that kernels read, ordered by slot so that eight adjacent points are loaded at once.
+//! Data of the points of a grid, for kernels. The data are ordered by slot, so that a kernel loads
+//! the data of eight adjacent points at once.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -47,8 +48,8 @@ impl<const D: usize> GridValues<D> {
         Arc::ptr_eq(&self.grid, grid)
     }
 
-    /// Copy the displacements of the ghosts to their slots, and the thermal stretches if the run has
-    /// temperatures.
+    /// Copy the displacements of the ghosts to their slots. If the run has temperatures, also copy the
+    /// thermal stretches of the ghosts.
     pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D], thermal_stretch: Option<&[f64]>) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
             self.grid.update(Which::Ghosts, values, places);

@@ -57,9 +57,9 @@ where
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     /// Weights of the force states in the work of a bond: the influence function, without volume correction.
-    /// `no_volume_correction` says whether [`Self::weights`] contain no volume correction. If this is true,
-    /// the result is [`Self::weights`]. Otherwise, the result is 1 at the ends whose force states act on the
-    /// bond, and 0 at the other ends. Criteria that use the work then require a constant influence function.
+    /// `no_volume_correction` is true if [`Self::weights`] contain no volume correction. The result is then
+    /// [`Self::weights`]. Otherwise, the result is 1 at the ends whose force states act on the bond, and 0 at
+    /// the other ends. In this second case, criteria that use the work require a constant influence function.
     #[inline(always)]
     pub fn weights_of_work<S: Simd>(&self, simd: S, no_volume_correction: bool) -> Weights {
         if no_volume_correction {
@@ -181,7 +181,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// [`Criterion::limit`]. x is defined in [`crate::material::bond`].
     const HAS_FAST_PATH: bool = false;
 
-    /// Whether to load [`Group::whole`], which has the bits of intact and broken bonds.
+    /// Whether to load [`Group::whole`]. Its bits are set for all bonds, intact or broken.
     const READS_BROKEN: bool = false;
 
     /// Whether the kernel's criterion can read stresses of points i and j.

@@ -130,9 +130,9 @@ impl<'a> ReadLimits<'a> {
         }
     }
 
-    /// Load the limits of eight points. `take` loads their entries of a column. It is called only for columns
-    /// whose length [`Self::new`] has checked. Stresses are loaded only if `may_read_stresses`. This argument
-    /// is a constant, so the compiler removes the branch.
+    /// Load the limits of eight points. `take` loads the entries of these points from one column. It is
+    /// called only for columns whose length [`Self::new`] has checked. Stresses are loaded only if
+    /// `may_read_stresses`. This argument is a constant, so the compiler removes the branch.
     #[inline(always)]
     pub fn eight(&self, may_read_stresses: bool, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();

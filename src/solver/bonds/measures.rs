@@ -67,8 +67,10 @@ impl<const D: usize> Kernel<D> for EnergiesAndFamilies {
     }
 }
 
-/// Kernel with two of the sums of [`EnergiesAndFamilies`]: the volume of the intact neighbours within the
-/// horizon of point i (m³), and the number of intact bonds, including bonds longer than this horizon.
+/// Kernel that computes two of the sums of [`EnergiesAndFamilies`], by index:
+///
+/// 0. volume of the intact neighbours within the horizon of the point, m³;
+/// 1. number of intact bonds, including bonds longer than the horizon of the point.
 #[derive(Clone, Copy)]
 pub struct IntactFamilies;
 

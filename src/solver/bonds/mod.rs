@@ -1,11 +1,12 @@
 //! Internal forces: sums over bonds in passes, with halo exchanges between them.
 //!
 //! A force evaluation runs a list of passes, which is created once from the laws in use. Each pass is a sum
-//! over the bonds of every point. Later passes read the results of a pass at point i, or at both i and j. A
-//! pass begins with a halo exchange if it reads values that other ranks have changed. The first exchange
-//! sends displacements and thermal stretches. Later exchanges send thresholds and point numbers. Point
-//! numbers are values of a point, such as the dilatation, that the law of the point computes from sums over
-//! the bonds of the point. Interior points are processed while messages are in flight.
+//! over the bonds of every point. For a bond ij, later passes read the results of an earlier pass either of
+//! point i only, or of both points. A pass begins with a halo exchange if it reads values that other ranks
+//! have changed. The first exchange sends displacements and thermal stretches. Later exchanges send
+//! thresholds and point numbers. Point numbers are values of a point, such as the dilatation, that the law of
+//! the point computes from sums over the bonds of the point. Interior points are processed while messages
+//! are in flight.
 //!
 //! Bonds that meet their criterion break in the pass that sums the forces. Point numbers and forces that
 //! depend on broken bonds are then recomputed, see `broken.rs`.
@@ -70,8 +71,8 @@ enum Pass {
     /// Smallest stretch of the intact bonds of each point; the threshold of the point follows from this
     /// stretch.
     SmallestStretch,
-    /// The sums of the law's pass with this index, see [`Law::PASSES`]. Laws compute point numbers from these
-    /// sums. Laws without this pass are skipped.
+    /// The sums of one pass of the laws, see [`Law::PASSES`]. The number is the index of this pass. Laws
+    /// compute point numbers from these sums. Laws without this pass are skipped.
     PointSum(usize),
     /// The forces.
     Force,
@@ -119,7 +120,6 @@ fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64>
 /// The bonds of a rank and the data for sums over them.
 pub struct Forces<const D: usize> {
     interactions: Vec<Interaction>,
-    /// The laws of each block.
     blocks: Vec<BlockLaws>,
     /// Point data that list families read; empty if there is no list.
     nodes: Vec<Node>,
@@ -404,7 +404,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Exchange the ghost values of a column over the local points. Collective.
+    /// Exchange the ghost values of a column. The column has one value per local point. Collective.
     pub fn update_ghosts_of(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
         self.halo.update_ghosts(comm, &mut [values]);
     }

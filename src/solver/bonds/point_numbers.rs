@@ -68,9 +68,9 @@ impl PointNumbers {
         }
     }
 
-    /// Compute the constants of a range of owned points from `sums`, the columns of sums over their initial
-    /// families. Also compute the [truncation factors](Law::truncation_factor) of these points, unless
-    /// `truncation_factors` is empty.
+    /// Compute the constants of a range of owned points. `sums` contains the columns of sums over the initial
+    /// families of these points. Also compute the [truncation factors](Law::truncation_factor) of the points,
+    /// unless `truncation_factors` is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         points: Range<usize>,
@@ -125,8 +125,8 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Compute the rotations of a range of owned points, by column, from the sums of the law's first pass.
-    /// Components with empty columns are skipped.
+    /// Compute the rotations of a range of owned points from the sums of the law's first pass. Each column of
+    /// `rotations` holds one component. Components with empty columns are skipped.
     pub fn find_rotations<const D: usize>(
         &self,
         points: Range<usize>,

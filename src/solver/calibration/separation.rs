@@ -1,7 +1,8 @@
 //! The separation energy of a body. In this file, the block is a rectangular sample of the body's lattice. A
 //! plane between two layers of points divides the block into two halves. The middle column contains the
 //! points within half a cell of the line through the centre of the block along the normal of the plane. The
-//! upper half moves away from the lower half until no intact bond of these points crosses the plane.
+//! upper half moves away from the lower half until no intact bond of a point in the middle column crosses the
+//! plane.
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
@@ -169,8 +170,8 @@ impl Separation {
     }
 }
 
-/// Return true if no intact bond of a point in the middle crosses the plane. `middle` marks the points in the
-/// middle, and `upper` marks the points of the upper half.
+/// Return true if no intact bond of a point in the middle column crosses the plane. `middle` is true for the
+/// points in the middle column, and `upper` is true for the points of the upper half.
 fn is_separated<const D: usize>(
     simulation: &Simulation<'_, D>,
     middle: &[bool],

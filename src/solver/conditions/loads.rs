@@ -142,8 +142,9 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Store force density and displacement for the work of the next step. `displacement`
-    /// contains the displacements (m) of all points of the part.
+    /// Store the force densities and displacements of the loaded points. [`Self::add_work`] uses the stored
+    /// values to compute the work of the next step. `displacement` contains the displacements (m) of all
+    /// points of the part.
     pub fn record_for_work(&mut self, displacement: [&[f64]; D]) {
         self.before.copy_from_slice(&self.force);
         for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
@@ -151,8 +152,8 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the work (J) of the load since [`Self::record_for_work`] to the external work of each point; see
-    /// [`Work`].
+    /// Add the work (J) of the load since the last call of [`Self::record_for_work`] to the external work of
+    /// each point; see [`Work`].
     pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {
             return;

@@ -47,12 +47,12 @@ pub struct OnPart<const D: usize> {
 
 /// Formula for the work that loads and supports do from a stored state 0 to the present state.
 ///
-/// f is the force density of a load or a reaction, u is the displacement, and V is the volume of a point. A
-/// load step in which bonds break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work
-/// is ½ (f₀ + f₁)·(u₁ − u₀) V.
+/// f is the force density of a load or a reaction, u is the displacement, and V is the volume of a point. In
+/// a load step in which bonds break, state 1 is the first equilibrium, and state 2 is the last equilibrium.
+/// From 0 to 1, the work is ½ (f₀ + f₁)·(u₁ − u₀) V.
 /// From 1 to 2, supports do not move, and the force density of loads remains f₁. The displacement u₁ is not
-/// stored for equilibrium 2. Therefore the work of loads from 0 to 2 is the sum of two terms. The first term
-/// is added at equilibrium 1, and the second term at equilibrium 2:
+/// stored for equilibrium 2. Therefore the work that loads do from 0 to 2 is the sum of two terms. The first
+/// term is added at equilibrium 1, and the second term at equilibrium 2:
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
@@ -124,8 +124,8 @@ fn body_of<'p, const D: usize>(problem: &'p Problem, model: &Model<D>, point: u3
     problem.block(usize::from(model.block[point as usize])).body
 }
 
-/// Check a load on a layer whose thickness is the spacing. Return an input error if a loaded point on any
-/// rank belongs to a body without a [single spacing](Body::single_spacing). Do nothing for other loads.
+/// Check a load on a layer that is one spacing thick. Return an input error if a loaded point on any rank
+/// belongs to a body without a [single spacing](Body::single_spacing). Do nothing for other loads.
 /// Collective.
 fn have_depths<const D: usize>(
     problem: &Problem,
@@ -435,7 +435,7 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in one step,
-    /// and that the counted work does not contain. `step` is the length of the step, s. The work is
+    /// but that is not part of the recorded work. `step` is the length of the step, s. The work is
     /// integrated by the trapezoidal rule, which misses this energy. A load contributes the energy that it
     /// adds in one step to points initially at rest. A supported component contributes the energy of its
     /// velocity. It also contributes the energy that a point initially at rest gains from the prescribed
@@ -564,8 +564,8 @@ impl<'a, const D: usize> PartConditions<'a, D> {
         finite
     }
 
-    /// Add the work of loads and supports since [`Self::record_for_work`]. Force densities and reactions must
-    /// belong to the present positions.
+    /// Add the work of loads and supports since the last call of [`Self::record_for_work`]. Force densities
+    /// and reactions must belong to the present positions.
     pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
             load.add_work(part, work);

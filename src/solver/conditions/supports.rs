@@ -48,7 +48,7 @@ struct PrescribedVelocity {
 pub struct Supported {
     /// Index of the support among the supports of the stage.
     support: usize,
-    /// Indices of the points in the part.
+    /// Index of each of these points within the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
     /// Reaction before the step, N/m³.
@@ -250,8 +250,8 @@ impl Supported {
         finite
     }
 
-    /// Add the work (J) of the support since [`Self::record_for_work`] to the external work of each point;
-    /// see [`Work`].
+    /// Add the work (J) of the support since the last call of [`Self::record_for_work`] to the external work
+    /// of each point; see [`Work`].
     pub fn add_work<const D: usize>(
         &self,
         supports: &[Support],

@@ -42,8 +42,8 @@ impl Temperatures {
     }
 
     /// Prepare the temperatures at a time (s). After the first call of this function, [`Self::apply`] sets
-    /// the temperatures of points. If temperatures change with time, it also sets them after each call of
-    /// this function with a new time.
+    /// the temperatures of points. If temperatures change with time, [`Self::apply`] also sets the
+    /// temperatures of points after each call of this function with a new time.
     pub fn set_time(&mut self, time: f64) {
         let is_new = self.time != Some(time);
         let changes = self.each.iter().any(|one| one.values.changes);

@@ -35,7 +35,8 @@ pub struct Touching {
     pub force: Vec<f64>,
 }
 
-/// Sums over the contacts of a pair of bodies on one rank.
+/// Contact values of one rank, for a pair of bodies or for all bodies: number of contacts, largest overlap,
+/// and force.
 struct PairSum<const D: usize> {
     /// Number of contacts of owned points. The sum over all ranks counts each pair of points twice.
     count: u64,

@@ -4,7 +4,7 @@
 /// Integer coordinates of a cell; 0 beyond the dimension.
 pub(super) type Cell = [i64; 3];
 
-/// The cell of a position (m), for cells with this edge (m).
+/// Return the cell that contains a position (m). `edge` is the edge length of the cells, m.
 pub(super) fn cell_of(position: [f64; 3], edge: f64) -> Cell {
     position.map(|x| (x / edge).floor() as i64)
 }

@@ -43,7 +43,7 @@ pub(super) struct Ghost {
 pub(super) struct Ghosts<const D: usize> {
     /// The points, sorted by owner and then by id.
     pub points: Vec<Ghost>,
-    /// Edge of a line segment, square or cube with the volume of each point, m.
+    /// For each point, the edge of the line segment, square or cube that represents the point, m.
     pub edges: Vec<f64>,
     /// Displacements by component, m.
     pub displacement: Vec<Vec<f64>>,

@@ -66,7 +66,7 @@ pub struct Contact<const D: usize> {
     rules: Vec<Option<PairRule>>,
     /// Number of blocks.
     blocks: usize,
-    /// Largest contact distance of any two points without thermal stretch, m.
+    /// Largest contact distance of any two points, m. The change by thermal stretches is not included.
     largest: f64,
     /// Edge of a line segment, square or cube with the volume of the point, for each owned point, m.
     edges: Vec<f64>,
@@ -101,8 +101,8 @@ pub struct Contact<const D: usize> {
 /// Settings of a contact force evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactEvaluation {
-    /// Whether the evaluation is part of a relaxation or static solution. Velocities are then 0. In a
-    /// relaxation, contact also adds to the fictitious density.
+    /// Whether the evaluation belongs to a quasi-static stage (method `relaxation` or `static`). Velocities
+    /// are then 0. In a relaxation, contact also adds to the fictitious density.
     pub is_quasi_static: bool,
     /// Data of the step, if a step ends with this evaluation or a load step has reached equilibrium;
     /// otherwise `None`.
@@ -221,7 +221,7 @@ impl<const D: usize> Contact<D> {
         self.rigid.iter().position(|rigid| !rigid.is_finite())
     }
 
-    /// Advance the rigid bodies to a time (s) by a step (s).
+    /// Advance the rigid bodies by a step of length `step` (s), which ends at `time` (s).
     pub fn drift(&mut self, time: f64, step: f64) {
         for rigid in &mut self.rigid {
             rigid.drift(time, step);
@@ -524,7 +524,7 @@ fn stretch_of(thermal_stretch: Option<&Vec<f64>>, index: usize) -> f64 {
 }
 
 impl<const D: usize> PointSum<D> {
-    /// Add the force of a contact, and the given fraction of its energy.
+    /// Add the force of a contact, and the fraction `share` of the energy of this contact.
     fn add(&mut self, touch: &Touch<D>, share: f64) {
         for d in 0..D {
             self.repulsion[d] += touch.repulsion[d];

@@ -10,7 +10,8 @@ use crate::problem::{Block, ContactModel, ContactRule};
 /// (Silling & Askari 2005, §5).
 const SHORT_RANGE: f64 = 1.35;
 
-/// Upper limit of the contact distance of short-range forces, as a fraction of the reference distance.
+/// Upper limit of the contact distance of short-range forces, as a fraction of the distance between the
+/// reference positions of both points.
 const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
 
 /// Stiffness of short-range forces, divided by the bond stiffness of a bond-based law (Macek & Silling 2007).
@@ -185,7 +186,7 @@ impl PairRule {
     }
 
     /// Contribution of a pair to the step limits. The result is `None` if the pair does not touch and will
-    /// not touch within a time (s) at its present approach speed. The result is also `None` if the gap
+    /// not touch within `time` (s) at its present approach speed. The result is also `None` if the gap
     /// (present distance minus contact distance) exceeds `most_gap` (m).
     pub fn demand<const D: usize>(
         &self,

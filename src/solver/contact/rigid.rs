@@ -35,8 +35,8 @@ pub struct RigidState {
     friction: Wrench,
     /// Part of `contact` that is contact damping.
     damping: Wrench,
-    /// Displacement of a driven body in the present load step, m; 0 after the first equilibrium of the load
-    /// step, and in explicit stages.
+    /// Displacement of a driven body in the present load step, m. The work of this displacement is added at
+    /// the first equilibrium of the load step. The value is then reset to 0. It is also 0 in explicit stages.
     advance: [f64; 3],
     /// Prescribed force, N.
     load: [f64; 3],
@@ -49,7 +49,6 @@ pub struct RigidState {
     pub damping_energy: f64,
 }
 
-/// A rigid body with its definition, state and constants.
 #[derive(Debug)]
 pub(super) struct RigidBody {
     problem: problem::Rigid,
@@ -223,7 +222,7 @@ impl RigidBody {
 
     /// Finish a step of length `step` (s) that ends at `time` (s). Store the forces that the points exert.
     /// Record the work of these forces and of the prescribed force, and apply the second half kick. `sums`
-    /// are the values of [`WrenchSums::flat`] over all ranks.
+    /// begins with the values of [`WrenchSums::flat`], summed over all ranks.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
@@ -335,10 +334,10 @@ impl RigidBody {
         }
     }
 
-    /// Contribution of a point to the step limits. The result is `None` if the point does not touch the body
-    /// and will not touch the body within a time (s) at its present approach speed. At any velocity, the
-    /// result is also `None` if the gap exceeds the edge of the point's cell. The gap is the distance of the
-    /// point from the surface minus half this edge times 1 + a, with the thermal stretch a of the point.
+    /// Contribution of a point to the step limits. The result is `None` unless the point touches the body, or
+    /// will touch the body within `time` (s) at the present approach speed. At any velocity, the result is
+    /// also `None` if the gap exceeds the edge of the point's cell. The gap is the distance of the point from
+    /// the surface minus half this edge times 1 + a, with the thermal stretch a of the point.
     pub fn demand<const D: usize>(
         &self,
         block: usize,

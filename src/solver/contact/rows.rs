@@ -64,7 +64,7 @@ impl Rows {
         rows
     }
 
-    /// Indices of the points that may touch an owned point and that no intact bond joins to the owned point.
+    /// Indices of the points that may touch an owned point and have no intact bond to it.
     pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
         let row = self.starts[point]..self.starts[point + 1];
         row.filter(|pair| !self.is_bonded[*pair])

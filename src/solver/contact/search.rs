@@ -69,9 +69,9 @@ impl<const D: usize> Contact<D> {
         true
     }
 
-    /// Largest change of the thermal stretch of an owned point since the last search, and the largest thermal
-    /// stretch of an owned point; +∞ for stretches that are not finite. Both are 0 in runs without
-    /// temperatures.
+    /// Two values over the owned points: the largest change of the thermal stretch since the last search, and
+    /// the largest thermal stretch. A change or stretch that is not finite counts as +∞. Both values are 0 in
+    /// runs without temperatures.
     fn largest_stretches(&self, model: &Model<D>, fields: &Fields<D>) -> [f64; 2] {
         let Some(column) = &fields.thermal_stretch else {
             return [0.0; 2];
@@ -184,8 +184,8 @@ impl<const D: usize> Contact<D> {
         self.is_stale = false;
     }
 
-    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Bonds of these points have
-    /// broken in the last evaluation, or a rollback has restored these bonds.
+    /// Update the bonded flags of the points with entries in [`Forces::broken`]. Bonds of these points broke
+    /// in the last evaluation. If the step has been rolled back since, these bonds are intact again.
     pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
         if self.rows.is_unused() {
             return;

@@ -44,8 +44,8 @@ pub(super) fn distance(
     }
 }
 
-/// Compute the results of [`distance`] for mutually perpendicular faces. `beyond` are the signed distances
-/// (m) of the position from these faces, and `normals` are the outward normals of the faces.
+/// Return the results of [`distance`] for a shape with mutually perpendicular faces. `beyond` are the signed
+/// distances (m) of the position from these faces, and `normals` are the outward normals of the faces.
 fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     let faces = beyond.iter().zip(normals);
     let outer: Vector3<f64> = faces

@@ -134,8 +134,8 @@ impl<const D: usize> Contact<D> {
         };
     }
 
-    /// Scale the limits after the densities of the points were multiplied by a factor. A factor above 1 does
-    /// not change the limits, which are then upper bounds.
+    /// Scale the limits after the densities of the points were multiplied by a factor. For a factor above 1,
+    /// the limits are not changed, because the old values are then upper bounds.
     pub fn scale_density(&mut self, factor: f64) {
         self.demand.stiffness /= factor.min(1.0);
         self.demand.damping /= factor.min(1.0);

@@ -262,7 +262,7 @@ impl<const D: usize> CoarseGrid<D> {
         self.matrix.solve(&mut self.values);
     }
 
-    /// Interpolate a component of the displacement of an owned point (m) after [`Self::solve`].
+    /// Interpolate component `d` of the displacement (m) of an owned point. Call after [`Self::solve`].
     pub fn displacement(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let place = self.place(model, point);
         let of = |p: usize| place.weight(p) * self.values[(place.node + self.corner(p)) * D + d];
@@ -299,8 +299,9 @@ impl<const D: usize> CoarseGrid<D> {
         strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
     }
 
-    /// Stiffness matrices of a cell, divided by the volume of the cell: for the moduli λ = 1 and G = 0, and
-    /// for λ = 0 and G = 1. Each row and each column belongs to a displacement component of a node.
+    /// Two stiffness matrices of a cell, divided by the volume of the cell. The moduli are λ = 1 and G = 0 in
+    /// the first matrix, and λ = 0 and G = 1 in the second. Each row and each column belongs to a
+    /// displacement component of a node.
     fn reference_stiffness(&self) -> [Vec<f64>; 2] {
         let mut both = [0; 2].map(|_| vec![0.0; (CORNERS * D) * (CORNERS * D)]);
         let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
@@ -354,8 +355,9 @@ impl<const D: usize> CellPosition<D> {
     }
 }
 
-/// Weight of the lower (`end` = 0) or upper (`end` = 1) face of a cell along an axis, at the coordinate
-/// `along` from 0 to 1.
+/// Interpolation weight of one of the two faces of a cell that are normal to an axis: the lower face
+/// (`end` = 0) or the upper face (`end` = 1). The coordinate `along` is 0 at the lower face and 1 at the
+/// upper face.
 fn weight(end: usize, along: f64) -> f64 {
     if end == 1 { along } else { 1.0 - along }
 }
@@ -408,8 +410,8 @@ mod tests {
     use crate::comm::threads;
     use crate::solver::palette_column::PaletteColumn;
 
-    /// Every `size`-th of 41 points, from point `first` on. The points are 1 m apart and have a volume of 1
-    /// m³.
+    /// Part of a bar of 41 points. The points of the bar are 1 m apart and have a volume of 1 m³. The part
+    /// has every `size`-th point of the bar, starting from point `first`.
     fn bar(first: usize, size: usize) -> (Model<1>, Vec<usize>) {
         let own: Vec<usize> = (first..41).step_by(size).collect();
         let model = Model {

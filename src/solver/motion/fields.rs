@@ -241,7 +241,7 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Relative change of the yield stress of a point by strain rate and temperature, in the last step. None
+    /// Factor of strain rate and temperature on the yield stress of a point in the last step, minus 1. None
     /// without plasticity.
     yield_change: Option<Vec<f64>> = Description {
         name: "yield_change",
@@ -579,9 +579,9 @@ impl<const D: usize> Fields<D> {
     ///
     /// The force F of a breaking bond acted in the first half kick of the step, but not in the second. So the
     /// points supplied less energy than the bond had at the end of the step. The difference is ½ F·Δℓ, where
-    /// Δℓ is the change of the bond vector in the step. The released energy is reduced by this amount. On
-    /// average, a bond reaches its criterion in the middle of the step at whose end the break is detected.
-    /// Therefore neither motion nor energy depends on the step length to first order.
+    /// Δℓ is the change of the bond vector in the step. The released energy is reduced by this amount. The
+    /// break is detected at the end of the step. On average, the bond reached its criterion in the middle of
+    /// this step. Therefore neither motion nor energy depends on the step length to first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
         let velocity = &self.velocity;
         let (Some(count), Some(new), Some(freed), Some(overshoot)) = (

@@ -413,7 +413,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Sum over this rank's owned points whose fictitious density is finite. It is finite at all points except
+/// Sum over this rank's owned points whose fictitious density is finite. The density is infinite only at
 /// points that have never had an intact bond. `terms` returns the terms of a point, given the index and the
 /// fictitious density (N/m⁴) of the point.
 pub(super) fn sums<const D: usize, const N: usize>(

@@ -10,20 +10,22 @@
 //! ```
 //!
 //! η follows Eisenstat & Walker 1996, and the differences of f follow Knoll & Keyes 2004. f includes the
-//! reactions, so f is 0 for supported components. All force evaluations use the history that an equilibrium
-//! at the displaced positions would have (`BondUpdate::Trial`), so K is the consistent tangent at points that
-//! yield. ε is chosen such that the largest component of ε v is `SHIFT` times the shortest horizon. The
-//! difference then has two relative errors: an error of the order of `SHIFT` from bonds that rotate, and an
-//! error of the order of (machine precision)/`SHIFT` from rounding.
+//! reactions, so f is 0 for supported components. All force evaluations use a trial history
+//! (`BondUpdate::Trial`): the history after a step from the last equilibrium to the displaced positions.
+//! Therefore K is the consistent tangent at points that yield. ε is chosen such that the largest component of
+//! ε v is `SHIFT` times the shortest horizon. The difference then has two relative errors: an error of the
+//! order of `SHIFT` from bonds that rotate, and an error of the order of (machine precision)/`SHIFT` from
+//! rounding.
 //!
 //! K is symmetric if the forces of the law derive from an energy. In a body that softens or buckles, K may
 //! not be positive definite. The conjugate gradients then stop at the first direction of negative curvature.
 //! The preconditioner is the sum of two terms. The inverse of the diagonal of K is effective for short waves
 //! of the displacement. A coarse grid (`coarse_grid.rs`) is effective for long waves.
 //!
-//! A load step begins with a prediction of the displacements. If the last load step had the same size and no
-//! bond broke in it, the points repeat their motion of that load step. Otherwise, and in the first load step
-//! of a stage, the prediction is the solution of the problem that is linearized about the last equilibrium.
+//! A load step begins with a prediction of the displacements. If the last load step had the same size as the
+//! new one, and no bond broke in the last one, each point repeats its motion of the last load step.
+//! Otherwise, and in the first load step of a stage, the prediction is the solution of the problem that is
+//! linearized about the last equilibrium.
 //! The change of the prescribed displacements is then part of x.
 //!
 //! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. The
@@ -67,7 +69,8 @@ const MOST_FORCING: f64 = 0.1;
 /// Lower bound of the tolerance of the linear problem, as a fraction of the tolerance of the load step.
 const LINEAR_TOLERANCE_SHARE: f64 = 0.5;
 
-/// Lower bound of a point's fraction of intact bonds in the preconditioner.
+/// Lower bound of the intact fraction of a point's family in the preconditioner. This fraction is the volume
+/// of the neighbours with intact bonds, divided by the volume of the family.
 const LEAST_INTACT: f64 = 1e-3;
 
 /// State of Newton's method between iterations; the same on all ranks.
@@ -175,7 +178,7 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
 
 /// Work vectors over the owned points.
 struct Vectors<const D: usize> {
-    /// Displacement u at which differences are computed, m.
+    /// Displacement u at which finite differences of the forces approximate K, m.
     base: [Vec<f64>; D],
     /// Total force density f at `base`, N/m³.
     force: [Vec<f64>; D],
@@ -281,8 +284,8 @@ impl<const D: usize> Vectors<D> {
         simulation.progress.newton.adapt(linear, force);
     }
 
-    /// Store the total forces at the displacements u in `base`. Set the residual of the linear problem to
-    /// these forces, and to 0 where the inverse diagonal is 0.
+    /// Store the total forces at the present displacements, which must be those in `base`. Set the residual
+    /// of the linear problem to these forces, and to 0 where the inverse diagonal is 0.
     fn note_force(&mut self, simulation: &Simulation<'_, D>) {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {

@@ -10,11 +10,11 @@
 //! c ← 2 √(u̇·¹K u̇ / u̇·ρ u̇),   ¹K u̇ = −(f_new − f_old)
 //! ```
 //!
-//! ρ is the product of a reserve factor and the density for which the bound of [`super::stable_step`] gives
-//! Δt = 1. ρ follows from the largest eigenvalue of the matrix D of each point. c is the critical damping of
-//! the present motion. The quotient under the root is a Rayleigh quotient of the tangent stiffness ¹K. It
-//! uses u̇ rather than u, because differences of f along u̇ give ¹K u̇ exactly. All sums are exact, so the
-//! result is bitwise independent of ranks and threads.
+//! Each point has its own ρ: a reserve factor times the density for which the bound of
+//! [`super::stable_step`] gives Δt = 1. This bound contains the largest eigenvalue of the matrix D of the
+//! point. c is the critical damping of the present motion. The quotient under the root is a Rayleigh quotient
+//! of the tangent stiffness ¹K. It uses u̇ rather than u, because differences of f along u̇ give ¹K u̇
+//! exactly. All sums are exact, so the result is bitwise independent of ranks and threads.
 //!
 //! [`super::load_step`] defines the equilibrium and when bonds break.
 //!

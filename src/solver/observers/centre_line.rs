@@ -75,7 +75,8 @@ pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch>
 struct ShortestPaths {
     /// Path length of each reached point, m; infinite for other points.
     length: Vec<f64>,
-    /// The preceding point on the path; `None` for points where a path begins.
+    /// For each point, the preceding point on its path; `None` for points where a path begins, and for points
+    /// that are not reached.
     before: Vec<Option<usize>>,
     /// The reached points, ordered by path length, then by index.
     order: Vec<usize>,
@@ -158,7 +159,7 @@ struct Part {
     children: Vec<usize>,
 }
 
-/// Divide the points into parts. Each part comes after its parent.
+/// Divide the points into parts. In the returned list, each part comes after its parent.
 fn parts(points: &[Damaged], bins: &Bins, paths: &ShortestPaths, reach: Reach) -> Vec<Part> {
     // All points where paths begin are in section 0, including those at exactly one section length.
     let section = |point: usize| match paths.before[point] {
@@ -207,8 +208,8 @@ fn parts(points: &[Damaged], bins: &Bins, paths: &ShortestPaths, reach: Reach) -
     parts
 }
 
-/// Remove parts without children (stubs) at forks. If all children of a part are stubs, they are merged into
-/// one part. Otherwise, the stubs are dropped.
+/// Remove parts without children (stubs) at forks. If all children of a part are stubs, the children are
+/// merged into one child. Otherwise, the stubs are dropped.
 fn drop_stubs(parts: &mut [Part]) {
     for number in 0..parts.len() {
         let children = std::mem::take(&mut parts[number].children);

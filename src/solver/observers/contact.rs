@@ -34,8 +34,8 @@ const PASSED: f64 = 0.5;
 const CHUNK: usize = 1 << 15;
 
 /// Two points of different bodies that are too near: nearer than their spacing, and nearer than 0.9 of their
-/// initial distance. If bonds joined the bodies, the limit is half of the spacing or of the initial distance,
-/// whichever is smaller.
+/// initial distance. For bodies that bonds joined at the start of the run, the limits are smaller: half the
+/// spacing, and half the initial distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Bodies of the points, the lower index first.

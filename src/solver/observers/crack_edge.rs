@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 type Vector = Vector3<f64>;
 
-/// Threshold of a distance, in horizons. Each damaged point has such a distance. In the plane of the crack,
-/// it is measured from the mean position of the damaged points around the point to the mean position of the
-/// point's family. A point can be on the front only if its distance exceeds the threshold. The distance is
-/// 0.4 on a straight front, and 0.05 at an edge of the body.
+/// Threshold of the distance d of a damaged point, in horizons. d is measured in the plane of the crack, from
+/// the mean position of the damaged points around the point to the mean position of the point's family. A
+/// point can be on the front only if its d exceeds the threshold. d is 0.4 on a straight front, and 0.05 at
+/// an edge of the body.
 const ONE_SIDED: f64 = 0.2;
 
 /// Cosine of 45°, the half angle of the cone ahead of a point of the front. The cone contains no damaged
@@ -28,8 +28,8 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// Return the edge of the damaged region at a damaged point; `None` if the point is inside the region or
-    /// at an edge of the body, or if no other damaged points are around the point.
+    /// Return the edge of the damaged region at a damaged point. `None` if the point is inside the region, if
+    /// the point is at an edge of the body, or if no other damaged points are around it.
     ///
     /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
     /// ⊗ g over these points and the point itself, 1/m²; g is the result of

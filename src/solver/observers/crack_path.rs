@@ -1,4 +1,5 @@
-//! Crack paths: centre lines of the damage that starts at a given position, and their length.
+//! Crack paths and their lengths. A crack path consists of the centre lines of the damage that starts at a
+//! given position.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,4 +1,4 @@
-//! Points among which a crack is searched for, in 2-D and 3-D.
+//! Points that are searched for a crack, in 2-D and 3-D.
 
 use crate::error::Result;
 use crate::problem::{CrackPath, Problem};

@@ -37,15 +37,15 @@ const DIAGONAL: f64 = 1.8;
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
-/// Largest damage at which a point ahead of the front counts as undamaged, as a fraction of the threshold. At
-/// an oblique surface of the body, the damage falls below the threshold before the crack ends, but stays
-/// above this fraction.
+/// Largest damage at which a point ahead of the front counts as undamaged, divided by
+/// [`problem::CrackPath::threshold`]. At an oblique surface of the body, the damage falls below the threshold
+/// before the crack ends, but stays above this fraction.
 const UNDAMAGED: f64 = 0.5;
 
 /// A crack in 3-D whose area and front are computed.
 pub struct CrackSurface {
     rule: problem::CrackPath,
-    /// Owned points of the set.
+    /// Owned points of the set in which the crack is searched for.
     points: Vec<u32>,
     /// Distance up to which damaged points are connected, m.
     link: f64,

@@ -111,7 +111,7 @@ pub struct HistoryRow {
     pub number: u64,
     /// Energies of the row.
     pub energies: Energies,
-    /// Energies minus work in the first row, J; see [`Energies::error`].
+    /// Value of S in the first row, J. S is the sum of the energies minus the work, see [`Energies::error`].
     pub first_energy: f64,
     /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step, but that is
     /// not part of the recorded work. The trapezoidal rule, which integrates the work, misses this energy.
@@ -250,9 +250,9 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Two reference values for all rows: energies minus work in the first row (J; see [`Energies::error`]),
-    /// and number of bonds that were intact before any bond could break. Each bond counts twice. `None`
-    /// before the first row.
+    /// Two reference values for all rows. The first value is the sum S of [`Energies::error`] in the
+    /// first row, J. The second value is the number of bonds that were intact before any bond could break.
+    /// Each bond counts twice. `None` before the first row.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
@@ -311,8 +311,9 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// Compute the present row. Then reset to 0 the largest number of bonds that one point lost in one step.
-    /// The next row therefore contains the largest number since this row. Collective.
+    /// Compute the present row, then reset `most_broken` to 0. `most_broken` is the largest number of bonds
+    /// that one point lost in one step. The next row therefore contains the largest number since this row.
+    /// Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

@@ -116,9 +116,9 @@ fn part_in_box(centre: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option
     (range.start < range.end).then_some(range)
 }
 
-/// Return the range of distances a (m) for which the cell of the point at `position` (m) covers the positions
-/// a · `direction` of a line. `None` if the distance of the point from the line exceeds the edge of the cell
-/// (`edges[0]`).
+/// Return the part of a line that the cell of the point at `position` (m) covers, as a range of distances a
+/// (m). The positions on the line are a · `direction`. `None` if the distance of the point from the line
+/// exceeds the edge of the cell (`edges[0]`).
 fn part_near(position: [f64; 3], edges: [f64; 3], direction: [f64; 3]) -> Option<Range<f64>> {
     let along: f64 = (0..3).map(|d| position[d] * direction[d]).sum();
     let across = (0..3).map(|d| (position[d] - along * direction[d]).powi(2));

@@ -24,8 +24,8 @@ pub struct Course {
 pub struct Reached {
     /// Distance from the start of the line, m.
     pub along: f64,
-    /// Position, m: the position of the farthest point above the threshold, moved in the direction of the
-    /// line until its distance from the start is `along`.
+    /// Position, m. To obtain it, the position of the farthest point above the threshold is moved in the
+    /// direction of the line until its coordinate along the line is `along`.
     pub position: [f64; 3],
 }
 
@@ -66,9 +66,10 @@ impl Course {
     /// the threshold. The result is bitwise the same for any number of ranks. Collective.
     ///
     /// The search starts at the farthest point whose value exceeds the threshold. If several of these points
-    /// are equally far, the search starts at the point with the smallest id. The next points are the nearest
-    /// points along the line that lie ahead of this point and within one horizon of it. Between the farthest
-    /// point and the next points, the values are interpolated linearly. The result is the position at which
+    /// are equally far, the search starts at the point with the smallest id. Only points ahead of this point
+    /// and within one horizon of it are considered. Among them, the next points are those with the smallest
+    /// distance from the start of the line, measured along the line. Between the farthest point and the next
+    /// points, the values are interpolated linearly. The result is the position at which
     /// the interpolated value equals the threshold. Without next points, it is the position of the farthest
     /// point. If several points are equally far along the line, the largest of their values is used. While
     /// values grow, the result therefore moves along the line without jumps, also when the value of a next
@@ -132,7 +133,6 @@ impl Course {
     }
 }
 
-/// The largest of some values; `f64::MIN` if there are none.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(f64::MIN, f64::max)
 }

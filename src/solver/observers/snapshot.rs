@@ -263,7 +263,7 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
 
 /// Trace of the 3-D strain of an owned point. `in_plane` is the trace in the plane, or the strain along the
 /// bar. In plane stress, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy); under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
-/// Thermal strain is added.
+/// These relations hold for the strain without thermal strain. The thermal strain is added afterwards.
 fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_plane: f64) -> f64 {
     let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
@@ -353,7 +353,7 @@ fn set_out_of_plane_stress<const D: usize>(
     }
 }
 
-/// Convert columns to rows: one row per point with `components` values, for `count` points. Missing columns
+/// Convert columns to rows. Each of the `count` points has one row of `components` values. Missing columns
 /// are 0.
 fn rows(columns: &[Vec<f64>], count: usize, components: usize) -> Vec<f64> {
     let mut values = vec![0.0; components * count];

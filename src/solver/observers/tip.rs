@@ -101,13 +101,13 @@ impl Tip {
 /// such row, let l₀ be the length of the crack in the first row with a tip. The interval then begins at the
 /// latest row in which the length of the crack was at most l₀.
 ///
-/// In an interval with less growth than one horizon, the speed would show the jumps of the tip from point to
-/// point of the lattice. In an interval with a fixed number of rows, the speed would depend on the time
-/// between rows. A crack that has not grown has speed 0. After a crack stops, its speed is about one horizon
-/// divided by the duration of the interval. This duration grows from row to row.
+/// If the crack grew by less than one horizon in the interval, the speed would show each jump of the tip from
+/// one point of the lattice to the next. If the interval had a fixed number of rows, the speed would depend
+/// on the time between rows. A crack that has not grown has speed 0. After a crack stops, its speed is about
+/// one horizon divided by the duration of the interval. This duration grows from row to row.
 struct Growth {
     horizon: f64,
-    /// Time (s) and length (m) of each row with a tip.
+    /// Time (s) and length of the crack (m) in each row with a tip.
     past: Vec<(f64, f64)>,
 }
 

@@ -4,8 +4,9 @@
 //! at which a condition of the deck is true. All points within the horizon of such a point are refined
 //! (Dipasquale et al. 2014, §2.1). A new point gets the mean state of its parents. The new point takes its
 //! volume from the parents in equal parts, so mass and momentum are conserved. Bonds that exist before and
-//! after the refinement keep their state. A new bond starts broken if it crosses a pre-crack, or a facet: a
-//! face between points that a crack separates. No point is created between points that a crack separates.
+//! after the refinement keep their state. A facet is a face between points that a crack separates. A new bond
+//! starts broken if it crosses a pre-crack or a facet. No point is created between points that a crack
+//! separates.
 
 use std::cell::OnceCell;
 use std::time::Instant;
@@ -103,15 +104,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened after a time
-    /// of at least `coarsen_after` outside the horizons of triggering points and of points with broken bonds.
-    /// Return the numbers of created and removed points; `None` if the grids do not
-    /// change. Collective.
+    /// Refine and coarsen as the trigger of the problem requests. A refined point is coarsened if, for at
+    /// least `coarsen_after` (s), it has been outside the horizons of triggering points and of points with
+    /// broken bonds. Return the numbers of created and removed points; `None` if the grids do not change.
+    /// Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
-    /// memory for its bonds. The error is the same on all ranks. The run cannot continue, because its points
-    /// are freed.
+    /// memory for its bonds. The error is the same on all ranks. The run cannot continue after the error,
+    /// because its points have been freed from memory.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -216,7 +217,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Create the run on the grids of a checkpoint, at time 0. `state` contains the refined and the
+    /// Replace this run by a run at time 0 on the grids of a checkpoint. `state` contains the refined and the
     /// suppressed nodes, as in [`Grids::state`]. Collective.
     ///
     /// # Errors

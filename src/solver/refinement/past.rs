@@ -17,7 +17,8 @@ pub struct Past {
     /// For each column, the rule by which new points get their values.
     births: Vec<Birth>,
     /// Local index by body and grid index (in spacings of the finest level). The map contains only points in
-    /// the level-0 cells that [`Grids::changed`] returns for the grids before or after the refinement.
+    /// certain level-0 cells. [`Grids::changed`] returns these cells, for the grids before the refinement or
+    /// for the grids after it.
     at: FxHashMap<(usize, GridIndex), usize>,
     /// Whether each local point is removed.
     is_removed: Vec<bool>,

@@ -9,9 +9,9 @@ use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
-/// A point that triggers refinement or has broken bonds, in messages to all ranks. Points within the horizon
-/// of a triggering point are refined. Points within the horizon of a triggering point, or of a point with
-/// broken bonds, are not coarsened.
+/// Message to all ranks: a point that triggers refinement or has broken bonds. Points within the horizon of a
+/// triggering point are refined. Points within the horizon of a triggering point, or of a point with broken
+/// bonds, are not coarsened.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Source {

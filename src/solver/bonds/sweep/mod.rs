@@ -64,8 +64,8 @@ trait Part: Sized + Send {
 trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
-    /// Run the kernel over a part; `base` is the local index of the point to which the first entry of the
-    /// results belongs. Return the sums over breaking bonds, in ascending order of the points.
+    /// Run the kernel over a part. The first entry of the results belongs to the point with the local index
+    /// `base`. Return the sums over breaking bonds, in ascending order of the points.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -121,8 +121,8 @@ pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
     sweep_if_exists(bonds, points, 0, results, (kernel, Some(breaking)), source)
 }
 
-/// Run a kernel that is implemented in `D` dimensions. `kernels` are this kernel and the kernel that sums
-/// over breaking bonds. The latter is `None` if this kernel breaks no bonds.
+/// Run a kernel, which must be implemented in `D` dimensions. `kernels` are this kernel and the kernel that
+/// sums over breaking bonds. The latter is `None` if this kernel breaks no bonds.
 fn sweep_if_exists<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
