@@ -23,16 +23,15 @@ pub enum Criterion {
     Never,
     /// Bonds break at this stretch.
     Stretch(f64),
-    /// Bonds break at the smaller threshold stretch of points i and j. The numbers are the critical stretches
-    /// of both blocks, 0 for a block without critical stretch. If the law scales thresholds, it scales only
-    /// these critical stretches. It does not scale the term α s_min of `CriticalStretch::threshold`.
-    Thresholds([f64; 2], Directions),
-    /// Same as [`Self::Stretch`], with a separate critical stretch of each block; ∞ for a block without
-    /// critical stretch.
+    /// Bonds break at the smaller threshold stretch of points i and j.
+    Thresholds(Directions),
+    /// Same as [`Self::Stretch`], for separate critical stretches of the blocks of points i and j.
+    /// [`StretchConversion`] converts these stretches to the critical stretch of the bond. A block
+    /// without critical stretch has the value ∞.
     StretchBetween([f64; 2], StretchConversion),
     /// Same as [`Self::Thresholds`], for thresholds of points i and j that belong to different horizons.
     /// [`StretchConversion`] converts these thresholds to the critical stretch of the bond.
-    ThresholdsBetween([f64; 2], StretchConversion, Directions),
+    ThresholdsBetween(StretchConversion, Directions),
     /// Bonds break when their work reaches their critical work. Each end that acts on a bond adds the work of
     /// its force state to the work of the bond. The end also adds its share to the critical work of the bond.
     /// The numbers are the shares of points i and j, J/m⁶.
@@ -58,15 +57,15 @@ pub type HorizonRatios = [[f64; 2]; 2];
 /// Conversion of the critical stretches of points i and j to the critical stretch of their bond, for ends
 /// with different horizons or different damage laws.
 ///
-/// An end e acts on the bond if the bond is within the horizon of e. The energy of the bond at this end is
-/// then ½ k_e s² |ξ|, with the stiffness k_e.
+/// An end e acts on the bond if the bond is within the horizon of e. The end then contributes ½ k_e s² |ξ| to
+/// the energy of the bond. Here s is the stretch of the bond, and k_e is the stiffness of this end.
 ///
 /// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k. The minimum is over the
 /// points k of the bond: k = i and k = j. Here t_k is the critical stretch of point k, and r_ek is the factor
 /// in [`Self::ratios`].
 ///
-/// With sums over the acting ends, the bond breaks when Σ ½ k_e s² |ξ| reaches Σ ½ k_e m_e² |ξ|. The critical
-/// stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
+/// The energy of the bond is Σ ½ k_e s² |ξ|, summed over the acting ends. The bond breaks when this energy
+/// reaches Σ ½ k_e m_e² |ξ|. The critical stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. r_ek is 1 if
@@ -89,7 +88,7 @@ impl StretchConversion {
     }
 
     /// Return a lower bound on the critical stretch of a bond, from the critical stretches of points i and j.
-    /// The bound holds whichever ends act on the bond.
+    /// The bound is valid for any combination of ends that act on the bond.
     #[inline(always)]
     fn smallest(self, [i, j]: [f64; 2]) -> f64 {
         let of_end = |[from_i, from_j]: [f64; 2]| (i * from_i).min(j * from_j);
@@ -97,7 +96,7 @@ impl StretchConversion {
     }
 }
 
-/// Rule for breaking bonds by their work.
+/// Rule for bonds that break when the work done on them reaches a critical value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
     /// Bonds that can break: stretched bonds only, or compressed bonds too.
@@ -148,8 +147,8 @@ impl BreakableBonds {
     }
 }
 
-/// Data that criteria read at both ends of eight bonds. Criteria also read the laws and the point numbers
-/// ([`Law::Point`]).
+/// Data that criteria read at both ends of eight bonds. The laws and the point numbers ([`Law::Point`]),
+/// which criteria also read, are not part of this struct.
 #[derive(Clone, Copy)]
 pub struct Ends<'a> {
     /// Data of points i and j.
@@ -158,7 +157,7 @@ pub struct Ends<'a> {
     pub weights: Weights,
 }
 
-/// Data that only criteria read, at one end of eight bonds.
+/// Data at one end of eight bonds. Only criteria read these data.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Stretches, works (J/m⁶) or stresses (Pa) at which the bonds of the points break.
@@ -314,7 +313,7 @@ impl Criterion {
     }
 
     /// Return the stretch, work or stress at which each bond breaks. `scale` is the factor
-    /// [`Law::toughness_scale`] on critical stretches; `None` for laws that do not scale them.
+    /// [`Law::toughness_scale`] on stretch thresholds; `None` for laws that do not scale them.
     #[inline(always)]
     fn threshold<S: Simd, const D: usize>(
         &self,
@@ -342,14 +341,12 @@ impl Criterion {
                     None => threshold,
                 }
             }
-            Self::Thresholds(critical, ref directions)
-            | Self::ThresholdsBetween(critical, _, ref directions) => {
+            Self::Thresholds(ref directions) | Self::ThresholdsBetween(_, ref directions) => {
                 let (mut threshold_i, mut threshold_j) =
                     (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if let Some(scale) = scale {
-                    let growth = scale - Lanes::splat(1.0);
-                    threshold_i += growth * critical[0];
-                    threshold_j += growth * critical[1];
+                    threshold_i = threshold_i * scale;
+                    threshold_j = threshold_j * scale;
                 }
                 if let Some(directions) = directions {
                     let [factor_i, factor_j] =
@@ -358,7 +355,7 @@ impl Criterion {
                     threshold_j = threshold_j * factor_j.sqrt();
                 }
                 match *self {
-                    Self::ThresholdsBetween(_, conversion, _) => {
+                    Self::ThresholdsBetween(conversion, _) => {
                         conversion.convert(simd, [threshold_i, threshold_j], ends.weights.acting())
                     }
                     _ => threshold_i.min(threshold_j),

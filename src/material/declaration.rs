@@ -51,9 +51,6 @@ pub struct Declaration {
     /// Return the error message for a horizon that is not allowed. The field is `None` if every horizon is
     /// allowed.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
-    /// Whether the law, with these values of its keys, scales the critical stretch by a factor per bond. The
-    /// law scales only a critical stretch that follows from a fracture energy.
-    pub scales_thresholds: fn(&Values) -> bool,
     /// Create the law from the constants of one body.
     pub build: fn(&Given) -> Built,
     /// Examples for the tests. Each example lists the keys that a test deck gives for the law, except density
@@ -82,7 +79,6 @@ impl Declaration {
             own_critical_stretch: None,
             wears_out: false,
             horizon_fault: None,
-            scales_thresholds: |_| false,
             build,
             examples: &[""],
         }
@@ -93,7 +89,7 @@ impl Declaration {
         self.own_critical_stretch.is_some()
     }
 
-    /// Test whether the law exists in this dimension if its keys have their defaults.
+    /// Test whether the law with the defaults of all its keys exists in this dimension.
     pub fn is_for(&self, dimension: Dimension) -> bool {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }
@@ -278,10 +274,10 @@ impl Values {
         }
     }
 
-    /// Return the word of a key.
+    /// Return the value of a key whose value is a word.
     ///
     /// # Panics
-    /// If the key has no word.
+    /// If the value of the key is not a word, or the key has no value.
     pub fn word(&self, key: &str) -> &str {
         match self.get(key) {
             Some(Value::Word(word)) => word,

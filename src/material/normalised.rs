@@ -1,12 +1,12 @@
 //! Prototype microelastic material with one micromodulus per point, computed from the point's own family.
 //!
-//! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3. The micromodulus c_i scales the energy of
-//! the discrete family at unit isotropic stretch to the classical energy density W₁. With the bond energy
-//! w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an isotropic stretch
-//! is therefore correct at surfaces and on any lattice. A bond has the mean of the micromoduli of points i
-//! and j, c_ij = (c_i + c_j)/2. A critical stretch s_c that follows from a fracture energy is scaled to s_c
-//! √(c/c_ij), with the micromodulus c of an untruncated family. Breaking the bond then takes the same energy
-//! as in an untruncated family.
+//! Ganzenmüller, Hiermaier & May 2014; Diehl & Schweitzer 2016, §3. The micromodulus c_i is chosen such that,
+//! at unit isotropic stretch, the energy of the discrete family is the classical energy density W₁. With the
+//! bond energy w = c_i s²|ξ|/2, the condition ½ Σ w Ṽ = W₁ gives c_i = 4 W₁ / Σ |ξ| Ṽ. The energy of an
+//! isotropic stretch is therefore correct at surfaces and on any lattice. A bond has the mean of the
+//! micromoduli of points i and j, c_ij = (c_i + c_j)/2. A critical stretch s_c that follows from a fracture
+//! energy is scaled to s_c √(c/c_ij), with the micromodulus c of an untruncated family. Breaking the bond
+//! then takes the same energy as in an untruncated family.
 //!
 //! With the influence function δ/|ξ|, the bond energy is w = c̄_i s²/2 with c̄_i = c_i δ = 4 W₁/Σ Ṽ. This is
 //! eq. 15 of Diehl & Schweitzer, except that they use W₁ = 9K/4 instead of the classical W₁.
@@ -28,8 +28,8 @@ pub struct Normalised {
     /// `form = "diehl2016"`.
     pub energy: f64,
     /// Micromodulus c of an untruncated family, N/m⁶, if the critical stretch follows from a fracture energy.
-    /// `None` if the deck gives the critical stretch, which then holds for all bonds, or if the bonds have no
-    /// damage.
+    /// `None` if the bonds have no damage, or if the deck gives a critical stretch, which then holds for all
+    /// bonds.
     pub reference: Option<f64>,
 }
 
@@ -51,7 +51,6 @@ impl Declared for Normalised {
         keys: &[FORM],
         breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
-        scales_thresholds: |_| true,
         examples: &["", "form = 'diehl2016'"],
         ..Declaration::new(
             "normalised_pmb",
@@ -80,8 +79,8 @@ fn as_printed(given: &Given) -> bool {
     given.values.word(FORM.name) == "diehl2016"
 }
 
-/// Return the micromodulus (N/m⁶) of Diehl & Schweitzer 2016, eq. 15, for an untruncated family. The
-/// influence function δ/|ξ| contains the horizon δ, so the micromodulus is 9K/Σ V divided by δ.
+/// Return the micromodulus (N/m⁶) of Diehl & Schweitzer 2016, eq. 15, for an untruncated family: 9K/(δ Σ V).
+/// The division by δ compensates the factor δ in the influence function δ/|ξ|.
 fn printed_micromodulus(given: &Given) -> f64 {
     let volume = match given.dimension {
         Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),

@@ -106,7 +106,8 @@ impl Ordinary {
         self.untruncated_weighted_volume
     }
 
-    /// Return m (m⁵) from A/m; `None` if the point has no bonds.
+    /// Return the weighted volume m (m⁵) of a point. `extension_factor` is A/m. `None` if the point has no
+    /// bonds.
     pub(super) fn weighted_volume_of(&self, extension_factor: f64) -> Option<f64> {
         (extension_factor > 0.0).then(|| self.extensional / extension_factor)
     }
@@ -167,7 +168,6 @@ impl Declared for Ordinary {
         no_line: Some("`ordinary` has no 1-D form; use `pmb`"),
         breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
-        scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",
         examples: &[
             "poisson_ratio = 0.4",
             "poisson_ratio = 0.1, influence = 'linear'",
@@ -251,7 +251,7 @@ impl<const D: usize> Law<D> for Ordinary {
     const CONSTANTS: usize = 1;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// Each point has one own number, the dilatation θ.
+    /// The only own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]

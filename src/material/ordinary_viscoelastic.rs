@@ -64,7 +64,6 @@ impl Declared for OrdinaryViscoelastic {
         },
         breaks_by_energy: true,
         critical_stretch: Some(super::ordinary::critical_stretch),
-        scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",
         examples: &[
             "poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.4",
             "poisson_ratio = 0.2, relaxation_time = 0.05, relaxing_share = 0.6, surface_correction = 'pals'",
@@ -112,7 +111,8 @@ impl Described for OrdinaryViscoelastic {
     }
 }
 
-/// Relaxation of the deviatoric force of bonds: back extensions that follow the deviatoric extensions.
+/// Relaxation of the deviatoric force of bonds. At each end of a bond, the back extension follows the
+/// deviatoric extension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Relaxation {
     /// Relaxation time τ, s.
@@ -178,7 +178,9 @@ impl Relaxation {
 }
 
 impl<const D: usize> Law<D> for OrdinaryViscoelastic {
-    /// A/m and d κ θ/m + λ (A/m²) Σ ω|ξ| e_b Ṽ (both N/m⁷), and θ/d.
+    /// 1. A/m, N/m⁷;
+    /// 2. d κ θ/m + λ (A/m²) Σ ω|ξ| e_b Ṽ, N/m⁷;
+    /// 3. θ/d.
     type Point = [Lanes; 3];
     /// e_b/|ξ|, e_d/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 3];
@@ -188,7 +190,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 2;
-    /// Each point has one own number, the dilatation θ.
+    /// The only own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

@@ -1,5 +1,6 @@
-//! Prototype microelastic material: the force density of a bond per volume of point j is f = c s Y/|Y|, and
-//! the energy of a bond is w = c s² |ξ|/2 (J/m⁶). The force state of each end is half of f.
+//! Prototype microelastic material. A bond exerts the force density f = c s Y/|Y| on point i, per volume of
+//! point j. Here c is the micromodulus, and s is the stretch of the bond. The force state of each end is half
+//! of f. The energy of the bond is w = c s² |ξ|/2 (J/m⁶).
 //!
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 4–5; Dipasquale et al. 2014, eq. 2 and 6. The
 //! micromodulus c gives the body the classical strain energy under isotropic expansion. Without failure, the
@@ -16,7 +17,7 @@ use super::{
 use crate::dimension::{Constraint, Dimension};
 use crate::lanes::{Lanes, Simd};
 
-/// The law with its only constant.
+/// The prototype microelastic material. Its only constant is the micromodulus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pmb {
     /// Micromodulus c, N/m⁶.
@@ -94,7 +95,6 @@ impl Declared for Pmb {
             keys: &[SURFACE_CORRECTION],
             breaks_by_energy: true,
             critical_stretch: Some(bond_based_critical_stretch),
-            scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",
             examples: &[
                 "",
                 "surface_correction = 'energy'",

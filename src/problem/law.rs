@@ -79,8 +79,8 @@ impl Law {
         fault(&self.values, dimension)
     }
 
-    /// Return the fault of the law in 1-D. There is a fault if the law has no 1-D form. There is also a fault
-    /// if the value of one of its keys is a word without a 1-D form. `None` if there is no fault.
+    /// Return the fault of the law in 1-D; `None` if there is no fault. There is a fault if the law has no
+    /// 1-D form. There is also a fault if the value of a key is a word that is not available in 1-D.
     fn fault_of_a_line(&self) -> Option<LawFault> {
         let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
             (Kind::Word(words), Some(Value::Word(given))) => {
@@ -130,14 +130,6 @@ impl Law {
             }
             DamageRule::Stress(_) => (|law| law.breaks_by_stress, "by stress"),
         };
-        let is_given = matches!(damage.toughness, super::Toughness::CriticalStretch(_));
-        let scales = !is_given && (self.declaration.scales_thresholds)(&self.values);
-        if damage.weibull.is_some() && scales {
-            return Some(format!(
-                "`weibull_modulus` is not available for `{}`, which already scales the critical stretch of each bond",
-                self.declaration.name
-            ));
-        }
         if can(self.declaration) {
             return None;
         }

@@ -70,6 +70,44 @@ fn a_high_modulus_is_no_scatter() {
     }
 }
 
+/// In a bar of two points, `surface_correction = "energy"` doubles the stiffness of the bond. The bond must
+/// then break at 1/√2 of the stretch without correction, however strong its points are.
+#[test]
+fn surface_corrections_scale_the_strength_of_each_point() {
+    let stretch_at_break = |grid: &str, seed: u32| {
+        let deck = format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 1.5, volume_correction = 'none', {grid} }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            damage.brittle.critical_stretch = {{ fracture_energy = 1e-4, weibull_modulus = 2, seed = {seed} }}
+            body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [2] }} }}
+            condition.pull = {{ set = 'all', displacement = ['1e-6*t*x'] }}
+            time = {{ end = 20000, step = 1 }}
+            "
+        );
+        simulate::<1, _>(&deck, |mut simulation| {
+            while !simulation.is_over() {
+                simulation.advance();
+                let mut is_broken = false;
+                simulation.forces.for_each_broken(|_, _| is_broken = true);
+                if is_broken {
+                    return 1e-6 * simulation.clock.time();
+                }
+            }
+            panic!("the bond has not broken")
+        })
+    };
+    for seed in 1..=5 {
+        let plain = stretch_at_break("surface_correction = 'none'", seed);
+        let corrected = stretch_at_break("surface_correction = 'energy'", seed);
+        let expected = plain * std::f64::consts::FRAC_1_SQRT_2;
+        assert!(
+            (corrected - expected).abs() < 2e-6,
+            "{seed}: {corrected}, {expected}"
+        );
+    }
+}
+
 #[test]
 fn points_are_moved_by_up_to_the_jitter() {
     let deck = |grid: &str| {

@@ -82,7 +82,8 @@ fn breaks(body: &Body, damage: &problem::Damage) -> Breaks {
     }
 }
 
-/// Return the input for creating the law of a body with this damage and these constants.
+/// Return the input from which the law of a body is created. `damage` is the damage of the bonds, and
+/// `constants` are the constants at one end of the bonds.
 fn given<'a>(
     problem: &Problem,
     body: &'a Body,
@@ -108,8 +109,8 @@ fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) ->
     Some(own(&given(problem, body, None, constants)))
 }
 
-/// Create the law of a body with these constants. `damage` is the damage of the bonds; `None` for bonds
-/// without damage.
+/// Create the law of a body with these constants. `damage` is the damage law of the bonds; `None` for bonds
+/// without a damage law.
 fn build(
     problem: &Problem,
     body: &Body,
@@ -177,8 +178,8 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// Return the kinds of point data of `body` that the failure criteria of bonds to other bodies read. Only
-/// pairs of bodies with a separate damage law count.
+/// Return the kinds of point data of `body` that the failure criteria of bonds to other bodies read. Pairs
+/// of bodies without a separate damage law are ignored.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -342,13 +343,10 @@ fn criterion(
             });
             Criterion::Work(shares, rule)
         }
-        (None, true) => {
-            let critical = critical.map(|critical| critical.unwrap_or(0.0));
-            match conversion {
-                None => Criterion::Thresholds(critical, directions),
-                Some(conversion) => Criterion::ThresholdsBetween(critical, conversion, directions),
-            }
-        }
+        (None, true) => match conversion {
+            None => Criterion::Thresholds(directions),
+            Some(conversion) => Criterion::ThresholdsBetween(conversion, directions),
+        },
         (None, false) => match conversion {
             None => Criterion::Stretch(smallest),
             Some(conversion) => {

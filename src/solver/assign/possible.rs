@@ -1,4 +1,5 @@
-//! Check that the bodies of a problem can have the laws and the damage from the deck.
+//! Check that the laws and the damage of all bodies are compatible with each other and with the other
+//! settings of the problem.
 
 use super::{Breaks, breaks, build, constants, given};
 use crate::error::{Error, Result};
@@ -161,7 +162,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
 }
 
 /// Return an error if the damage of a body is incompatible with another setting of the problem. Also return
-/// an error if bonds may join this body and another body with incompatible damage.
+/// an error if bonds may join this body to another body whose bonds break by a different quantity (stretch,
+/// work or stress).
 fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
