@@ -3,7 +3,8 @@
 //! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
 //! last load step. In a run without an earlier load step, it is the change since the start of the run.
 //! If breaking bonds have added energy, the fracture energy is negative. The energy gain does not include a
-//! negative fracture energy. The energy input is `EnergyWatch::input`.
+//! negative fracture energy. The checks compare the energy gain with the energy input, see
+//! `EnergyWatch::input`.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -23,16 +24,15 @@ const WARNING_GAIN: f64 = 1.0;
 /// or the last row of the run, exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
-/// Ratio of energy gain to energy input. The run ends with an error at the first row of the history above
-/// this ratio.
+/// Ratio of energy gain to energy input. The run ends with an error as soon as one row of the history
+/// exceeds this ratio.
 const CERTAIN_GAIN: f64 = 1e9;
 
-/// Fraction of the energy input. If breaking bonds have added more energy than this fraction, a warning is
-/// printed.
+/// Largest energy that breaking bonds can add without a warning, as a fraction of the energy input.
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
-/// Fraction of the largest energy. If the error of the energy balance at the end of a run exceeds this
-/// fraction, a warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on
+/// If the error of the energy balance at the end of a run exceeds this fraction of the largest energy, a
+/// warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on
 /// coarse grids.
 const MAX_FINAL_ERROR: f64 = 0.2;
 
@@ -108,8 +108,8 @@ impl EnergyWatch {
         }
     }
 
-    /// Check a row of the history, and return warnings. `simulation` is at the time of this row. `is_last`
-    /// says whether this row is the last of the run. The warnings are the same on all ranks.
+    /// Check a row of the history, and return warnings. `simulation` must be at the time of this row.
+    /// `is_last` says whether this row is the last of the run. The warnings are the same on all ranks.
     ///
     /// # Errors
     /// If a time step is clearly unstable; [`Self::check`] states the limits.
@@ -148,8 +148,10 @@ impl EnergyWatch {
     /// `is_last` says whether this row is the last of the run. The result is the same on all ranks.
     ///
     /// # Errors
-    /// If the ratio is above [`FATAL_GAIN`] in two consecutive rows or in the last row of the run, or above
-    /// [`CERTAIN_GAIN`] in one row.
+    /// If the ratio exceeds one of these limits:
+    ///
+    /// - [`FATAL_GAIN`] in two consecutive rows or in the last row of the run;
+    /// - [`CERTAIN_GAIN`] in one row.
     fn check(
         &mut self,
         row: &HistoryRow,

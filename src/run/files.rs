@@ -28,7 +28,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// Return the files of a run in a folder.
+    /// Return the paths of the output files of a run. All files are in `folder`.
     pub fn new(problem: &Problem, folder: PathBuf) -> Self {
         let further = problem.further_outputs.iter();
         let cracks = problem.history.cracks.iter();
@@ -51,7 +51,6 @@ impl Files {
         all.map(PathBuf::as_path)
     }
 
-    /// Return the paths of the side-cars of the results.
     fn side_cars(&self) -> impl Iterator<Item = PathBuf> {
         self.results().map(|path| path.with_extension("xdmf"))
     }

@@ -23,8 +23,9 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data to ranges of ids. `rows` are the rows of this rank's range whose points
-    /// are in the result; `None` for all rows. `steps` is the expected number of outputs. Collective.
+    /// Create the layout. The static data are redistributed, so that each rank has the data of its range of
+    /// ids. `rows` are the rows of this rank's range whose points are in the result; `None` for all rows.
+    /// `steps` is the expected number of outputs. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,

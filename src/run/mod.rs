@@ -64,6 +64,7 @@ use energy_watch::{EnergyWatch, StepKinds};
 use output_file::Start;
 use recorder::{Continuation, Recorder, damage, reasons_for_new_results};
 use restart::{Restart, restart};
+use warnings::MAX_DEPTH;
 use watch::{Decision, OwnRequests, Watch};
 
 /// The outcome of a run; equal on all ranks.
@@ -281,7 +282,7 @@ impl<'a> Job<'a> {
         let simulation = stepper.at_full_step();
         let without_contact = self.problem.contact.is_none();
         let mut contact = without_contact.then(|| ContactWatch::new(simulation));
-        let mut warned_of_contact = false;
+        let (mut warned_of_contact, mut warned_of_depth) = (false, false);
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
@@ -311,6 +312,10 @@ impl<'a> Job<'a> {
                 warned_of_contact = true;
             }
             stepper.advance();
+            if !warned_of_depth && stepper.deepest_contact() > MAX_DEPTH {
+                self.warn_of_deep_contact(stepper.clock());
+                warned_of_depth = true;
+            }
             let clock = *stepper.clock();
             let complete = stepper.is_over();
             let step = stepper.load_step().is_settled.then_some(&clock);

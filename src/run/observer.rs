@@ -9,7 +9,8 @@ use crate::solver::refinement::Regridded;
 use crate::solver::repartition::Repartition;
 use crate::survey::Survey;
 
-/// Callbacks from a run. Each is called on all ranks at the same step; the defaults do nothing.
+/// Callbacks from a run. Each callback is called on all ranks at the same step. The default implementations
+/// do nothing.
 pub trait Observer {
     /// Called for each message of the run.
     fn message(&mut self, _message: &Message) {}
@@ -48,7 +49,7 @@ pub enum Message {
         /// Figures and warnings.
         survey: Survey,
     },
-    /// Automatic choices, such as the partition: names and values.
+    /// Names and values of automatic choices, such as the partition.
     Decided(Vec<(&'static str, String)>),
     /// The run continues from a checkpoint.
     Continued {
@@ -73,7 +74,7 @@ pub enum Message {
     Refined {
         /// Number of the last step before the refinement.
         number: u64,
-        /// Number of created and removed points.
+        /// Number of created points, and number of removed points.
         regridded: Regridded,
         /// New number of points.
         points: u64,
@@ -155,12 +156,13 @@ pub trait RunState {
     /// request needs one or several passes over the bonds. Collective: all ranks must request the same field.
     fn field(&mut self, field: Field) -> Vec<f64>;
 
-    /// Return the energies of all points, J. A request needs one or two passes over the bonds. Collective.
+    /// Return the energies, summed over the points of all ranks, J. A request needs one or two passes over
+    /// the bonds. Collective.
     fn energies(&mut self) -> StateEnergies;
 
     /// Write a checkpoint and stop the run before its end. A request by one rank stops all ranks. If the
     /// request is made in [`Observer::row`], the run stops at the step of this row. Otherwise, the run stops
-    /// up to ten explicit steps, or up to ten iterations of load steps, later.
+    /// later: after at most ten explicit steps, or after at most ten iterations of load steps.
     fn stop(&mut self);
 
     /// Return the factor of a load in the next step; 1 unless an observer has set the factor. `None` if no

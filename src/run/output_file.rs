@@ -31,7 +31,8 @@ pub struct OutputFile<'a> {
     /// Index of this output among the further outputs that count newly broken bonds; `None` for other
     /// outputs.
     counter: Option<usize>,
-    /// Rows of this rank's range of ids whose points are in the result; `None` for all rows.
+    /// Rows of the points in the result, counted within this rank's range of ids. `None` if the result
+    /// contains all points.
     rows: Option<Vec<usize>>,
     /// The side-car; on rank 0 only.
     side_car: Option<SideCar>,
@@ -41,9 +42,9 @@ pub struct OutputFile<'a> {
 pub type RetainedRows = Vec<Vec<f64>>;
 
 impl<'a> OutputFile<'a> {
-    /// Create or resume the file at a path. `history` is the history of the main result and its number of
-    /// rows; `None` for further results. Also return the history rows that a resumed file retains.
-    /// Collective.
+    /// Create or resume the file at a path. `history` is the description of the history, and the
+    /// number of rows after which a resumed history continues; `None` for further results. Also return the
+    /// history rows that a resumed file retains. Collective.
     ///
     /// # Errors
     /// If the file cannot be created, resumed or written, or the set of the output is empty.
@@ -173,7 +174,7 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// Find the rows of the output's points. The rows are counted within this rank's range of ids. `None` if the
+/// Find the rows of the output's points. A row is an index into this rank's range of ids. `None` if the
 /// output contains all points. Collective.
 ///
 /// # Errors

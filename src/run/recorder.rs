@@ -103,7 +103,7 @@ impl<'a> Recorder<'a> {
         &self.files[0].file
     }
 
-    /// Return the name and number of outputs of each further result, for a checkpoint.
+    /// Return the name of each further result and the number of its outputs, for a checkpoint.
     pub fn further<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<FurtherResult> {
         let problem = simulation.problem;
         let outputs = problem.further_outputs.iter().zip(&self.files[1..]);
@@ -236,7 +236,8 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Largest energy of the rows before a restart, J; 0 without such rows.
+    /// Return the largest absolute value of an energy (J) in the history rows that were written before a
+    /// restart; 0 if there are no such rows.
     pub fn largest_past_energy(&self) -> f64 {
         self.observer.largest_past_energy()
     }
@@ -264,7 +265,7 @@ impl<'a> Recorder<'a> {
     /// Close all result files. If `will_resume` is true, unused space in the files is not freed. Collective.
     ///
     /// # Errors
-    /// If closing a file or an earlier write fails, for example because the disk is full.
+    /// If a file cannot be closed, or if an earlier write has failed, for example because the disk is full.
     pub fn close(self, will_resume: bool) -> Result<()> {
         let mut files = self.files.into_iter();
         files.try_for_each(|file| file.close(will_resume))

@@ -19,8 +19,12 @@ const MAX_INERTIA: f64 = 0.05;
 /// of this run changes by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
-/// Initial fraction of the simulated time. Inertia is not checked in this part, because the strain energy is
-/// still small.
+/// Overlap of two points, as a fraction of their contact distance, above which a warning is printed. At 1,
+/// the points would be at the same place. Points that have passed each other are pressed farther apart.
+pub(super) const MAX_DEPTH: f64 = 0.9;
+
+/// Fraction of the simulated time before which inertia is not checked, because the strain energy is still
+/// small.
 const UNCHECKED_FRACTION: f64 = 0.1;
 
 impl<'a> Job<'a> {
@@ -54,8 +58,21 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn of a fixed step that refinement has made unstable. `before` is the smallest stable step so far
-    /// (s). Return the present stable step, s.
+    /// Warn of points that are about to pass each other.
+    pub(super) fn warn_of_deep_contact(&mut self, clock: &Clock) {
+        let text = format!(
+            "after step {} (t = {:.4e} s) points in contact overlap by more than {} % of their contact distance, \
+             and may pass through each other; increase `stiffness` in [contact], or choose model = \
+             \"short-range\"",
+            clock.number(),
+            clock.time(),
+            100.0 * MAX_DEPTH,
+        );
+        self.observer.message(&Message::Warning(text));
+    }
+
+    /// Warn of a fixed step that refinement has made unstable. `before` is the smallest stable step before
+    /// the present refinement (s). Return the present stable step, s.
     pub(super) fn warn_of_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

@@ -12,7 +12,7 @@ use crate::solver::observers::Schedule;
 use super::signals::Signals;
 
 /// Maximum number of iterations of the time loop between two collective decisions. An iteration of the time
-/// loop is a step, or an iteration of a load step.
+/// loop makes one explicit step, or one iteration of a load step.
 const MAX_ITERATIONS: u64 = 10;
 /// Target interval of wall-clock time between two collective decisions, s.
 const INTERVAL: f64 = 0.2;
@@ -167,8 +167,8 @@ impl<'a> Watch<'a> {
         step.is_some_and(due)
     }
 
-    /// Decide on a checkpoint or stop after this iteration. `observer` contains the requests of this rank's
-    /// observer. The decision is the same on all ranks. Collective.
+    /// Decide whether to write a checkpoint after this iteration, and whether to stop the run. `observer`
+    /// contains the requests of this rank's observer. The decision is the same on all ranks. Collective.
     pub fn decide(
         &mut self,
         comm: &dyn Communicator,

@@ -8,6 +8,7 @@ use crate::problem::{Condition, Time};
 
 use super::Simulation;
 use super::conditions::LoadFactors;
+use super::contact::Contact;
 use super::model::Model;
 use super::motion::Clock;
 use super::motion::load_step::LoadStep;
@@ -31,7 +32,6 @@ pub struct Stepper<'a, const D: usize> {
 /// Requests of an observer on this rank.
 #[derive(Default)]
 struct Requests {
-    /// Whether the run shall stop.
     stop: bool,
     /// Error of an invalid request; `None` if all requests are valid.
     error: Option<Error>,
@@ -98,6 +98,12 @@ impl<'a, const D: usize> Stepper<'a, D> {
     /// Same as [`Simulation::step_for_contact`].
     pub fn step_for_contact(&self) -> Option<f64> {
         self.simulation.step_for_contact()
+    }
+
+    /// Largest overlap of two points in contact at the end of the last step, as a fraction of their contact
+    /// distance; 0 without contact.
+    pub fn deepest_contact(&self) -> f64 {
+        (self.simulation.contact.as_ref()).map_or(0.0, Contact::deepest)
     }
 
     /// Progress of the load step.

@@ -36,8 +36,35 @@ fn warnings(ranks: usize, deck: &str) -> Vec<String> {
     let output = finish(&mut command);
     let printed = text(&output);
     assert!(output.status.success(), "{printed}");
-    let lines = printed.lines().filter(|line| line.contains("closer than"));
+    let kinds = ["closer than", "may pass through each other"];
+    let lines = printed.lines();
+    let lines = lines.filter(|line| kinds.iter().any(|kind| line.contains(kind)));
     lines.map(str::to_owned).collect()
+}
+
+#[test]
+fn a_collision_that_is_too_fast_for_contact_is_told_once() {
+    let deck = |speed: f64| {
+        format!(
+            "dimension = 'plane-strain'
+            grid = {{ spacing = 1, horizon = 3 }}
+            contact = {{}}
+            material.rubber.pmb = {{ density = 1, youngs_modulus = 1 }}
+            [body]
+            left = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [12, 6] }} }}
+            right = {{ material = 'rubber', shape.box = {{ lower = [14, 3], upper = [26, 9] }} }}
+            [initial]
+            left = {{ set = 'left', velocity = [{speed}, 0] }}
+            right = {{ set = 'right', velocity = [-{speed}, 0] }}
+            [time]
+            end = 40
+            "
+        )
+    };
+    let alone = warnings(1, &deck(0.3));
+    assert_eq!(alone.len(), 1, "{alone:?}");
+    assert_eq!(warnings(2, &deck(0.3)), alone);
+    assert_eq!(warnings(1, &deck(0.1)), [""; 0]);
 }
 
 #[test]

@@ -267,6 +267,55 @@ fn a_closed_crack_carries_load_in_equilibrium() {
     );
 }
 
+/// The points next to the faces of a refined grid are as far from the faces as those of the grid without
+/// refinement. Cells may also have different edges.
+#[test]
+fn a_closed_crack_carries_load_on_any_grid() {
+    let force = |grid: &str, contact: &str| {
+        let deck = cracked_block(contact).replace("spacing = 1, horizon = 3.015", grid);
+        load_steps::<2>(&deck, &["force_top"]).last().unwrap()[0]
+    };
+    let refined =
+        "contact = {}\nrefinement = { levels = 1, region.middle.where = 'abs(y - 10) < 4' }";
+    let [plain, oblong] = [
+        "spacing = 1, horizon = 3.015",
+        "spacing = [0.5, 1], horizon = 3.015",
+    ];
+    let expected = force(plain, "contact = {}");
+    for (grid, contact) in [(plain, refined), (oblong, "contact = {}")] {
+        let found = force(grid, contact);
+        assert!(
+            (0.9..1.1).contains(&(found / expected)),
+            "{grid} {contact}: {found} of {expected}"
+        );
+    }
+}
+
+/// The fine body has many contacts that are stiffer than its bonds. If points lost their additional
+/// fictitious density whenever they separate, they would bounce forever.
+#[test]
+fn a_contact_that_is_stiffer_than_the_bonds_comes_to_rest() {
+    let deck = "
+        dimension = 'plane-strain'
+        grid = { spacing = 1, horizon = 3 }
+        contact = {}
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.coarse = { material = 'rubber', shape.box = { lower = [0, -6], upper = [6, 0] } }
+        body.fine = { material = 'rubber', spacing = 0.25, horizon = 0.75, shape.box = { lower = [0, 0], upper = [6, 6] } }
+        set = { bottom.where = 'y < -5', top.where = 'y > 5.75', left.where = 'x < 0.25 || (x < 1 && y < 0)' }
+        condition.hold = { set = 'bottom', displacement = ['free', 0] }
+        condition.side = { set = 'left', displacement = [0, 'free'] }
+        condition.push = { set = 'top', traction = [0, '-0.005*t'] }
+        history.reactions = ['bottom']
+        time = { end = 1, method = 'relaxation', relaxation = { load_steps = 2, tolerance = 1e-6 } }
+        ";
+    let rows = load_steps::<2>(deck, &["reaction_bottom_y"]);
+    for (row, load) in rows.iter().zip([0.015, 0.03]) {
+        assert!((row[0] / load - 1.0).abs() < 1e-5, "{row:?} {load}");
+    }
+    assert_eq!(rows.len(), 2);
+}
+
 /// A rigid disc is pressed into a block that breaks; the block lies on another block.
 const INDENTED: &str = "
     dimension = 'plane-strain'

@@ -9,7 +9,6 @@ pub(super) fn cell_of(position: [f64; 3], edge: f64) -> Cell {
     position.map(|x| (x / edge).floor() as i64)
 }
 
-/// The hash of a cell.
 pub(super) fn hash(cell: Cell) -> u64 {
     cell.into_iter().fold(0_u64, |hash, k| {
         let mixed = (hash ^ k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -43,7 +42,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Sort positions (m) into cells with this edge (m).
+    /// Sort positions (m) into cells with the edge length `edge` (m).
     pub fn new(positions: &[[f64; 3]], edge: f64, dimension: usize) -> Self {
         let buckets = positions.len().next_power_of_two();
         let mut starts = vec![0_u32; buckets + 1];

@@ -4,10 +4,10 @@
 //! ascending order of ids, so the order of the force sum does not depend on the ranks. A pair touches if its
 //! distance is below its contact distance. The lists contain the pairs whose gap (present distance minus
 //! contact distance) is at most the skin. The lists are rebuilt when points have moved or expanded so far
-//! that other pairs may soon touch. The contact distance never exceeds the reference distance, so an
-//! undeformed body has no contact forces. Points on opposite crack faces can touch, because the bonds between
-//! them have broken. Contact distances expand with temperature as bonds do, so a body that expands freely has
-//! no contact forces either.
+//! that pairs outside the lists may soon touch. The contact distance never exceeds the reference distance, so
+//! an undeformed body has no contact forces. Points on opposite crack faces can touch, because the bonds
+//! between them have broken. Contact distances expand with temperature as bonds do, so a body that expands
+//! freely has no contact forces either.
 //!
 //! Rigid bodies repel all points. Every rank integrates the motion of all rigid bodies. The forces and
 //! torques of the points on a rigid body are exact sums over all ranks, so the states of the bodies are the
@@ -18,6 +18,7 @@
 
 mod by_pair;
 mod cells;
+mod cover;
 mod ghosts;
 mod pair;
 mod rigid;
@@ -39,8 +40,9 @@ use super::bonds::Forces;
 use super::model::Model;
 use super::motion::Fields;
 use super::motion::load_step::stable_density;
+use cover::covers;
 use ghosts::Ghosts;
-use pair::{ContactPoint, Demand, PairRule, Touch};
+use pair::{ContactPoint, Demand, Lengths, PairRule, Touch};
 use rigid::{RigidBody, WrenchSums};
 use rows::Rows;
 use start::check_outside;
@@ -68,8 +70,8 @@ pub struct Contact<const D: usize> {
     blocks: usize,
     /// Largest contact distance of any two points, m. The change by thermal stretches is not included.
     largest: f64,
-    /// Edge of a line segment, square or cube with the volume of the point, for each owned point, m.
-    edges: Vec<f64>,
+    /// Lengths of each owned point.
+    lengths: Vec<Lengths>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
     /// The owned points that touched a rigid body or were going to touch one within the look-ahead. The first
@@ -84,11 +86,14 @@ pub struct Contact<const D: usize> {
     searched: [Vec<f64>; D],
     /// Thermal stretches of the owned points at the last search; empty in runs without temperatures.
     searched_stretch: Vec<f64>,
-    /// Whether the lists of pairs must be rebuilt, including the flags that mark pairs joined by an intact
+    /// Whether the lists of pairs must be rebuilt, and also the flags that mark the pairs joined by an intact
     /// bond; the same on all ranks.
     is_stale: bool,
     /// Limits that contact sets for the time step.
     demand: StepDemand,
+    /// Largest overlap of two points at the end of the last step, as a fraction of their contact distance.
+    /// The same on all ranks.
+    deepest: f64,
     /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N²; 0 if this
     /// evaluation was not quasi-static.
     rigid_forces: ExactSum,
@@ -140,6 +145,8 @@ struct PointSum<const D: usize> {
     demand: Demand,
     /// Whether the point touches another point or a rigid body.
     touches: bool,
+    /// Largest overlap with another point, as a fraction of the contact distance.
+    depth: f64,
 }
 
 impl<const D: usize> Contact<D> {
@@ -168,21 +175,24 @@ impl<const D: usize> Contact<D> {
                 Some(PairRule::new(dimension, &rule, [here, there]))
             })
             .collect();
-        let edges: Vec<f64> = model
-            .volume
-            .iter()
-            .map(|volume| dimension.edge(volume))
+        let edges: Vec<f64> = (0..model.owned())
+            .map(|point| dimension.edge(model.volume[point]))
             .collect();
-        let mut largest_edges = vec![0.0_f64; blocks.len()];
-        for (block, edge) in model.block.iter().zip(&edges) {
-            let largest = &mut largest_edges[usize::from(*block)];
-            *largest = largest.max(*edge);
+        let lengths: Vec<Lengths> = edges
+            .iter()
+            .zip(covers(problem, model, &edges))
+            .map(|(edge, cover)| Lengths { edge: *edge, cover })
+            .collect();
+        let mut largest_covers = vec![0.0_f64; blocks.len()];
+        for (block, lengths) in model.block.iter().zip(&lengths) {
+            let largest = &mut largest_covers[usize::from(*block)];
+            *largest = largest.max(lengths.cover);
         }
-        comm.max(&mut largest_edges);
+        comm.max(&mut largest_covers);
         let largest = |here: usize, there: usize| {
-            let edge = 0.5 * (largest_edges[here] + largest_edges[there]);
+            let cover = 0.5 * (largest_covers[here] + largest_covers[there]);
             let rule = rules[here * blocks.len() + there].as_ref();
-            rule.map_or(0.0, |rule| rule.largest_distance(edge))
+            rule.map_or(0.0, |rule| rule.largest_distance(cover))
         };
         let all =
             (0..blocks.len()).flat_map(|here| (0..blocks.len()).map(move |there| (here, there)));
@@ -201,7 +211,8 @@ impl<const D: usize> Contact<D> {
             blocks: blocks.len(),
             rules,
             largest,
-            edges: edges[..model.owned()].to_vec(),
+            lengths,
+            deepest: 0.0,
             ghosts: Ghosts::default(),
             rows: Rows::default(),
             open: Vec::new(),
@@ -235,6 +246,11 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Largest overlap of two points at the end of the last step, as a fraction of their contact distance.
+    pub fn deepest(&self) -> f64 {
+        self.deepest
+    }
+
     /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N²; 0 if this
     /// evaluation was not quasi-static.
     pub fn rigid_forces(&self) -> &ExactSum {
@@ -244,8 +260,8 @@ impl<const D: usize> Contact<D> {
     /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
     /// friction and damping from the velocities in the middle of the step, and record the energy that they
     /// dissipate. At the end of a step, also apply the second half kick of rigid bodies. An evaluation that
-    /// does not end a step does not change friction and damping. If points can touch each other and a
-    /// position or a thermal stretch is not finite, nothing is added. Collective.
+    /// does not end a step does not change friction and damping. In runs in which points can touch each
+    /// other, nothing is added if a position or a thermal stretch is not finite. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
@@ -277,7 +293,7 @@ impl<const D: usize> Contact<D> {
             .with_min_len(CHUNK / 16)
             .map(|point| self.point_sum(model, fields, *point as usize, look_ahead))
             .collect_into_vec(&mut sums);
-        let mut largest = [0.0_f64; 2];
+        let mut largest = [0.0_f64; 3];
         self.rigid_forces = ExactSum::ZERO;
         for (point, sum) in active.iter().zip(&sums) {
             let point = *point as usize;
@@ -286,6 +302,7 @@ impl<const D: usize> Contact<D> {
             let Demand { stiffness, damping } = sum.demand;
             largest[0] = largest[0].max(2.0 * stiffness / mass);
             largest[1] = largest[1].max(2.0 * damping / mass);
+            largest[2] = largest[2].max(sum.depth);
             let [repulsion, damping, friction] = [sum.repulsion, sum.damping, sum.friction]
                 .map(|force| force.map(|component| component / volume));
             if let Some(StepEnd { step, .. }) = end {
@@ -301,7 +318,7 @@ impl<const D: usize> Contact<D> {
                 let square = sum.of_rigid.iter().map(|component| component * component);
                 self.rigid_forces.add(square.sum());
                 if let Some(density) = &mut fields.contact_density {
-                    density[point] = stable_density(stiffness / volume);
+                    density[point] = density[point].max(stable_density(stiffness / volume));
                 }
             }
         }
@@ -342,28 +359,27 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Sum the forces of points on rigid bodies, finish the step of the bodies, and compute the step limits
-    /// of contact. `stiffness` and `damping` are the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned
-    /// points; see [`StepDemand`]. Collective.
+    /// of contact. `largest` contains the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned points, see
+    /// [`StepDemand`], and their largest [`PointSum::depth`]. Collective.
     fn close_step(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
         fields: &Fields<D>,
-        [stiffness, damping]: [f64; 2],
+        mut largest: [f64; 3],
         end: StepEnd,
     ) {
         if self.rigid.is_empty() {
-            let mut largest = [stiffness, damping];
             comm.max(&mut largest);
-            [self.demand.stiffness, self.demand.damping] = largest;
+            [self.demand.stiffness, self.demand.damping, self.deepest] = largest;
             return;
         }
-        // The entries from the third on are one distance per rigid body: the largest distance from the centre
-        // to a point that touches the body or will do so within the look-ahead.
-        let mut largest = vec![0.0; 2 + self.rigid.len()];
-        (largest[0], largest[1]) = (stiffness, damping);
+        // The entries from the fourth on are one distance per rigid body: the largest distance from the
+        // centre to a point that touches the body or will do so within the look-ahead.
+        let mut largest = largest.to_vec();
+        largest.resize(3 + self.rigid.len(), 0.0);
         let mut sums = Vec::new();
-        for (rigid, reach) in self.rigid.iter().zip(&mut largest[2..]) {
+        for (rigid, reach) in self.rigid.iter().zip(&mut largest[3..]) {
             let mut wrench = WrenchSums::new();
             let mut demands = [const { ExactSum::ZERO }; 2];
             for index in &self.at_rigid[0] {
@@ -381,8 +397,9 @@ impl<const D: usize> Contact<D> {
             sums.extend(demands);
         }
         comm.max(&mut largest);
-        let (points, reaches) = largest.split_at(2);
+        let (points, reaches) = largest.split_at(3);
         (self.demand.stiffness, self.demand.damping) = (points[0], points[1]);
+        self.deepest = points[2];
         let sums = reduce(comm, &mut sums);
         let each = sums.chunks_exact(WrenchSums::COUNT + 2).zip(reaches);
         for (rigid, (sums, reach)) in self.rigid.iter_mut().zip(each) {
@@ -414,7 +431,7 @@ impl<const D: usize> Contact<D> {
                         velocity: std::array::from_fn(|d| fields.velocity[d][index]),
                         thermal_stretch: stretch_of(fields.thermal_stretch.as_ref(), index),
                         volume,
-                        edge: self.edges[index],
+                        lengths: self.lengths[index],
                         mass: model.density[block] * volume,
                     },
                 )
@@ -431,7 +448,7 @@ impl<const D: usize> Contact<D> {
                         velocity: std::array::from_fn(|d| ghosts.velocity[d][index]),
                         thermal_stretch: stretch_of(ghosts.thermal_stretch.as_ref(), index),
                         volume: point.volume,
-                        edge: ghosts.edges[index],
+                        lengths: ghosts.lengths[index],
                         mass: model.density[block] * point.volume,
                     },
                 )
@@ -493,12 +510,14 @@ impl<const D: usize> Contact<D> {
             energy: 0.0,
             demand: Demand::default(),
             touches: false,
+            depth: 0.0,
         };
         self.for_each_candidate(model, fields, point, |here, there, _, rule| {
             sum.add_demand(rule.demand(here, there, (look_ahead, MOST_GAP * self.largest)));
             if let Some(touch) = rule.touch(here, there) {
                 // The sum of the other point contains the other half of the energy.
                 sum.add(&touch, 0.5);
+                sum.depth = sum.depth.max(touch.depth);
             }
         });
         if !self.rigid.is_empty() {

@@ -6,7 +6,7 @@ use crate::dimension::Dimension;
 use crate::material::Pmb;
 use crate::problem::{Block, ContactModel, ContactRule};
 
-/// Contact distance of short-range forces, as a fraction of the sum of the half edges of both points
+/// Contact distance of short-range forces, as a fraction of the mean of the covers of both points
 /// (Silling & Askari 2005, §5).
 const SHORT_RANGE: f64 = 1.35;
 
@@ -23,10 +23,10 @@ const STICKING: f64 = 0.5;
 /// Contact rule for the points of two blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PairRule {
-    /// Contact distance, m. If `None`, the contact distance is `edge_share` times the mean of the edges of
+    /// Contact distance, m. If `None`, the contact distance is `cover_share` times the mean of the covers of
     /// both points.
     radius: Option<f64>,
-    edge_share: f64,
+    cover_share: f64,
     /// Upper limit of the contact distance, as a fraction of the reference distance. With this limit, no
     /// force acts in the reference positions or after free thermal expansion.
     reference_share: f64,
@@ -66,10 +66,19 @@ pub(super) struct ContactPoint<const D: usize> {
     pub thermal_stretch: f64,
     /// Volume, m³.
     pub volume: f64,
-    /// Edge of the line segment, square or cube that represents the volume of the point, m.
-    pub edge: f64,
+    /// Lengths.
+    pub lengths: Lengths,
     /// Mass, kg.
     pub mass: f64,
+}
+
+/// Lengths of a point, m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lengths {
+    /// Edge of the line segment, square or cube with the volume of the point. It sets the stiffness.
+    pub edge: f64,
+    /// The length that the point covers, see [`covers`](super::cover::covers). It sets the contact distance.
+    pub cover: f64,
 }
 
 impl<const D: usize> ContactPoint<D> {
@@ -92,8 +101,8 @@ pub(super) fn whole<const D: usize>(vector: [f64; D]) -> [f64; 3] {
 pub(super) struct Demand {
     /// Stiffness, N/m.
     pub stiffness: f64,
-    /// The larger of the coefficients of damping and of sticking friction, N s/m; for a point, the sum over
-    /// its contacts.
+    /// Damping coefficient, N s/m. For a pair, the larger of the coefficients of normal damping and of
+    /// sticking friction. For a point, the sum over its contacts.
     pub damping: f64,
 }
 
@@ -110,6 +119,8 @@ pub(super) struct Touch<const D: usize> {
     pub energy: f64,
     /// Contact distance minus present distance, m.
     pub overlap: f64,
+    /// Overlap divided by the contact distance; 0 for contacts with rigid bodies.
+    pub depth: f64,
 }
 
 impl PairRule {
@@ -117,7 +128,7 @@ impl PairRule {
     pub fn new(dimension: Dimension, rule: &ContactRule, blocks: [&Block<'_>; 2]) -> Self {
         let elastic = blocks.map(|block| block.body.material.elastic);
         let horizon = blocks[0].horizon.min(blocks[1].horizon);
-        let (edge_share, reference_share, stiffness) = match rule.model {
+        let (cover_share, reference_share, stiffness) = match rule.model {
             ContactModel::Penalty => {
                 // The materials act in series. The layer of each material is half a horizon thick.
                 let [first, second] = elastic.map(|elastic| elastic.youngs_modulus);
@@ -137,22 +148,22 @@ impl PairRule {
         };
         Self {
             radius: rule.radius,
-            edge_share,
+            cover_share,
             reference_share,
             stiffness,
             response: Response::new(rule),
         }
     }
 
-    /// Largest contact distance (m) of points with edges of at most `edge` (m), without thermal stretch.
-    pub fn largest_distance(&self, edge: f64) -> f64 {
-        self.radius.unwrap_or(self.edge_share * edge)
+    /// Largest contact distance (m) of points with covers of at most `cover` (m), without thermal stretch.
+    pub fn largest_distance(&self, cover: f64) -> f64 {
+        self.radius.unwrap_or(self.cover_share * cover)
     }
 
-    /// Contact distance (m) of points with these edges (m) and the reference distance `reference` (m),
+    /// Contact distance (m) of points with these covers (m) and the reference distance `reference` (m),
     /// without thermal stretch.
-    pub fn distance(&self, edges: [f64; 2], reference: f64) -> f64 {
-        let distance = self.largest_distance(0.5 * (edges[0] + edges[1]));
+    pub fn distance(&self, covers: [f64; 2], reference: f64) -> f64 {
+        let distance = self.largest_distance(0.5 * (covers[0] + covers[1]));
         distance.min(self.reference_share * reference)
     }
 
@@ -170,7 +181,7 @@ impl PairRule {
         });
         let apart = norm(vector);
         let thermal_stretch = 0.5 * (first.thermal_stretch + second.thermal_stretch);
-        let distance = self.distance([first.edge, second.edge], norm(reference));
+        let distance = self.distance([first.lengths.cover, second.lengths.cover], norm(reference));
         (distance * (1.0 + thermal_stretch) - apart, apart, vector)
     }
 
@@ -178,7 +189,7 @@ impl PairRule {
     fn stiffness<const D: usize>(&self, first: &ContactPoint<D>, second: &ContactPoint<D>) -> f64 {
         match self.stiffness {
             Stiffness::OfLayer(layer) => {
-                let edge = 0.5 * (first.edge + second.edge);
+                let edge = 0.5 * (first.lengths.edge + second.lengths.edge);
                 layer * edge.powi(D as i32 - 1)
             }
             Stiffness::OfVolumes(constant) => constant * (first.volume * second.volume),
@@ -219,10 +230,11 @@ impl PairRule {
         let stiffness = self.stiffness(first, second);
         let mass = first.mass * second.mass / (first.mass + second.mass);
         let velocity = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);
-        Some(
-            self.response
-                .touch(stiffness, overlap, normal, velocity, mass),
-        )
+        let touch = (self.response).touch(stiffness, overlap, normal, velocity, mass);
+        Some(Touch {
+            depth: overlap / (overlap + apart),
+            ..touch
+        })
     }
 }
 
@@ -290,6 +302,7 @@ impl Response {
             }),
             energy: 0.5 * repulsion * overlap,
             overlap,
+            depth: 0.0,
         }
     }
 }

@@ -14,7 +14,7 @@ use super::shape::{distance, inertia};
 /// Number of components of a [`Wrench`].
 const WRENCH: usize = 6;
 
-/// A force (N) and its torque about the centre (N m).
+/// A force (N) on a rigid body, and its torque (N m) about the centre of the body.
 type Wrench = [f64; WRENCH];
 
 /// The state of a rigid body; the same on all ranks.
@@ -266,13 +266,13 @@ impl RigidBody {
     }
 
     /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
-    /// The overlap is contact distance minus present distance. The contact distance is (1 + a) times the
-    /// smaller of two lengths: half the edge of the point's cell, and the distance of the point from the
-    /// surface at the start. Here a is the thermal stretch of the point. The overlap is set to 0 if the point
-    /// is farther from the surface than (1 + a) times half the edge.
+    /// The overlap is the contact distance minus the present distance of the point from the surface. The
+    /// contact distance is (1 + a) times the smaller of two lengths: half the cover of the point, and the
+    /// distance of the point from the surface at the start. Here a is the thermal stretch of the point. The
+    /// overlap is set to 0 if the point is farther from the surface than (1 + a) times half the cover.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.position());
-        let (half, expansion) = (0.5 * point.edge, 1.0 + point.thermal_stretch);
+        let (half, expansion) = (0.5 * point.lengths.cover, 1.0 + point.thermal_stretch);
         if apart >= half * expansion {
             return (0.0, normal);
         }
@@ -336,8 +336,9 @@ impl RigidBody {
 
     /// Contribution of a point to the step limits. The result is `None` unless the point touches the body, or
     /// will touch the body within `time` (s) at the present approach speed. At any velocity, the result is
-    /// also `None` if the gap exceeds the edge of the point's cell. The gap is the distance of the point from
-    /// the surface minus half this edge times 1 + a, with the thermal stretch a of the point.
+    /// also `None` if the gap exceeds the cover of the point. The gap is
+    /// d − (1 + a) c/2. Here d is the distance of the point from the surface, c is the cover of the point,
+    /// and a is the thermal stretch of the point.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -345,8 +346,8 @@ impl RigidBody {
         time: f64,
     ) -> Option<Demand> {
         let (apart, normal) = self.surface(point.position());
-        let gap = apart - 0.5 * point.edge * (1.0 + point.thermal_stretch);
-        if gap > point.edge {
+        let gap = apart - 0.5 * point.lengths.cover * (1.0 + point.thermal_stretch);
+        if gap > point.lengths.cover {
             return None;
         }
         let arm = Vector3::from(point.position()) - Vector3::from(self.state.position);
@@ -360,7 +361,7 @@ impl RigidBody {
     }
 
     fn point_stiffness<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> f64 {
-        self.layers[block] * point.edge.powi(D as i32 - 1)
+        self.layers[block] * point.lengths.edge.powi(D as i32 - 1)
     }
 
     /// Reduced mass of the body and a point, kg.
@@ -409,7 +410,7 @@ impl RigidBody {
     }
 }
 
-/// Append to `rotation` a rotation with an angular velocity (1/s) over a time (s), and return the result.
+/// Return `rotation`, followed by a rotation with an angular velocity `spin` (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
     // The result is (1 + ½ Δt w) q with the angular velocity w and the quaternion q of `rotation`. The

@@ -100,8 +100,8 @@ impl Rows {
         self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
     }
 
-    /// Copy the bonded flags of all pairs that are also in `earlier`, the earlier rows of the same points.
-    /// Return the points that have a pair which is not in `earlier`.
+    /// Copy the bonded flag of each pair from `earlier`, if the pair is also in `earlier`. `earlier` contains
+    /// the earlier rows of the same points. Return the points that have a pair which is not in `earlier`.
     pub fn inherit(&mut self, earlier: &Self) -> Vec<usize> {
         let mut new = Vec::new();
         for point in 0..self.starts.len() - 1 {

@@ -13,17 +13,17 @@ use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
 /// Skin as a fraction of the largest contact distance. A search finds the pairs whose gap (present distance
-/// minus contact distance) is at most the skin. With this skin and penalty contact, the rows of a lattice at
-/// rest contain only nearest neighbours.
+/// minus contact distance) is at most the skin. With penalty contact, this skin is so small that the rows of
+/// a lattice at rest contain only nearest neighbours.
 const SKIN: f64 = 0.4;
 
-/// Largest gap of a pair that the look-ahead considers, as a fraction of the largest contact distance. The
-/// last search has found all pairs with gaps up to this limit. Therefore the step limits of contact do not
-/// depend on when the last search was made.
+/// Limit of the gap of a pair, as a fraction of the largest contact distance. The look-ahead (`LOOK_AHEAD`)
+/// ignores pairs with a larger gap. The last search has found all pairs with gaps up to this limit. Therefore
+/// the step limits of contact do not depend on when the last search was made.
 pub(super) const MOST_GAP: f64 = 0.1;
 
-/// Distance that a point may move between searches, as a fraction of the largest contact distance. Half of
-/// the change of a contact distance by thermal stretches counts as motion of both points.
+/// Distance that a point may move between searches, as a fraction of the largest contact distance. If thermal
+/// stretches change the contact distance of two points, half of this change counts as motion of each point.
 const MOVED: f64 = 0.5 * (SKIN - MOST_GAP);
 
 impl<const D: usize> Contact<D> {
@@ -113,6 +113,7 @@ impl<const D: usize> Contact<D> {
                     index: point as u64,
                     block: model.block[point].into(),
                     volume: model.volume[point],
+                    cover: self.lengths[point].cover,
                     reference,
                     position,
                 }
@@ -123,9 +124,9 @@ impl<const D: usize> Contact<D> {
         all.extend_from_slice(&self.ghosts.points);
         let positions: Vec<[f64; 3]> = all.iter().map(|point| point.position).collect();
         let cells = Cells::new(&positions, reach, D);
-        let edge = |index: usize| match index.checked_sub(model.owned()) {
-            None => self.edges[index],
-            Some(ghost) => self.ghosts.edges[ghost],
+        let cover = |index: usize| match index.checked_sub(model.owned()) {
+            None => self.lengths[index].cover,
+            Some(ghost) => self.ghosts.lengths[ghost].cover,
         };
         let mut rows = Rows::new(model.owned(), |point, row| {
             let here = &all[point];
@@ -139,7 +140,7 @@ impl<const D: usize> Contact<D> {
                     (0..D).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
                 };
                 let reference = apart(&here.reference, &there.reference);
-                let distance = rule.distance([edge(point), edge(index)], reference);
+                let distance = rule.distance([cover(point), cover(index)], reference);
                 if apart(&here.position, &there.position) <= distance * expansion + skin {
                     row.push(FoundPair {
                         id: there.id,
@@ -201,7 +202,6 @@ impl<const D: usize> Contact<D> {
     }
 }
 
-/// Return +∞ for NaN, and every other value unchanged.
 fn finite_or_infinity(value: f64) -> f64 {
     if value.is_nan() { f64::INFINITY } else { value }
 }

@@ -19,12 +19,13 @@ const CALM: u64 = 100;
 #[repr(C)]
 pub(super) struct StepDemand {
     /// Largest value of 2 Σ k/m over all points and rigid bodies, 1/s². The sum is over the contacts of the
-    /// point or body. Contact adds at most this value to the square of an angular frequency.
+    /// point or body. Contact increases the square of each angular frequency by at most this value.
     pub stiffness: f64,
     /// Largest 2 Σ c/m of a point or rigid body, 1/s.
     pub damping: f64,
-    /// Number of consecutive steps that contact did not limit. The count restarts when a step that is not
-    /// adaptive is lengthened. The count is large at the start, when contact has limited no step.
+    /// Number of consecutive steps that contact did not limit. In a stage without an adaptive step, the count
+    /// is also reset to 0 when the step is lengthened. Before contact has limited any step, the count starts
+    /// at a large number.
     calm: u64,
 }
 
@@ -115,7 +116,7 @@ impl<const D: usize> Contact<D> {
 
     /// Stable step (s) with contact; `step` is the stable step without contact.
     ///
-    /// Damping follows from the velocities half a step earlier. Therefore the step Δt is stable if
+    /// Damping forces use the velocities of half a step earlier. Therefore the step Δt is stable if
     /// Δt² ω² + 2 Δt C/m < 4. Here ω² is the sum of 4/`step`² and `StepDemand::stiffness`, and C/m is
     /// `StepDemand::damping`.
     pub fn stable_step(&self, step: f64) -> f64 {

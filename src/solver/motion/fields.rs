@@ -1,4 +1,4 @@
-//! The fields of the points: one declaration each, with meaning, storage and output.
+//! The fields of the points. Each field has one declaration, which states its meaning, storage and output.
 //!
 //! Checkpoints, rollbacks and the result iterate over the list of fields. A new field in this list is saved,
 //! rolled back and output as its description says. A field has one column of numbers per component.
@@ -26,18 +26,18 @@ pub struct Description {
 }
 
 /// Values of a field that a new point gets from its parents, and values that a removed point returns to its
-/// parents in equal parts. "The mean" is the mean of the parents' values.
+/// parents in equal parts. In the descriptions below, "the mean" is the mean of the parents' values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
     /// A new point gets the mean; a removed point returns nothing.
     Interpolated,
-    /// A new point gets the mean. A removed point returns its volume times d, where d is its value minus
-    /// the mean of its parents. These rules conserve momentum, and do not change a field that is linear in
-    /// space.
+    /// A new point gets the mean. Let d be the value of a removed point minus the mean. The removed point
+    /// returns the product of its volume and d. These rules conserve momentum, and do not change a field that
+    /// is linear in space.
     Conserved,
     /// A new point gets the mean. If a point is removed, each parent gets the average of its own value and
     /// the value of the removed point. The weights are the parent's volume and the volume that the parent
-    /// receives. Therefore no value leaves the range of the averaged values.
+    /// receives. Therefore each average lies between the two averaged values.
     Mixed,
     /// A new point takes a part of the value of each parent, in proportion to the volume that it takes from
     /// this parent. The sum over all points is therefore conserved. A removed point returns all of its value.
@@ -151,8 +151,8 @@ fields! {
         output: Some(Field::Displacement),
         ..STATE
     };
-    /// Temperature, in the unit of the key `reference_temperature` of the materials; none without prescribed
-    /// temperatures.
+    /// Temperature, in the unit of the key `reference_temperature` of the materials; `None` without
+    /// prescribed temperatures.
     temperature: Option<Vec<f64>> = Description {
         name: "temperature",
         unit: "K",
@@ -162,7 +162,7 @@ fields! {
         output: Some(Field::Temperature),
     };
     /// Thermal stretch: along the bar in 1-D, in the plane in 2-D, in all directions in 3-D. Owned points,
-    /// then ghosts; none without prescribed temperatures.
+    /// then ghosts; `None` without prescribed temperatures.
     thermal_stretch: Option<Vec<f64>> = Description {
         name: "thermal_stretch",
         unit: "1",
@@ -220,8 +220,8 @@ fields! {
         name: "freed_energy",
         ..ENERGY
     };
-    /// Overshoot energy of the broken bonds of a point, J: the part of the freed energy by which the bonds
-    /// exceeded the energy of their criterion when they broke; none without damage.
+    /// Overshoot energy of the broken bonds of a point, J; none without damage. The overshoot energy of a
+    /// bond is its energy above the criterion when it breaks. The freed energy includes the overshoot energy.
     overshoot_energy: Option<Vec<f64>> = Description {
         name: "overshoot_energy",
         ..ENERGY
@@ -249,8 +249,8 @@ fields! {
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Energy density of the zero-energy control without its reduction by plastic flow, J/m³. The control
-    /// consists of the forces that resist zero-energy modes. None without plasticity.
+    /// Energy density that the zero-energy control would have if plastic flow did not reduce the control,
+    /// J/m³. The control consists of the forces that resist zero-energy modes. None without plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
@@ -346,11 +346,11 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Contribution of contact to the fictitious density, N/m⁴. None if the deck lacks contact or relaxation.
+    /// Contribution of contact to the fictitious density, N/m⁴: the largest value since the points last
+    /// started from rest. None if the deck lacks contact or relaxation.
     contact_density: Option<Vec<f64>> = Description {
         name: "contact_density",
         unit: "N/m^4",
-        state: false,
         undone: false,
         birth: Birth::FoundAnew,
         ..STATE
@@ -578,7 +578,7 @@ impl<const D: usize> Fields<D> {
     /// their overshoot energy. `step` is the length of the step, s.
     ///
     /// The force F of a breaking bond acted in the first half kick of the step, but not in the second. So the
-    /// points supplied less energy than the bond had at the end of the step. The difference is ½ F·Δℓ, where
+    /// points gave the bond less energy than it had at the end of the step. The difference is ½ F·Δℓ, where
     /// Δℓ is the change of the bond vector in the step. The released energy is reduced by this amount. The
     /// break is detected at the end of the step. On average, the bond reached its criterion in the middle of
     /// this step. Therefore neither motion nor energy depends on the step length to first order.
@@ -624,14 +624,10 @@ impl<const D: usize> Fields<D> {
         potential[point] = energy;
     }
 
-    /// Set contact force, contact energy and contact density of an owned point without contact to 0.
+    /// Set contact force and contact energy of an owned point without contact to 0.
     pub fn clear_contact(&mut self, point: usize) {
         let columns = self.contact_force.iter_mut().flatten();
-        let scalars = self
-            .contact_energy
-            .iter_mut()
-            .chain(&mut self.contact_density);
-        for column in columns.chain(scalars) {
+        for column in columns.chain(&mut self.contact_energy) {
             column[point] = 0.0;
         }
     }

@@ -16,10 +16,11 @@
 //! of the tangent stiffness ¹K. It uses u̇ rather than u, because differences of f along u̇ give ¹K u̇
 //! exactly. All sums are exact, so the result is bitwise independent of ranks and threads.
 //!
-//! [`super::load_step`] defines the equilibrium and when bonds break.
+//! [`super::load_step`] defines when an equilibrium is reached and when bonds break.
 //!
 //! Contact is part of the equilibrium. The repulsion has a potential; neither friction nor contact damping
-//! acts. While points are in contact, their ρ includes the contact stiffness. Rigid bodies with a prescribed
+//! acts. ρ includes the largest contact stiffness of the point since the motion started from rest. If ρ fell
+//! when points separate, stiff contacts would bounce forever. Rigid bodies with a prescribed
 //! motion move with time, as supports do. The forces of rigid bodies on the points count as reactions.
 
 use std::time::Instant;
@@ -93,7 +94,8 @@ impl<const D: usize> Simulation<'_, D> {
     fn stop(&mut self) {
         self.progress.load_step.damping = f64::NAN;
         let velocity = self.fields.relaxation_velocity.iter_mut().flatten();
-        velocity.for_each(|component| component.fill(0.0));
+        let columns = velocity.chain(&mut self.fields.contact_density);
+        columns.for_each(|column| column.fill(0.0));
     }
 
     /// Move the points by one iteration. Returns the sums of [`Before`], with the velocities of this
