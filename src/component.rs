@@ -29,8 +29,8 @@ pub enum Component {
     Determinant,
 }
 
-/// Return the names of the components of a field with this number of values per point. The result is empty
-/// for a scalar, and for all numbers except 2, 3, 6 and 9.
+/// Return the names of the components of a field with this number of values per point. Only fields with 2, 3,
+/// 6 or 9 values have component names. For all other fields, the result is empty.
 pub fn names(components: usize) -> &'static [&'static str] {
     match components {
         2 => &AXES[..2],

@@ -84,7 +84,7 @@ impl Error {
         Self::new(ErrorKind::Run, message)
     }
 
-    /// Create the error of a stop: see [`ErrorKind::Stopped`].
+    /// Create an error of the kind [`ErrorKind::Stopped`].
     pub fn stopped(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Stopped, message)
     }

@@ -54,8 +54,9 @@ fn address_space() -> Option<u64> {
 }
 
 /// Return the memory and swap that this process can still use within the limits of its control groups,
-/// bytes. This is the smallest amount that is left in the group of the process or in a group above it. `None`
-/// if none of these groups has a limit, or on systems without control groups of version 2.
+/// bytes. These groups are the group of the process and all groups above it. The result is the smallest
+/// amount that is left in any of these groups. `None` if none of these groups has a limit, or on systems
+/// without control groups of version 2.
 fn control_group() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;

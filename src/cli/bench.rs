@@ -118,7 +118,7 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 const MOTION_BYTES: u64 = 170;
 /// Estimated minimum memory traffic of a 3-D pass over the bonds, bytes per point. The stored bonds are not
 /// included. Reference position, displacement and volume are read, and the sums of the pass are read
-/// and written. The estimate assumes that these sums are four numbers.
+/// and written. The estimate assumes four sums per point.
 const PASS_BYTES: u64 = 120;
 
 /// Parse `N` or `X,Y,Z` into the numbers of points along the edges of a block.

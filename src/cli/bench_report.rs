@@ -32,7 +32,8 @@ pub struct Limited {
     pub done: f64,
 }
 
-/// Measured figures over all ranks; times in s, sizes in bytes.
+/// Settings and measured values of a benchmark. Times are in s, and sizes in bytes. The values are for all
+/// ranks together, unless the comment of a field says otherwise.
 pub struct Figures {
     /// The law of the bonds.
     pub law: Law,

@@ -76,7 +76,7 @@ pub struct Request<'a> {
 
 /// Steps and cost of a run that is too large for a dry run.
 pub struct TimeEstimate {
-    /// Stable step of the first stage, with the scaled density of this stage, s.
+    /// Stable step (s) of the first stage, for the scaled density of this stage.
     pub stable_step: f64,
     /// For each stage: the first time step (s), and the number of time steps or load steps.
     pub steps: Vec<(f64, f64)>,

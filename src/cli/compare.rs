@@ -173,7 +173,8 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
 /// Format the comparison:
 /// - the paths of the results,
 /// - the numbers of compared outputs, points and rows,
-/// - lists of the items that only one result has,
+/// - the fields, columns and outputs that only one result has,
+/// - the numbers of points and rows that only one result has,
 /// - a table of the fields and a table of the columns.
 fn report(
     comparison: &Comparison,
@@ -219,8 +220,8 @@ fn report(
 /// Largest number of names in a printed list. A longer list ends with the number of further names.
 const LONGEST_LIST: usize = 8;
 
-/// Append a line with the entries of `list`, which only the result `name` (A or B) has. `what` is the kind of
-/// the entries, such as `fields`. Append nothing if the list is empty.
+/// Append a line with the entries of `list`. Only the result `name` (A or B) has these entries. `what` is the
+/// kind of the entries, such as `fields`. Append nothing if the list is empty.
 fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     if !list.is_empty() {
         let shown = list[..list.len().min(LONGEST_LIST)].join(", ");

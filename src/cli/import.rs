@@ -138,8 +138,8 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     Ok(())
 }
 
-/// Return the default path of the new deck: `.toml` replaces the ending of a deck of Peridigm or PeriLab,
-/// such as `.yaml`, and is appended to any other path.
+/// Return the default path of the new deck. If the path of the source deck has an ending of Peridigm or
+/// PeriLab (such as `.yaml`), this ending is replaced by `.toml`. Otherwise, `.toml` is appended to the path.
 fn default_target(deck: &Path) -> PathBuf {
     let endings = ["yaml", "yml", "xml", "peridigm"];
     let ending = deck.extension().and_then(|ending| ending.to_str());

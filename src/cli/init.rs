@@ -77,7 +77,7 @@ impl Template {
 ///
 /// # Errors
 /// - If the file of the deck already exists.
-/// - If the data file exists with other content, or has the path of the deck.
+/// - If the data file exists with other content, or has the same path as the deck.
 /// - If a file cannot be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     let mut path = arguments.name.clone();

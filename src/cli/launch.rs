@@ -1,5 +1,5 @@
-//! Start of MPI and of the threads. The environment variables of the launcher (the program that starts the
-//! ranks) give the rank, the number of ranks on the host and the number of threads.
+//! Start of MPI and of the threads. The launcher is the program that starts the ranks. Its environment
+//! variables give the rank, the number of ranks on the host and the number of threads.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -11,7 +11,8 @@ use fissure::run::start_mpi;
 
 use super::{errln, finish};
 
-/// Number of threads that is accepted on any host, even on a host with few cores.
+/// Maximum number of threads of a rank on a host with few cores. On other hosts, the maximum is four threads
+/// per core.
 const ALWAYS_ALLOWED_THREADS: usize = 64;
 
 /// Start MPI, run `body` on all ranks and finalise MPI. If `body` returns an error on one rank, `body` must
@@ -59,8 +60,8 @@ fn started() -> Option<(&'static str, usize)> {
         .find_map(|name| Some((*name, number(&[name])?)))
 }
 
-/// Check that the launcher works with the MPI library of this program. Otherwise, each process would run
-/// alone, as rank 0.
+/// Check that the launcher works with the MPI library of this program. With an incompatible launcher, each
+/// process would run alone, as rank 0.
 ///
 /// # Errors
 /// If MPI has one rank but the launcher started several processes.
@@ -178,8 +179,8 @@ fn warning(threads: usize) -> Option<String> {
     None
 }
 
-/// Start the threads of this rank, and return their number: the requested number, or a default from Slurm or
-/// from the cores of this process.
+/// Start the threads of this rank, and return their number. The number is `asked` if it is given. Otherwise,
+/// it is a default from Slurm or from the cores of this process.
 ///
 /// # Errors
 /// If there are more than `ALWAYS_ALLOWED_THREADS` threads and more than four threads per core of the host,

@@ -14,8 +14,8 @@ use super::launch;
 /// same time.
 #[derive(Clone, Copy)]
 pub struct Limits {
-    /// Memory bandwidth of the triad a = b + s c with arrays a, b and c and a number s, bytes/s. As in STREAM
-    /// (McCalpin 1995), 24 bytes are counted per entry.
+    /// Memory bandwidth, bytes/s, measured with the triad a = b + s c. Here a, b and c are arrays, and s is a
+    /// number. As in STREAM (McCalpin 1995), 24 bytes are counted per array entry.
     pub bandwidth: f64,
     /// Rate of floating-point operations with the widest vectors, 1/s. A multiply-add counts as two
     /// operations.

@@ -267,7 +267,7 @@ struct BenchArguments {
     contact: Option<f64>,
 
     /// Size of the block. With one number N, the block is a cube with N points; N is rounded to a cube
-    /// number. X,Y,Z are the numbers of points along the edges.
+    /// number. Three numbers X,Y,Z are the numbers of points along the edges.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 

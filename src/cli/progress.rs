@@ -12,8 +12,8 @@ use super::format::si;
 const FIRST_LINE: f64 = 5.0;
 /// Time from the start to the second line, s. The intervals between later lines are at least as long.
 const MINUTE: f64 = 60.0;
-/// Minimum interval between later lines, as a fraction of the elapsed time. A run of one day prints about
-/// sixty lines.
+/// Minimum interval between lines after the second line, as a fraction of the elapsed time. A run of one day
+/// prints about sixty lines.
 const RELATIVE_INTERVAL: f64 = 0.1;
 
 /// Width of the bar in characters.
@@ -122,7 +122,7 @@ impl Progress {
 }
 
 /// Return the time at which the next progress line is printed, after a line at the time `elapsed`. Both times
-/// are measured from the start, s.
+/// are in seconds, counted from the creation of the display.
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE

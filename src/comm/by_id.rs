@@ -20,8 +20,8 @@ pub struct IdOrder {
     /// For each rank q: the local indices of the points that this rank owns and whose ids are in the range of
     /// q.
     owned: Vec<Vec<u32>>,
-    /// For each rank q: positions in this rank's range of ids. These are the positions of the points that q
-    /// owns, in the order of `owned` on rank q.
+    /// For each rank q: row numbers in this rank's range of ids. These are the rows of the points that q
+    /// owns, in the order in which `owned` on rank q lists these points.
     rows_in_range: Vec<Vec<u32>>,
 }
 
@@ -152,8 +152,8 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
 /// Rows that stay on this rank are copied. Collective.
 ///
 /// For each rank q, `from_rows` lists the rows of `values` to send to q. `to_rows` lists the rows of the
-/// result that come from q, in the order in which q sends them. `from` returns the range of a row in
-/// `values`, and `to` the range of a row in the result.
+/// result that come from q, in the order in which q sends them. `from` returns the range of indices that
+/// a row has in `values`. `to` returns the range of indices that a row has in the result.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),

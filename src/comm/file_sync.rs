@@ -23,8 +23,9 @@ pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition. The
-/// override skips the fsync while this thread is in a call of [`without_fsync`].
+/// Override of `MPI_File_sync`, as MPI's profiling interface permits. The linker uses this function instead
+/// of the function in the MPI library. The override skips the fsync while this thread is in a call of
+/// [`without_fsync`].
 ///
 /// # Safety
 /// `file` must be open.

@@ -1,7 +1,7 @@
 //! The halo plan: the owned points sent to each rank, and the ghosts received from each rank.
 //!
-//! In the order of the local indices, the ghosts come after the owned points. The ghosts are grouped by owner
-//! and, in each group, sorted by id. Therefore the ghosts of one owner are one contiguous range.
+//! The local indices of the ghosts follow those of the owned points. The ghosts are grouped by owner and, in
+//! each group, sorted by id. Therefore the ghosts of one owner are one contiguous range.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -26,7 +26,8 @@ pub struct Traffic {
     pub messages: u64,
     /// Number of bytes sent.
     pub bytes: u64,
-    /// Communication time: sending, calls that drive progress, and waiting, without the overlapped work.
+    /// Communication time: the time of sending, of the calls that advance the messages, and of waiting. Work
+    /// that overlaps with the messages is not included.
     pub time: Duration,
 }
 

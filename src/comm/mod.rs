@@ -1,8 +1,8 @@
 //! Communication between ranks. No other folder calls MPI.
 //!
 //! All other code uses [`Communicator`]: a few collective operations, and a halo exchange that overlaps with
-//! computation. [`Communicator`] has two implementations: [`mpi::World`], and [`threads`] for one rank
-//! without MPI and for tests with several ranks in one process.
+//! computation. [`Communicator`] has two implementations: [`mpi::World`] and [`threads`]. [`threads`] is for
+//! one rank without MPI, and for tests with several ranks in one process.
 
 mod by_id;
 mod file_sync;
@@ -45,7 +45,7 @@ pub trait Communicator {
     /// The number of ranks.
     fn size(&self) -> usize;
 
-    /// Element-wise sum over the ranks (wrapping), in place.
+    /// Element-wise sum over the ranks, in place. An overflow wraps around.
     fn sum(&self, values: &mut [u64]);
 
     /// Element-wise maximum over the ranks, in place. Values must not be NaN.
@@ -63,7 +63,7 @@ pub trait Communicator {
     /// Send and receive all buffers, and call `during` while messages are in flight.
     ///
     /// Large messages progress only inside MPI calls. Therefore `during` should call its argument from time
-    /// to time. Each call of the argument drives progress and returns true while any message is in flight.
+    /// to time. Each such call advances the messages, and returns true while any message is in flight.
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>);
 
     /// The raw MPI handle; `None` without MPI.
@@ -103,7 +103,7 @@ pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> 
 pub struct Found<T, const N: usize = 1> {
     /// Key that is compared first.
     pub key: f64,
-    /// Ids, such as the id of a point, that are compared if keys are equal.
+    /// Ids that are compared if keys are equal, such as the id of a point.
     pub ids: [u64; N],
     /// Data of the candidate.
     pub payload: T,
@@ -166,7 +166,8 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
 /// Value that is packed in place of the span if an error has no span.
 const NO_SPAN: [u64; 2] = [u64::MAX; 2];
 
-/// Number of bytes of a packed error before its message: exit code, and start and end of the span.
+/// Length (bytes) of the header of a packed error. The header contains the exit code, and the start and end
+/// of the span. The message follows the header.
 const HEADER: usize = 1 + size_of::<[u64; 2]>();
 
 /// Serialize an error.

@@ -17,7 +17,7 @@ use mpi_sys::{MPI_Request, RSMPI_COMM_WORLD};
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 use crate::error::{Error, Result};
 
-/// Maximum bytes per MPI message, because counts are 32-bit integers.
+/// Maximum size of an MPI message, bytes. The limit is needed because MPI counts are 32-bit integers.
 const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
@@ -148,7 +148,8 @@ impl InFlight<'_> {
     /// Start a send.
     ///
     /// # Safety
-    /// The bytes must stay valid and unchanged until `self` is dropped, and `self` must be dropped.
+    /// The bytes must stay valid and unchanged until `self` is dropped. `self` must be dropped, because the
+    /// drop waits for the message.
     unsafe fn send(&mut self, bytes: &[u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks(LARGEST_MESSAGE) {
             // SAFETY: the caller keeps the chunk valid, and its length fits a C integer. MPI aborts the job

@@ -1,14 +1,14 @@
-//! Sums of terms, each rounded to a multiple of one unit.
+//! Sums of terms that are rounded to multiples of a common unit.
 //!
-//! A sum of integers does not depend on the order of the terms. It is therefore bitwise the same for any
-//! number of ranks and threads. A rounded sum needs 8 bytes, and an [`ExactSum`](super::ExactSum) needs 552
-//! bytes. The error of a rounded sum is at most half a unit per term. Use rounded sums if the sum must be
-//! reproducible but need not be exact.
+//! A sum of integers does not depend on the order of the terms. A rounded sum is therefore bitwise the same
+//! for any number of ranks and threads. A rounded sum needs 8 bytes, and an [`ExactSum`](super::ExactSum)
+//! needs 552 bytes. The error of a rounded sum is at most half a unit per term. Use rounded sums if the sum
+//! must be reproducible but need not be exact.
 
 /// Number of bits for the magnitude of a sum.
 const BITS: i32 = 62;
 
-/// Largest exponent of `Unit::factor`, so that this factor and its inverse are finite.
+/// Largest allowed n for `Unit::factor` = 2ⁿ. With this limit, the factor and its inverse are finite.
 const MOST: i32 = 1000;
 
 /// The unit of the terms: a power of 2.
@@ -22,8 +22,8 @@ pub struct Unit {
 
 impl Unit {
     /// Return a unit for which the sum of `terms` terms does not overflow. The absolute value of a term must
-    /// not exceed `magnitude`. The unit is a power of 2. It is close to the smallest unit without overflow,
-    /// and at least 2⁻¹⁰⁰⁰. `None` if the magnitude is 0 or not finite.
+    /// not exceed `magnitude`. The unit is a power of 2. It is close to the smallest unit that prevents
+    /// overflow, but not below 2⁻¹⁰⁰⁰. `None` if the magnitude is 0 or not finite.
     pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
         if magnitude == 0.0 || !magnitude.is_finite() {
             return None;
@@ -43,7 +43,7 @@ impl Unit {
         libm::rint(term * self.factor) as i64
     }
 
-    /// Convert a sum of units to a number.
+    /// Return the value of a sum that is given as a number of units.
     #[inline]
     pub fn value(self, sum: i64) -> f64 {
         sum as f64 * self.size

@@ -118,7 +118,7 @@ impl ExactSum {
     }
 }
 
-/// `value` · 2^`exponent`, in two factors because 2^`exponent` can underflow.
+/// Return `value` · 2^`exponent`. The power is applied as two factors, because 2^`exponent` can underflow.
 fn scale(value: f64, exponent: i32) -> f64 {
     let half = exponent / 2;
     value * 2_f64.powi(half) * 2_f64.powi(exponent - half)

@@ -5,7 +5,7 @@ use std::sync::{Arc, Barrier, Mutex};
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 
 /// The state that the ranks share: a barrier, and one message buffer for each pair of sender and receiver. In
-/// an all-gather, each rank writes its data to the buffer for messages from itself to itself.
+/// an all-gather, each rank writes its data to the buffer whose sender and receiver are this rank.
 struct Shared {
     barrier: Barrier,
     slots: Vec<Mutex<Vec<u8>>>,

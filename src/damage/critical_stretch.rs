@@ -1,9 +1,9 @@
 //! Stretch criterion: a bond breaks irreversibly when its stretch reaches f s0 − α s_min.
 //!
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s0 is the critical stretch. s_min is the smallest
-//! stretch of the intact bonds of a point. f is the strength factor of the point, 1 without scatter. If the
-//! horizons of both points are equal, the smaller threshold of points i and j holds for a bond, so that both
-//! ends agree. If the thresholds belong to different horizons,
+//! stretch of the intact bonds of a point. f is the strength factor of the point, 1 without scatter. If
+//! points i and j of a bond have the same horizon, the smaller of their two thresholds holds for the bond.
+//! Both ends then use the same threshold. If the thresholds belong to different horizons,
 //! [`StretchConversion`](crate::damage::StretchConversion) computes the threshold of the bond from the two
 //! thresholds. With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6.
 //! [`Criterion::breaking`](crate::damage::Criterion::breaking) tests the criterion.
@@ -26,9 +26,9 @@ pub struct CriticalStretch {
 }
 
 impl CriticalStretch {
-    /// Return s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio of
-    /// bond-based laws. In the table, K is the bulk modulus (Pa), E is Young's modulus (Pa), c is the
-    /// micromodulus of `pmb`, and A is the cross-section (m²).
+    /// Return s0 from the fracture energy G0 (J/m²) and the horizon δ (m). The formulas hold for the Poisson
+    /// ratio of bond-based laws. In the table, K is the bulk modulus (Pa), E is Young's modulus (Pa), c is
+    /// the micromodulus of `pmb`, and A is the cross-section (m²).
     ///
     /// | dimension | s0 | source |
     /// |---|---|---|

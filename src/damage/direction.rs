@@ -1,14 +1,14 @@
 //! Fracture energy that depends on the direction of a crack, for laminates and wood.
 //!
-//! With a unit vector a of the undeformed body and the direction n of a bond, the critical work of the bond
-//! is
+//! Let a be a unit vector in the undeformed body, and n the direction of a bond. The critical work of the
+//! bond is
 //!
 //! w_c(n) = w (p + q c^k).
 //!
-//! Cracks along the vector a have a normal perpendicular to this vector. Cracks across a have the normal a. w
-//! is the critical work of an isotropic body whose fracture energy equals the fracture energy of cracks along
-//! a. If the fracture energy of cracks across a is at least the fracture energy of cracks along a,
-//! c = (n·a)². Otherwise, c = 1 − (n·a)².
+//! Cracks along the vector a have a normal perpendicular to this vector. Cracks across the vector a have the
+//! normal a. The factor w is the critical work of a bond in an isotropic body. The fracture energy of this
+//! body equals the fracture energy of cracks along a. If the fracture energy of cracks across a is at least
+//! the fracture energy of cracks along a, c = (n·a)². Otherwise, c = 1 − (n·a)².
 //!
 //! A crack with the normal N breaks all bonds that cross its plane. The fracture energy of this crack is
 //! proportional to a weighted mean of w_c(n): the mean is over all directions n, and the weight of a

@@ -1,12 +1,12 @@
 //! Energy for pulling apart a body along a plane. The body has an ordinary state-based law, and its bonds
 //! break at a critical stretch s0.
 //!
-//! The halves of a body move apart by Δ normal to the plane. A bond at the angle φ to the normal has the
-//! extension Δ cos φ, and breaks when this extension is s0|ξ|. When a bond breaks, each end dissipates the
-//! bond energy ½ (A/m) ω|ξ|²s0². The dilatation energy of each end decreases by κ θ (d/m) ω|ξ|² s0, and this
-//! energy is dissipated too. The dilatation θ is a sum over the bonds that are still intact. The sum of these
-//! energies over all bonds across a unit area is G0 = δ s0² (A b + κ τ). The numbers b and τ depend only on
-//! the dimension and the influence function. The symbols d, m, ω, κ and A are those of `ordinary.rs`, see
+//! The plane divides the body into two halves. The halves move apart by a distance Δ along the normal of the
+//! plane. A bond at the angle φ to the normal has the extension Δ cos φ, and breaks when this extension is
+//! s0|ξ|. When a bond breaks, each end dissipates the bond energy ½ (A/m) ω|ξ|²s0². The dilatation energy of
+//! each end decreases by κ θ (d/m) ω|ξ|² s0, and this amount is dissipated too. The dilatation θ is a sum over
+//! the bonds that are still intact. The sum of these energies over all bonds across a unit area is
+//! G0 = δ s0² (A b + κ τ). The numbers b and τ depend only on the dimension and the influence function. The symbols d, m, ω, κ and A are those of `ordinary.rs`, see
 //! [`crate::material::Ordinary`]. For the Poisson ratio of bond-based laws, κ is 0. With ω = 1/|ξ|, s0
 //! then equals the critical stretch of the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014,
 //! eq. 5).

@@ -1,4 +1,5 @@
-//! Stress criterion: a bond breaks irreversibly when the mean stress of its ends reaches a strength.
+//! Stress criterion: a bond breaks irreversibly when the mean of the stress measures at its ends reaches a
+//! strength.
 //!
 //! The criterion reads a scalar measure of the Cauchy stress σ = P Fᵀ/det F of a point. P is the first
 //! Piola–Kirchhoff stress of the point, and F is the deformation gradient of its family. In plane problems, σ

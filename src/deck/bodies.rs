@@ -22,11 +22,16 @@ const MOST_BODIES: usize = 256;
 /// Validate the bodies. `spacing` is the spacing in `[grid]`: the edges of a lattice cell, m.
 ///
 /// # Errors
-/// If the deck has no body or more than 256 bodies. On an unknown material or damage law, a damage law that
-/// the material does not support, an invalid number or shape, or a body without exactly one source of points.
-/// If a spacing is missing, the name of a mesh file has an unknown ending, or a key does not belong to the
-/// source of points. If two bodies request the same rows or elements of a file, or have different `columns`
-/// for the same file.
+/// - If the deck has no body or more than 256 bodies.
+/// - If a material or a damage law is unknown.
+/// - If the material of a body does not support the damage law of the body.
+/// - If a number or a shape is invalid.
+/// - If a body does not have exactly one source of points.
+/// - If a spacing is missing.
+/// - If the name of a mesh file has an unknown ending.
+/// - If a key does not belong to the source of points.
+/// - If two bodies request the same rows or elements of a file.
+/// - If two bodies have different `columns` for the same file.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -92,8 +97,8 @@ pub fn bodies(
     })
 }
 
-/// Validate the sources of the bodies' points without the other keys of the bodies. `spacing` is the spacing
-/// in `[grid]`: the edges of a lattice cell, m.
+/// Validate only the source of the points of each body, not the other keys of the body. `spacing` is the
+/// spacing in `[grid]`: the edges of a lattice cell, m.
 ///
 /// # Errors
 /// On the same errors in the sources of points as [`bodies`], except that spacings are not compared with the
@@ -182,8 +187,8 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
 const WHOLE: f64 = 1e-6;
 
 /// Return the origin of a grid along `axis`, m. The cells of this grid, with the edge `edge` (m), fill the
-/// shape exactly along this axis. The origin is 0 if a grid with this origin fills the shape exactly,
-/// otherwise the lower face of the shape.
+/// shape exactly along this axis. If a grid with the origin 0 fills the shape exactly, the origin is 0.
+/// Otherwise, the origin is the coordinate of the lower face of the shape.
 /// `None` if the shape does not have two flat faces, or if the distance between the faces is not a whole
 /// number of cells.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
@@ -368,7 +373,7 @@ impl From<grammar::Quadrature> for problem::Quadrature {
     }
 }
 
-/// Validate the points of a body from a file or a mesh.
+/// Validate the key `points` of a body. The points come from a file or a mesh.
 fn from_file(
     scope: &Scope,
     key: &str,

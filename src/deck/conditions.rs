@@ -14,8 +14,10 @@ use crate::problem::{self, Action, Depth, Selector};
 /// Validate the initial values.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression or file, a table without values, or a table with both a file and
-/// expressions. On an initial velocity in a run whose first stage is quasi-static.
+/// - On an unknown set.
+/// - On an invalid expression or file.
+/// - On a table without values, or with both a file and expressions.
+/// - On an initial velocity in a run whose first stage is quasi-static.
 pub fn initials(
     scope: &Scope,
     deck: &Deck,
@@ -86,8 +88,8 @@ fn initial_file(scope: &Scope, file: &grammar::Text, key: &str) -> Result<proble
 /// Validate the loads, supports and temperatures.
 ///
 /// # Errors
-/// On an unknown set, an invalid expression, or a table without exactly one quantity. On a `depth` or
-/// `normal` that is missing or has no effect.
+/// On an unknown set or an invalid expression. On a table that gives no quantity or more than one quantity.
+/// On a `depth` or `normal` that is missing or has no effect.
 ///
 /// In one case, a missing `depth` is not reported here: only some bodies need it, and it is not yet known
 /// whether the set has points of these bodies. If the set has such points, the solver reports the missing
@@ -167,7 +169,7 @@ pub fn temperatures_act<'m>(
     Err(scope.error(condition.place.clone(), message))
 }
 
-/// Return whether a condition acts on a surface layer with a depth.
+/// Return whether a condition acts on a surface layer. Only tractions and pressures act on a layer.
 fn on_a_layer(condition: &grammar::Condition) -> bool {
     condition.traction.is_some() || condition.pressure.is_some()
 }

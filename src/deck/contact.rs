@@ -8,7 +8,8 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, ContactModel, ContactRule};
 
-/// Smallest coefficient of restitution. The damping of smaller coefficients requires very short time steps.
+/// Smallest allowed coefficient of restitution. With a smaller coefficient, the contact damping would require
+/// very short time steps.
 const LEAST_RESTITUTION: f64 = 0.01;
 
 /// Keys of a contact rule: the rule of `[contact]`, of a pair of bodies or of a rigid body.

@@ -19,7 +19,7 @@ type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
 /// Validate a damage law.
 ///
 /// # Errors
-/// On an invalid number, an unknown set, or a table without exactly one measure of toughness. On a
+/// On an invalid number, an unknown set, or a table that does not give exactly one measure of toughness. On a
 /// calibration or a toughness by direction that is not available in this dimension. On a toughness by
 /// direction with only some of its three keys, and on a seed without `weibull_modulus`.
 pub fn damage(

@@ -168,9 +168,9 @@ impl Comparison<'_> {
         }
     }
 
-    /// Return a value as an expression of position and time, or of the length of a bond, with the parameters
-    /// of its deck inserted; `None` if the value is not an expression. `deck` is 0 for the old deck and 1 for
-    /// the new deck.
+    /// Return a value as an expression, with the parameters of its deck inserted. The variables of the
+    /// expression are position and time, or the length of a bond. `None` if the value is not an expression.
+    /// `deck` is 0 for the old deck and 1 for the new deck.
     fn expression(&self, deck: usize, value: Option<&Value>) -> Option<Expression> {
         let written = match value? {
             Value::Integer(value) => Written::Value(*value as f64),

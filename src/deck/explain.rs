@@ -162,8 +162,8 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     }
 }
 
-/// Return the grid origin of all lattice bodies, m; `None` if their origins differ, and 0 without lattice
-/// bodies.
+/// Return the common grid origin of all lattice bodies, m. Return `None` if their origins differ. Return the
+/// zero vector if there are no lattice bodies.
 ///
 /// Without `origin`, the origin is chosen for each spacing, so bodies of different spacings may have
 /// different origins. The single key `origin` cannot express different origins.

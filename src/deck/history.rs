@@ -88,7 +88,7 @@ pub fn history(
     })
 }
 
-/// Return the interval of rows; `None` if the deck gives none.
+/// Return the interval between rows of the history; `None` if the deck gives no interval.
 fn rows(scope: &Scope, history: &grammar::History) -> Result<Option<Interval>> {
     let seconds = |every: &Number| scope.positive(every, "[history] every");
     let steps = history
@@ -164,8 +164,9 @@ fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
     Ok(fields[find(scope.source, name, names, key)?])
 }
 
-/// Return the component or invariant that a table requests. The default is the only component of a scalar
-/// field, and the magnitude of a vector field; a tensor field without `component` is an error.
+/// Return the component or invariant that a table requests. For a scalar field, the default is its only
+/// component. For a vector field, the default is the magnitude. For a tensor field, a table without
+/// `component` is an error.
 fn component(
     scope: &Scope,
     key: &str,

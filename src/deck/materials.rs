@@ -21,8 +21,9 @@ use crate::problem::law;
 /// Validate a material.
 ///
 /// # Errors
-/// On an unknown law or key, on invalid, missing or surplus constants, and on elastic constants that the law
-/// does not support.
+/// - If the law or a key is unknown.
+/// - If a constant is invalid, missing or surplus.
+/// - If the law does not support the elastic constants.
 pub fn material(
     scope: &Scope,
     dimension: Dimension,

@@ -1,4 +1,5 @@
-//! Decks, the TOML files that describe runs: from the text of a deck to a validated [`Problem`].
+//! Decks, the TOML files that describe runs. This module converts the text of a deck to a validated
+//! [`Problem`].
 
 mod assign;
 mod bodies;
@@ -56,8 +57,8 @@ pub struct Deck {
     source: Source,
     grammar: grammar::Deck,
     /// Copy of `grammar` with numbers in place of horizons that depend on the mean spacing of points; `None`
-    /// if the deck has no such horizons. The copy is made only once, because meshes and point files may have
-    /// to be read.
+    /// if the deck has no such horizons. The copy is made only once, because making it can require reading
+    /// meshes and point files.
     with_horizons: OnceLock<Option<grammar::Deck>>,
 }
 
@@ -73,8 +74,10 @@ pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
 }
 
 /// Read a deck as [`read`] does, and merge the decks `overlays` into it. Later overlays override earlier
-/// overlays; `set` overrides all decks. Tables are merged key by key. Lists and choices, such as the law of a
-/// material, are replaced. Paths in an overlay are relative to the folder of the deck.
+/// overlays; `set` overrides all decks. Tables are merged key by key. Any other value, such as a list, is
+/// replaced as a whole. In some tables, the only key names a choice, such as the law of a material. If an
+/// overlay makes another choice, this choice replaces the table. Paths in an overlay are relative to the
+/// folder of the deck.
 ///
 /// # Errors
 /// Same as [`read`]. The location in the message is in the deck or in an overlay.
@@ -135,8 +138,8 @@ impl Deck {
 
     /// Validate the deck in a single process. Return the [`Problem`], including the warnings about the deck.
     ///
-    /// If a horizon depends on the mean spacing of points, the process reads all files of these points.
-    /// [`Self::problem_on`] shares this work between ranks.
+    /// If a horizon depends on the mean spacing of points, the process reads the meshes and point files
+    /// that contain these points. [`Self::problem_on`] shares this work between ranks.
     ///
     /// # Errors
     /// If a value is invalid; the message is as in [`read`].

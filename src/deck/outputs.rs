@@ -28,8 +28,8 @@ pub fn output(
 /// Validate the further results; `end` is the end of the run, s.
 ///
 /// # Errors
-/// As [`output`]. Also on a name that cannot be part of a file name, that contains `until_step_`, or that
-/// differs from another name only in upper and lower case.
+/// The errors of [`output`]. There is also an error if a name cannot be part of a file name, contains
+/// `until_step_`, or differs from another name only in upper and lower case.
 pub fn further_outputs(
     scope: &Scope,
     deck: &Deck,

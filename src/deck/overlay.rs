@@ -8,9 +8,9 @@ use super::toml_error::syntax_error;
 use crate::error::Result;
 
 /// Return the text of a deck merged with overlays; later overlays override earlier overlays. Tables are
-/// merged key by key. Any other value, including the list of stages, is replaced as a whole. In some
-/// tables, the only key names a choice, for example the law of a material. If the overlay has another key in
-/// such a table, this key replaces the key of the deck.
+/// merged key by key. Any other value, including the list of stages, is replaced as a whole. Some tables
+/// have a single key that selects an alternative, for example the law of a material. If the overlay has
+/// another key in such a table, this key replaces the key of the deck.
 ///
 /// # Errors
 /// If the deck or an overlay is not TOML. Without overlays, this function does not parse the deck.
@@ -30,7 +30,7 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
     Ok(merged.to_string())
 }
 
-/// Parse a text to a document that keeps comments and blanks.
+/// Parse a deck or an overlay into a document that keeps comments and white space.
 fn document(source: &Source) -> Result<DocumentMut> {
     // Errors of this parser have the same text as for decks without overlays.
     if let Err(error) = DeTable::parse(&source.text) {
@@ -40,8 +40,8 @@ fn document(source: &Source) -> Result<DocumentMut> {
     parsed.map_err(|error| source.error(error.span().unwrap_or(0..0), error.message()))
 }
 
-/// Merge `upper` into `lower`, the table at `path`; keys of `upper` override keys of `lower`. `is_inline` is
-/// true if `lower` is an inline table.
+/// Merge the table `upper` into the table `lower`. Both tables are at `path` in their decks. Keys of `upper`
+/// override keys of `lower`. `is_inline` is true if `lower` is an inline table.
 fn merge_tables<'k>(
     lower: &mut dyn TableLike,
     upper: &'k dyn TableLike,
@@ -74,8 +74,8 @@ fn merge_tables<'k>(
     }
 }
 
-/// Return whether `path` belongs to a table whose only key names a choice: the law of a material, the kind of
-/// a damage law or crack, or a shape.
+/// Return whether `path` is the path of a table with a single key that names a choice: the law of a material,
+/// the kind of a damage law or crack, or a shape.
 fn is_choice(path: &[&str]) -> bool {
     matches!(
         path,
@@ -83,8 +83,8 @@ fn is_choice(path: &[&str]) -> bool {
     )
 }
 
-/// Reset the positions of an item's tables, so that these tables follow the tables of the deck. The order of
-/// bodies and conditions matters.
+/// Reset the positions of the tables in `item`. In the merged deck, these tables then come after the deck's
+/// tables of the same section. The order of bodies and conditions matters.
 fn forget_positions(item: &mut Item) {
     match item {
         Item::Table(table) => {
@@ -119,7 +119,7 @@ mod tests {
     }
 
     /// Merge two tables key by key. If `lower` and `upper` make different choices, the result contains both
-    /// choices, unlike the result of [`merge`]. A test compares the result of [`merge`] with this function.
+    /// choices, unlike the result of [`merge`]. A test compares the results of the two functions.
     fn over(lower: &mut Table, upper: &Table) {
         for (key, value) in upper {
             match (lower.get_mut(key), value) {

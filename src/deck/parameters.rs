@@ -11,7 +11,8 @@ use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::message::suggestion;
 
-/// Words with a meaning in expressions, and `free`, which replaces an expression.
+/// Reserved names: words that have a meaning in expressions, and `free`. In place of an expression, `free`
+/// leaves a component of displacement or velocity unprescribed.
 const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free"];
 
 /// Evaluate the parameters, and store their values in the scope.

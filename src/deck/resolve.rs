@@ -39,8 +39,9 @@ impl<'a> Scope<'a> {
     /// Evaluate the parameters, which may refer to each other in any order, and read the tables.
     ///
     /// # Errors
-    /// On an invalid title or name, an invalid expression or unknown name in a parameter, a circular
-    /// definition, or an invalid table.
+    /// - If the title or a name is invalid.
+    /// - If a parameter has an invalid expression, an unknown name or a circular definition.
+    /// - If a table is invalid.
     pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {
             source,
@@ -264,7 +265,7 @@ impl<'a> Scope<'a> {
         Ok((scaled / scaled.dot(&scaled).sqrt()).into())
     }
 
-    /// Return the index of the only given key among mutually exclusive keys. It is an error if none or
+    /// Return the index of the key that is given, among mutually exclusive keys. It is an error if none or
     /// several of the keys are given. `place` is the byte range of the table with these keys.
     pub fn exactly_one(
         &self,
@@ -338,7 +339,7 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// Return whether an entry is `"free"`, a component that is not prescribed.
+/// Return whether an entry is `"free"`, which means that the component is not prescribed.
 fn is_free(entry: &Number) -> bool {
     matches!(entry.get_ref(), Written::Text(text) if text == "free")
 }

@@ -15,7 +15,8 @@ const LONGEST: u64 = 1 << 28;
 /// Approximate largest number of characters of an error, unless the path is very long.
 const LONGEST_ERROR: usize = 790;
 
-/// Largest number of characters of the message of an error or warning, without location and excerpt.
+/// Largest number of characters in the message of an error or warning. The location and the excerpt do not
+/// count.
 const LONGEST_MESSAGE: usize = 600;
 
 /// Smallest and largest width of the excerpt of a line, in characters. The longer the

@@ -17,7 +17,7 @@ pub struct SourceMap {
 #[derive(Debug)]
 struct MappedRange {
     merged: Range<usize>,
-    /// Index of the file.
+    /// Index of the file in `SourceMap::files`.
     file: usize,
     /// Byte range in this file.
     in_file: Range<usize>,
@@ -44,9 +44,9 @@ impl SourceMap {
         Self { files, ranges }
     }
 
-    /// Return the source of the range `span` of the merged text: the path and the text of a file, and a byte
-    /// range in this file. `length` is the length of the merged text, bytes. Return `None` for a range that
-    /// comes from no file, such as a value of `--set`.
+    /// Find the file from which the range `span` of the merged text comes. Return the path and the whole text
+    /// of this file, and the byte range in this file. `length` is the length of the merged text, bytes.
+    /// Return `None` for a range that comes from no file, such as a value of `--set`.
     pub fn find(
         &self,
         span: &Range<usize>,

@@ -15,7 +15,7 @@ use crate::message::{format_number, suggestion};
 use crate::points::columns::{BYTE_ORDER_MARK, entries, heading, is_comment};
 use crate::problem::{Action, Problem, RigidMotion};
 
-/// Maximum number of rows.
+/// Maximum number of rows of a table.
 const MAX_ROWS: usize = 100_000;
 
 /// Round-off tolerance of times, as a fraction of the end time of the stage or run.

@@ -73,7 +73,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     segment.time(scope)
 }
 
-/// Validate the stages of the run. `whole` is the time axis of the run.
+/// Validate the stages of the run. `whole` contains the time settings of the run.
 ///
 /// # Errors
 /// On a missing or invalid end of a stage, an unknown name, or an invalid number. If a stage has both `on`

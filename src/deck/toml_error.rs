@@ -1,5 +1,5 @@
-//! Translation of errors of the TOML parser and of serde into errors about the deck, with the key, the expected value and
-//! the given value.
+//! Translation of errors of the TOML parser and of serde into errors about the deck, with the key, the
+//! expected value and the given value.
 
 use std::ops::Range;
 
@@ -280,7 +280,7 @@ fn wanted_of_law(path: &[String]) -> Option<String> {
     law?.key(key).map(law::wanted)
 }
 
-/// Describe the given value in deck terms.
+/// Describe a wrong value for an error message. `written` is the text of the value in the deck.
 fn given(value: &DeValue, written: &str) -> String {
     match value {
         DeValue::Table(_) => "a table".to_owned(),

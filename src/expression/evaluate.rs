@@ -130,7 +130,6 @@ pub(super) enum Ternary {
 }
 
 impl Unary {
-    /// Compute the result of the operation.
     pub(super) fn apply(self, value: f64) -> f64 {
         match self {
             Self::Negate => -value,
@@ -163,7 +162,6 @@ impl Unary {
 }
 
 impl Binary {
-    /// Compute the result of the operation.
     pub(super) fn apply(self, left: f64, right: f64) -> f64 {
         match self {
             Self::Add => left + right,
@@ -191,7 +189,6 @@ impl Binary {
 }
 
 impl Ternary {
-    /// Compute the result of the operation.
     pub(super) fn apply(self, first: f64, second: f64, third: f64) -> f64 {
         match self {
             Self::Choose if first != 0.0 => second,
@@ -204,7 +201,6 @@ impl Ternary {
     }
 }
 
-/// Return 1 for true, 0 for false.
 fn truth(condition: bool) -> f64 {
     f64::from(u8::from(condition))
 }
@@ -280,9 +276,9 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Return true if the operations of the code show that its value is always 0 or 1, as for a comparison. The
-/// function does not compute with the values of constants and variables, so it returns false for `0*x`, for
-/// example.
+/// Return true if the operations in `code` show that the result is always 0 or 1. An example is a comparison.
+/// The function does not compute with the values of constants and variables, so it returns false for `0*x`,
+/// for example.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);

@@ -3,7 +3,7 @@
 //! # Language
 //!
 //! Every value is a 64-bit float. A condition is true if its value is not 0. Comparisons give 1 or 0. The
-//! operators are, from the tightest to the loosest:
+//! following table lists the operators in the order of their precedence, the highest first:
 //!
 //! | operators | |
 //! |---|---|
@@ -16,7 +16,8 @@
 //! | `a \|\| b` | from the left |
 //!
 //! `and`, `or` and `not` are synonyms of `&&`, `||` and `!`. `not x < 1` reads like `not (x < 1)` but would
-//! mean `(not x) < 1`. A `!` at the start of a comparison therefore requires parentheses.
+//! mean `(not x) < 1`. Therefore a comparison that starts with `!` or `not` is an error: write `!(x < 1)`
+//! or `(!x) < 1` instead.
 //!
 //! The variables are `x`, `y`, `z` and `t`, where the deck allows these. The only constant is `pi`. These
 //! names hide parameters of the same name. Names of functions do not hide parameters. In keys that are
@@ -68,7 +69,7 @@ pub enum Variable {
     Z,
     /// `t`, the time.
     T,
-    /// `r`, a length. [`Expression::evaluate`] takes the value as the first coordinate of the position.
+    /// `r`, a length. Pass its value to [`Expression::evaluate`] as the first coordinate of the position.
     R,
 }
 
@@ -109,7 +110,7 @@ impl Variable {
 /// An error with its byte range in the text of the expression.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpressionError {
-    /// Index of the first byte.
+    /// Index of the first byte of the range.
     pub start: usize,
     /// Index after the last byte; equal to `start` for an error at the end of the text.
     pub end: usize,

@@ -46,7 +46,6 @@ pub(super) enum Kind {
 /// A token and its byte range in the text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Token {
-    /// Kind of the token.
     pub(super) kind: Kind,
     /// Index of the first byte.
     pub(super) start: usize,

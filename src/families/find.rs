@@ -10,8 +10,9 @@ use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
 /// Build the families of a domain, sorted by pair of blocks, and the layouts of the grids.
 ///
-/// The domain must have been [arranged](super::arrange()) for these grids. `cutoffs` is the symmetric
-/// `blocks` × `blocks` matrix of longest bonds, m; 0 for a pair without bonds.
+/// The domain must have been [arranged](super::arrange()) for these grids. `cutoffs` is a symmetric
+/// `blocks` × `blocks` matrix. An entry is the maximum bond length of a pair of blocks, m; 0 for a pair
+/// without bonds.
 ///
 /// # Errors
 /// - If two points coincide.

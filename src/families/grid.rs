@@ -1,5 +1,5 @@
-//! The layout of the local points of a regular grid in memory. Points adjacent along x are adjacent in
-//! memory, and so are their neighbours at the same offset.
+//! Memory layout of the local points of a regular grid. Points adjacent along x are adjacent in memory, and
+//! so are their neighbours at the same offset.
 //!
 //! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x. The first and the last slot of a line
@@ -65,8 +65,8 @@ pub(super) struct Line {
 
 /// The layout of a grid's local points, including ghosts.
 ///
-/// Holes pad the layout at both ends. Therefore a load of eight slots is in bounds if it starts at an
-/// occupied slot plus the offset of any bond.
+/// Holes pad the layout at both ends. Let n be an occupied slot plus the offset of any bond. Because of the
+/// holes, the eight slots from n on are in bounds.
 #[derive(Debug)]
 pub struct Grid {
     /// Origin, spacing and blocks of the grid.
@@ -240,8 +240,8 @@ impl Grid {
             });
     }
 
-    /// Split a range of owned points into ranges with consecutive slots. Each item is the first slot and the
-    /// range of points. Points that are not on the grid are skipped.
+    /// Split a range of owned points into ranges with consecutive slots. Each item has the first slot of such
+    /// a range, and the points of the range. Points that are not on the grid are skipped.
     pub fn slots_of(&self, points: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
         let end = |run: &Run| (run.point + run.length) as usize;
         let first = (self.by_point).partition_point(|run| end(run) <= points.start);
@@ -262,7 +262,8 @@ impl Grid {
     }
 }
 
-/// A cursor that maps slots to local indices; it caches the run of the previous call.
+/// A cursor that maps slots to local indices. It caches the [`Run`] that contains the slot of the previous
+/// call.
 pub(super) struct Lookup<'a> {
     grid: &'a Grid,
     last: Run,
@@ -300,7 +301,8 @@ pub enum Which {
     All,
 }
 
-/// The first x of each band. No point lies within `reach` steps before the start of a band.
+/// Return the index along x at which each band starts. No point lies within `reach` steps before the start of
+/// a band.
 fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
     let mut all: Vec<i64> = cells.iter().map(|([_, _, x], _)| *x).collect();
     all.par_sort_unstable();

@@ -40,7 +40,7 @@ pub struct BondLattice {
     weighted: [bool; 2],
     /// The lane groups, sorted by local index.
     vectors: Vec<Vector>,
-    /// Offsets in y and z, in steps, of the lines that contain neighbours.
+    /// Offsets from the line of a point to the lines that contain its neighbours, in y and z, in steps.
     line_offsets: Vec<[i64; 2]>,
     /// Shift for each line of the grid and each line offset. The offset leads from this line to another line.
     /// The slot of a point in this line, plus the shift, is the slot at the same x in the other line.

@@ -24,7 +24,7 @@ pub struct BondList {
     /// Local indices of the neighbours, sorted by global id in each row. The last group of a row is padded
     /// with the local index of the row's point.
     pub(super) neighbours: Neighbours,
-    /// State of the bonds; the intact bits of padding are clear.
+    /// State of the bonds. In padding, the bits of `Store::intact` are clear.
     pub(super) store: Store,
     /// [Weights](crate::material::bond::Weights) of the ends i and j, 0 for padding. If the weights of i are
     /// `None`, all weights are 1. If only the weights of j are `None`, the weights of i apply to both ends.
@@ -342,7 +342,8 @@ impl<'a> Rows<'a> {
 }
 
 impl Row<'_> {
-    /// The bits of all bonds of a group; broken bonds are included, and the bits of padding are clear.
+    /// Return one byte for a group. Bit k is set if lane k has a bond, intact or broken, and clear if lane k
+    /// is padding.
     #[inline(always)]
     pub fn whole(&self, group: usize) -> u8 {
         let mut bits = 0;

@@ -24,14 +24,14 @@ struct Compact {
     differences: [u16; WIDTH],
 }
 
-/// The neighbour indices of a list.
+/// Neighbour indices of bonds that are stored as a list, in groups of eight.
 #[derive(Debug, Clone, Default)]
 pub struct Neighbours {
     compact: Vec<Compact>,
     full: Vec<[u32; WIDTH]>,
 }
 
-/// A range of groups.
+/// A range of groups of neighbour indices.
 #[derive(Debug, Clone, Copy)]
 pub struct NeighbourGroups<'a> {
     compact: &'a [Compact],
@@ -122,7 +122,7 @@ impl Neighbours {
         self.all().group(group).indices()
     }
 
-    /// Largest index of all groups; `None` without groups.
+    /// Largest neighbour index in all groups; `None` if there are no groups.
     pub fn largest(&self) -> Option<u32> {
         let largest = |group: usize| self.indices(group).into_iter().fold(0, u32::max);
         (0..self.len()).into_par_iter().map(largest).max()

@@ -20,7 +20,8 @@ pub struct Offset {
     pub weights: [f64; 2],
     /// Number of steps of the offset along x.
     pub(super) x: i32,
-    /// Index of the line offset (the steps along y and z).
+    /// Index in the list of line offsets that `offsets` returns. The entry of the list contains the steps of
+    /// this offset along y and z.
     pub(super) line: u32,
 }
 

@@ -21,8 +21,8 @@ const HORIZON_TOLERANCE: f64 = 1e-9;
 /// Number of points that one task searches.
 const CHUNK: usize = 512;
 
-/// Number of chunks that are searched before their rows are appended to the lists. This number limits the
-/// memory of buffers.
+/// Number of chunks that are searched before their rows are appended to the lists. Each of these chunks has a
+/// buffer, so this number limits the memory of the buffers.
 const WAVE: usize = 32;
 
 /// Return the maximum length (m) of a bond for a horizon (m).
@@ -30,21 +30,23 @@ pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }
 
-/// The points of a domain, sorted by block, then by global id. The search returns indices into this order,
-/// for one block of neighbours at a time. Sorting these indices therefore sorts the neighbours by id.
+/// The points of a domain, sorted by block, then by global id. The search finds the neighbours of a point
+/// separately for each block, as indices into this order. Sorting the indices of one block therefore sorts
+/// the neighbours by id.
 struct Order {
     /// Local index of the point at each position in this order.
     local: Vec<u32>,
     /// For each block, the position of its first point in this order. The last entry is the number of points.
     first: Vec<u32>,
-    /// Bins of the points of each block. The bins contain indices into this `Order`, counted from the first
-    /// point of the block. Each block has separate bins, so the neighbour search of a point skips the blocks
-    /// to which the point has no bonds.
+    /// Bins of the points of each block. In the bins of a block, index k means the point k places after the
+    /// first point of the block in this order. Each block has separate bins. Therefore, the neighbour search of
+    /// a point skips the blocks that form no bonds with the block of the point.
     bins: Vec<Bins>,
 }
 
 impl Order {
-    /// Sort the points and build the bins. `cutoffs` is the matrix of longest bonds, m.
+    /// Sort the points and build the bins. `cutoffs` is the symmetric `blocks` × `blocks` matrix of maximum
+    /// bond lengths, m; 0 for a pair of blocks without bonds.
     fn new(points: &[Point], blocks: usize, cutoffs: &[f64]) -> Self {
         let mut keys: Vec<(u32, u64, u32)> = points
             .iter()
@@ -139,8 +141,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
     Ok(lists)
 }
 
-/// Return an error if the lists will not fit in memory. The memory of the complete lists is extrapolated from
-/// the fraction `done` of the points.
+/// Return an error if the lists will not fit in memory. `lists` contains the bonds of the fraction `done` of
+/// the points. The memory of the complete lists is extrapolated from this fraction.
 fn check_memory(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
     let remaining = bytes as f64 * (1.0 / done - 1.0);

@@ -41,7 +41,7 @@ impl Store {
         (width * self.intact.len() * size_of::<Lanes>()) as u64
     }
 
-    /// A range of the groups.
+    /// Return the groups whose indices are in `range`.
     pub fn groups(&mut self, range: Range<usize>) -> Groups<'_> {
         let history = self.width * range.start..self.width * range.end;
         Groups {
@@ -72,7 +72,8 @@ impl Store {
         }
     }
 
-    /// Copy the intact bits and the history to `saved`, for [`Self::undo`]. A step can change only these.
+    /// Copy the intact bits and the history to `saved`, for [`Self::undo`]. A step changes no
+    /// other part of the store.
     pub fn keep(&self, saved: &mut (Vec<u8>, Vec<Lanes>)) {
         saved.0.clone_from(&self.intact);
         saved.1.clone_from(&self.history);
@@ -128,7 +129,7 @@ impl<'a> Groups<'a> {
     }
 }
 
-/// Number of bytes for one bit per bond.
+/// Number of bytes that hold one bit for each of `bonds` bonds.
 pub(super) fn bit_bytes(bonds: usize) -> usize {
     bonds.div_ceil(WIDTH)
 }

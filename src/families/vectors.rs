@@ -30,8 +30,8 @@ pub struct VectorBonds<'a> {
     pub point: usize,
     /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Range of the bytes of this lane group in the result of `BondLattice::whole`. The result has one byte
-    /// per group of bonds.
+    /// Index range of this lane group's bytes in the vector that `BondLattice::whole` returns. The vector has
+    /// one byte for each lane group and offset.
     pub bits: Range<usize>,
     /// The offsets of the lattice.
     pub offsets: &'a [Offset],

@@ -52,7 +52,7 @@ pub struct VolumeFactors {
     reach_squared: f64,
     /// Number of table entries per direction, one per quarter of the edge; 0 if the table would be too large.
     multiples: usize,
-    /// Factors at offsets whose components are multiples of a quarter of the edge, as bit patterns.
+    /// Bit patterns of the factors at offsets whose components are multiples of a quarter of the edge.
     table: OnceLock<Vec<AtomicU64>>,
     /// Factors at all other offsets.
     cache: Mutex<FxHashMap<[i64; 3], f64>>,
@@ -129,8 +129,8 @@ impl VolumeFactors {
         }
     }
 
-    /// The table entry of an offset, and the offset in quarters of the edge; `None` if the table has no entry
-    /// for the offset.
+    /// Return the table entry of an offset, and the absolute values of the offset's components in quarters of
+    /// the cell edge; `None` if the table has no entry for the offset.
     #[inline]
     fn multiple(&self, offset: [f64; 3]) -> Option<(&AtomicU64, [i64; 3])> {
         let quarters = offset.map(|x| x.abs() * self.per_resolution / QUARTER as f64);

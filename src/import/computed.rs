@@ -160,7 +160,7 @@ impl<'n> Quantity<'n> {
         })
     }
 
-    /// Write a sum, a mean or an extreme over a set, one table per component.
+    /// Write a sum, a mean or an extreme over a set. The section `[history]` gets one table per component.
     fn statistics(&self, translation: &mut Translation, set: String) -> Result<Written> {
         let calculation = self.table.get("Calculation Type").and_then(Node::text);
         let calculation = calculation.unwrap_or("");

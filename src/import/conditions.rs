@@ -1,4 +1,5 @@
-//! Initial values, loads and supports of decks in which each condition has one component.
+//! Translation of initial values, loads, supports and temperatures. In the source decks, each condition
+//! prescribes one component of a vector, or a temperature.
 
 use super::draft::{Section, Value};
 use super::sets::Sets;
@@ -38,7 +39,7 @@ pub struct Conditions {
     /// Name of each condition in the new deck, and the numbers of the steps in which it acts. An empty list
     /// means that the condition acts in all steps.
     pub written: Vec<(String, Vec<u64>)>,
-    /// Whether a condition prescribes temperatures.
+    /// Whether at least one condition prescribes temperatures.
     pub has_temperature: bool,
 }
 
@@ -214,7 +215,8 @@ impl Conditions {
     }
 
     /// Write the initial values, one table per set. If a point is in several sets, the last of their tables
-    /// applies to the point. Log the initial values that a later table may replace by 0.
+    /// applies to the point. If the source deck gives no value for a component of a vector, the table has 0
+    /// for this component. Log each initial value that a later table may replace by such a 0.
     pub fn finish(&mut self, translation: &mut Translation) {
         for initial in &self.initials {
             let others = self

@@ -196,7 +196,8 @@ impl Draft {
         &mut self.sections[index]
     }
 
-    /// Test whether the deck has a section with this header; a section that is left out does not count.
+    /// Test whether the deck has a section with this header. Sections that [`Self::leave_out`] added do not
+    /// count.
     pub fn has(&self, header: &str) -> bool {
         self.sections.iter().any(|section| section.is(header))
     }

@@ -94,8 +94,8 @@ impl Constants {
         }
     }
 
-    /// Keep the first two of the constants, in the order of `precedence`. Return the keys of the constants
-    /// that are removed.
+    /// Sort the constants in the order of `precedence`, and keep the first two. Return the keys of the
+    /// constants that are removed.
     pub fn keep_two(&mut self, precedence: &[&str]) -> Vec<&'static str> {
         let rank = |key: &str| precedence.iter().position(|known| *known == key);
         self.given.sort_by_key(|(key, ..)| rank(key));
@@ -104,9 +104,9 @@ impl Constants {
         removed.map(|(key, ..)| key).collect()
     }
 
-    /// Write Young's modulus of a bond-based law of PeriLab, which uses one constant and the fixed Poisson's
-    /// ratio `ratio`. Return the key of this constant: the bulk modulus if given, or else the shear modulus,
-    /// or else Young's modulus. Return `None` if none of them is given.
+    /// Write Young's modulus of a bond-based law of PeriLab. The law has the fixed Poisson's ratio `ratio`,
+    /// and uses one elastic constant. Return the key of this constant: the bulk modulus if given, or else the
+    /// shear modulus, or else Young's modulus. Return `None` if none of them is given.
     pub fn write_young(&self, section: &mut Section, ratio: f64) -> Option<&'static str> {
         let factors = [
             ("bulk_modulus", 3.0 * (1.0 - 2.0 * ratio)),

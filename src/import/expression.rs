@@ -29,8 +29,8 @@ pub type Names<'a> = &'a dyn Fn(&str) -> Option<String>;
 /// Translate an expression.
 ///
 /// # Errors
-/// If the text cannot be translated, is too long, or the result is not an expression of `variables`. `Err`
-/// holds a message.
+/// If the text cannot be translated or is too long, or if the result is not an expression in `variables`.
+/// `Err` holds a message.
 pub fn rewrite(
     text: &str,
     dialect: Dialect,
@@ -74,7 +74,6 @@ const SYMBOLS: [&str; 27] = [
     "!", "=", ";", "{", "}", "?", ":", "&", "|", "≤",
 ];
 
-/// Split an expression into tokens.
 fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
     let mut tokens = Vec::new();
     let mut rest = text.trim_start();
@@ -116,7 +115,7 @@ fn has_statements(tokens: &[Token]) -> bool {
     tokens.iter().any(|token| is_name(token, "value"))
 }
 
-/// Return the index of the symbol that closes the symbol at `start`.
+/// Return the index of the closing bracket that belongs to the opening bracket `{` or `(` at `start`.
 fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
     let (open, close) = match &tokens[start] {
         Token::Symbol("{") => ("{", "}"),
@@ -167,10 +166,11 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// Translate the statements from index `at` to the first unmatched `}` or to the end of `tokens`. The
-    /// statements assign expressions to the name `value` of the source language. The parameter `value` is the
-    /// expression that earlier statements have assigned to this name. Return the expression after the last
-    /// statement, and the index after this statement.
+    /// Translate the statements from index `at` to the first unmatched `}` or to the end of `tokens`. In the
+    /// source deck, these statements assign expressions to a variable with the name `value`. The parameter
+    /// `value` is the expression that earlier statements have assigned to this variable. Return the
+    /// expression that is assigned to this variable after the last statement, and the index after this
+    /// statement.
     fn block(
         &self,
         tokens: &[Token],

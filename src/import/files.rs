@@ -58,8 +58,8 @@ pub struct PointFile {
 }
 
 impl PointFile {
-    /// Read a point file. `order` has the names of the columns of a file without header. The header, comments
-    /// and blank lines are not counted as rows.
+    /// Read a point file. `order` contains the column names, which are used if the file has no header. The
+    /// header, comments and blank lines are not counted as rows.
     ///
     /// Return `None` if the file cannot be read.
     pub fn read(path: &Path, order: &[&str]) -> Option<Self> {

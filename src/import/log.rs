@@ -79,7 +79,7 @@ pub(super) const DROPPED_NUMBERS: &str =
 pub(super) const UNSCALED_FAMILIES: &str =
     "families are not scaled: a family has the points within the horizon";
 
-/// Log note for the first `run` of a script in which no fix integrates the motion of atoms.
+/// Log note for the first `run` of a script, if no fix integrates the motion of atoms in this run.
 pub(super) const NO_INTEGRATION: &str =
     "no `fix nve` acts in the first run, so no atom moves in LAMMPS; points of the new deck move";
 
@@ -104,11 +104,11 @@ pub struct Losses {
     pub influence: Vec<usize>,
     /// Lines that name a point file with columns of material constants.
     pub columns: Vec<usize>,
-    /// Lines of node sets with numbers that no point has.
+    /// Lines of node sets that contain numbers of points that do not exist.
     pub dropped_numbers: Vec<usize>,
     /// Lines of keys that scale the families.
     pub scaled_families: Vec<usize>,
-    /// Line of the first `run` of a script in which no fix integrates the motion of atoms.
+    /// Line of the first `run` of a script, if no fix integrates the motion of atoms in this run.
     pub unmoved: Vec<usize>,
 }
 
@@ -283,8 +283,8 @@ impl Log {
         self.lost_loads.borrow_mut().insert(node.id);
     }
 
-    /// Return the outcomes of all keys of a tree, in the order of the text. Values and empty tables without
-    /// a note have the outcome `LeftOut`. All other tables without a note are not listed, but their keys are.
+    /// Return the outcomes of all keys of a tree, in the order of the text. If a value or an empty table has
+    /// no note, its outcome is `LeftOut`. If any other table has no note, only its keys are listed.
     pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);
@@ -325,7 +325,7 @@ impl Log {
     }
 }
 
-/// Reasons for leaving out keys that no translator reads: a word in the key, and the reason.
+/// Words in keys that no translator reads, each with the reason for leaving out such a key.
 const REASONS: [(&str, &str); 11] = [
     ("verbose", "concerns what the code prints"),
     ("pre calculation", "what a law needs is computed"),

@@ -46,7 +46,7 @@ pub enum Code {
     Peridigm,
     /// PeriLab, in YAML.
     PeriLab,
-    /// LAMMPS, an input script with `atom_style peri`.
+    /// LAMMPS, as an input script with `atom_style peri`.
     Lammps,
 }
 

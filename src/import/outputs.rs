@@ -109,7 +109,7 @@ pub enum Interval {
     Number(u64),
 }
 
-/// The field of an output variable.
+/// The field of Fissure that corresponds to an output variable of the other code.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FieldOf {
     /// Name of the field.
@@ -157,7 +157,7 @@ struct Frequency {
     has_fields: bool,
 }
 
-/// The outputs that have been read.
+/// The outputs that have been read from the source deck.
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
@@ -165,7 +165,8 @@ pub struct Outputs {
     intervals: Vec<Frequency>,
     /// Interval of each output that contains only columns of the history.
     history_intervals: Vec<Frequency>,
-    /// Whether temperatures are prescribed and a material expands; only then do points have temperatures.
+    /// Whether points have temperatures. They have temperatures if temperatures are prescribed and a material
+    /// expands.
     has_temperature: bool,
     /// Computed quantities: name, outcome and note.
     computed: Vec<(String, Fate, String)>,

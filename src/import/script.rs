@@ -47,9 +47,9 @@ const DEFAULT_STEP: f64 = 1e-8;
 /// Values that the variables and the time step have at one command of a script.
 #[derive(Debug, Default)]
 pub struct Variables {
-    /// Formulas and values by name.
+    /// Formula or value of each variable, by the name of the variable.
     values: HashMap<String, String>,
-    /// Time step of the last `timestep`, s.
+    /// Time step that the last command `timestep` has set, s.
     pub step: Option<f64>,
 }
 

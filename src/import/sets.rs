@@ -27,9 +27,10 @@ pub struct Sets<'n> {
     /// from a mesh.
     mesh_prefix: Option<&'static str>,
     /// Names of node sets of the mesh, with the ids of the elements whose nodes are all in the set. `None` if
-    /// an element belongs to a set when at least one of its nodes is in the set.
+    /// one node in a set suffices for an element to belong to the set.
     ids_by_name: Option<Vec<(String, Vec<u64>)>>,
-    /// Number of the last point if larger numbers in node sets have no effect, as in PeriLab.
+    /// Number of the last point, if larger numbers are dropped from node sets, as in PeriLab; `None` if no
+    /// numbers are dropped.
     last_number: Option<u64>,
 }
 
@@ -140,8 +141,8 @@ impl<'n> Sets<'n> {
     }
 
     /// Return the number of points of a node set if the ids of its points are known. The ids are known for
-    /// the sets passed to [`Self::set_ids_by_name`], and for lists of point numbers in the deck or in a file.
-    /// Return `None` for other sets.
+    /// the sets passed to [`Self::set_ids_by_name`]. The ids are also known for sets that the deck or a file
+    /// gives as a list of point numbers. Return `None` for other sets.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
         let mut of_mesh = self.ids_by_name.iter().flatten();
         if let Some((_, ids)) = of_mesh.find(|(known, _)| known == name) {
@@ -175,7 +176,7 @@ impl<'n> Sets<'n> {
     }
 }
 
-/// Read the numbers of points in a file; `None` if the file cannot be read.
+/// Read the point numbers that a file lists; `None` if the file cannot be read.
 fn numbers_of_file(translation: &Translation, file: &str) -> Option<Vec<u64>> {
     let mut ids = crate::points::id_file::read(&translation.path(file), 1).ok()?;
     for id in &mut ids {

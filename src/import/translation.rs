@@ -22,7 +22,7 @@ pub struct Translation<'a> {
     pub source: &'a Source,
     /// Folder of the new deck.
     target: PathBuf,
-    /// Language of the expressions.
+    /// Language of the expressions in the source deck.
     pub dialect: Dialect,
     /// Outcome of each key of the source deck.
     pub log: Log,
@@ -30,7 +30,7 @@ pub struct Translation<'a> {
     pub draft: Draft,
     /// Number of dimensions.
     pub dimension: usize,
-    /// Start of the run in the time of the source deck, s.
+    /// Time of the source deck at the start of the run, s.
     pub start: f64,
     /// Files that the new deck reads, relative to the working directory or absolute.
     pub files: RefCell<Vec<PathBuf>>,
@@ -184,7 +184,8 @@ impl<'a> Translation<'a> {
         written
     }
 
-    /// Return a name that no table of the section has yet, even if an earlier table had the same source name.
+    /// Return a name for a new table of a section of the new deck. The name differs from the names of all
+    /// earlier tables of this section, even if an earlier table had the same name in the source deck.
     /// For a body, pass `set` as the section: a body is also a set, so a body and a set must not have the
     /// same name.
     pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
@@ -225,7 +226,8 @@ impl<'a> Translation<'a> {
         Value::text(path.display().to_string().replace('\\', "/"))
     }
 
-    /// Create a vector with one given component; the other components are `others`.
+    /// Create a vector. The component with the index `component` is `value`, and each other component is
+    /// `others`.
     pub fn component(&self, component: usize, value: Value, others: &Value) -> Value {
         Value::list((0..self.dimension).map(|k| {
             if k == component {

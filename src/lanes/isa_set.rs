@@ -8,7 +8,7 @@ pub enum IsaSet {
     Each,
     /// AVX2 only, for loops that AVX-512 would hardly accelerate.
     Avx2,
-    /// One version for any processor of the target, without fused multiply-adds.
+    /// One version without fused multiply-adds. It runs on any processor of the target architecture.
     One,
 }
 

@@ -1,5 +1,5 @@
-//! Tuples of [`Lanes`], and columns of numbers. Loops read tuples from the columns, or add tuples to the
-//! columns.
+//! Tuples of [`Lanes`], and columns of numbers. Loops read tuples from the columns, or add the quantities of
+//! a tuple to the numbers in the columns.
 
 use std::ops::{Deref, DerefMut};
 
@@ -28,11 +28,11 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// Get a quantity for writing.
     fn get_mut(&mut self, quantity: usize) -> &mut Lanes;
 
-    /// Select the first [`Self::COUNT`] columns, to read.
+    /// Select the first [`Self::COUNT`] columns, for reading values.
     ///
     /// # Panics
-    /// If there are fewer than [`Self::COUNT`] columns and [`Self::PADDED`] is false. For a pair of tuples,
-    /// also if there are fewer columns than the first tuple has quantities.
+    /// - If there are fewer than [`Self::COUNT`] columns, and [`Self::PADDED`] is false.
+    /// - If `Self` is a pair of tuples, and the first tuple has more quantities than there are columns.
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
     /// Select the first [`Self::COUNT`] columns, for adding values.

@@ -43,8 +43,9 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Run a rarely needed task out of line, so that the task uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
-    /// Return `a`. With AVX2 and AVX-512, the compiler cannot see that the result is `a`. It then keeps the
-    /// operations before and after this call in whole vectors, instead of splitting them by lane.
+    /// Return `a`. With AVX2 and AVX-512, the compiler cannot see that the result is `a`. The compiler
+    /// therefore keeps the operations before and after this call in whole vectors, instead of splitting these
+    /// operations by lane.
     #[inline(always)]
     fn opaque(self, a: Lanes) -> Lanes {
         a

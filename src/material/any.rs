@@ -65,7 +65,7 @@ impl Counts {
     }
 }
 
-/// For each size, the largest value of all laws, in three dimensions.
+/// The largest value of each count over all laws, in 3-D. `central` is true only if it is true for every law.
 pub const MOST: Counts = {
     let mut most = COUNTS[0];
     let mut k = 1;
@@ -186,11 +186,10 @@ impl PairLaw {
     }
 }
 
-/// This implementation has two uses: bonds between different laws, and the kernel `BreakingBonds`, which all
-/// laws share.
-/// The forces of bonds between different laws are never [linear](Law::LINEAR), because a linear law is paired
-/// only with itself. Functions that are called per bond are not inlined. Otherwise, every loop would contain
-/// the code of all laws.
+/// This implementation has two uses: bonds between points with different laws, and the kernel
+/// `BreakingBonds`, which all laws share. The forces of bonds between points with different laws are never
+/// [linear](Law::LINEAR), because a linear law is paired only with itself. Functions that are called per bond
+/// are not inlined. Otherwise, every loop would contain the code of all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;

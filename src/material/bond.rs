@@ -319,8 +319,8 @@ fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     }))
 }
 
-/// Task of [`with_far`] for the lanes with |x| above [`NEAR`]. `other` receives and
-/// returns pairs of a number and its rounding error.
+/// Task that [`with_far`] runs for the lanes with |x| above [`NEAR`], where x is `relative_square_extension`.
+/// `other` receives and returns pairs of a number and its rounding error.
 struct ClosedForm<O> {
     relative_square_extension: Lanes,
     beyond_series: u8,
@@ -378,8 +378,8 @@ mod tests {
         extension_over_deformed: true,
     };
 
-    /// Return bonds with exactly the given values of x = (|Y|² − |ξ|²)/|ξ|². The reference data are
-    /// artificial.
+    /// Return bonds with exactly the given values of x = (|Y|² − |ξ|²)/|ξ|². The fields of `reference` are
+    /// chosen only to give these values, and do not belong to any real ξ.
     fn of_growth(simd: impl Simd, relative_square_extension: [f64; 8]) -> Bond<1> {
         let one = Lanes::splat(1.0);
         let reference = Reference {

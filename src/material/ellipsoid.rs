@@ -1,16 +1,16 @@
-//! Surface correction from extensions along the coordinate axes. The factor of a point for a bond is the
-//! radius of an ellipsoid in the direction of the bond.
+//! Surface correction from extensions along the coordinate axes. Each point has an ellipsoid. The factor of
+//! the point for a bond is the radius that the ellipsoid has in the direction of the bond.
 //!
 //! Madenci & Oterkus 2014, ch. 4; Oterkus 2010. Consider a unit extension along a coordinate axis a. A
 //! quantity of a point, such as the energy density, is then a sum over its family. The factor g_a scales this
 //! sum to the value of the quantity in the classical solid. A bond of direction n has the factor
 //! g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
 //!
-//! In the sources, a bond has one ellipsoid, and each semi-axis is the mean of the values at both ends. Here
-//! each end has its own ellipsoid, because the force state of a point depends on the numbers of this point
-//! only. In bond-based laws, the factor of a bond is then the mean of the radii at both ends. If the
-//! semi-axes at the two ends differ, this mean differs from the factor of the sources. The deviation is of
-//! second order in the difference of the semi-axes.
+//! In the cited works, a bond has one ellipsoid. Each semi-axis is the mean of the values g_a of the points
+//! at both ends. Here each end has its own ellipsoid, because the force state of a point depends on
+//! the numbers of this point only. In bond-based laws, the factor of a bond is then the mean of the radii at
+//! both ends. If the semi-axes at the two ends differ, this mean differs from the factor of the cited works.
+//! The deviation is of second order in the difference of the semi-axes.
 //!
 //! The factors depend on the coordinate axes, so they are not exact for extensions along other directions.
 

@@ -8,9 +8,9 @@
 //!
 //! dλ/dN = −A (ε − ε∞)^m for ε > ε∞, otherwise 0.
 //!
-//! The bond breaks when λ reaches 0. If the cyclic strain is constant, the bond breaks after 1/(A (ε − ε∞)^m)
-//! cycles. With ε∞ = 0, a crack of length a grows by da/dN ∝ ΔK^m, with the range ΔK of the stress intensity
-//! factor.
+//! A, m and the fatigue limit ε∞ are constants of the law. The bond breaks when λ reaches 0. If the cyclic
+//! strain is constant, the bond breaks after 1/(A (ε − ε∞)^m) cycles. With ε∞ = 0, a crack of length a grows
+//! by da/dN ∝ ΔK^m, with the range ΔK of the stress intensity factor.
 //!
 //! The law stores the used life 1 − λ. The number of cycles in a time step is the length of the step times
 //! [`FatiguePmb::cycles_per_second`]. For all these cycles, s is the stretch of the bond at the end of the

@@ -9,7 +9,7 @@ pub trait ForceState<const D: usize>: Copy {
     /// Whether the force always acts along the bond.
     const CENTRAL: bool;
 
-    /// Type of the family's [`Rotation`](super::Rotation), on which the work depends; empty for central
+    /// Type of the family's [`Rotation`](super::Rotation), which [`Self::work`] reads; empty for central
     /// forces.
     type Rotation: LaneTuple;
 
@@ -41,7 +41,8 @@ pub trait ForceState<const D: usize>: Copy {
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
 }
 
-/// Force state along the bond: T = t Y with t in N/m⁷, or t ξ for linear laws. Positive t attracts the ends.
+/// Force state along the bond: T = t Y with t in N/m⁷, or t ξ for linear laws. Positive t pulls the ends
+/// towards each other.
 #[derive(Debug, Clone, Copy)]
 pub struct Along(pub Lanes);
 

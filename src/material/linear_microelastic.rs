@@ -96,8 +96,8 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
         [bond.length * factor]
     }
 
-    /// Set the factor on the micromodulus to the surface correction, which is the inverse of the sum. Without
-    /// surface correction, or if the sum is not positive, the factor is 1.
+    /// Set the factor on the micromodulus. With surface correction, the factor is the inverse of the sum in
+    /// `sums`. Without surface correction, or if the sum is not positive, the factor is 1.
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         numbers[0] = match self.corrected_to {
             Some(_) if sums[0] > 0.0 => 1.0 / sums[0],

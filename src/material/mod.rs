@@ -81,7 +81,7 @@ use nalgebra::SMatrix;
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use bond::Weights;
 
-/// A property of a law for the reports of the command line.
+/// A property of a law, for the reports that the command-line program prints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Property {
     /// A number and its unit; the unit is empty for dimensionless numbers.
@@ -179,7 +179,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether forces act along ξ and are linear in η. Otherwise forces depend on the deformed bonds.
     const LINEAR: bool = false;
 
-    /// Instruction sets for which the loops over forces, sums and energies are compiled.
+    /// Instruction sets for which the loops that compute forces, sums and energies are compiled.
     const ISA_SET: IsaSet = IsaSet::Each;
 
     /// Whether the law overrides [`Self::toughness_scale`].
@@ -387,9 +387,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Test whether a point carries no force. This has three possible causes: the shape tensor of the intact
-    /// bonds is nearly singular; the intact part of the family is too stiff; or the law has no stress at the
-    /// deformation of the point or of one of its bonds.
+    /// Test whether a point carries no force. There are three possible causes:
+    ///
+    /// - The shape tensor of the intact bonds is nearly singular.
+    /// - The intact part of the family is too stiff.
+    /// - The law has no stress at the deformation of the point or of one of its bonds.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
@@ -421,8 +423,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// W ≤ ½ Σ k |η|² Ṽ. For bond-based laws k = |∂T/∂η|.
     fn stiffness(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes;
 
-    /// Test whether the springs of [`Self::stiffness`] must also resist displacements across the bonds. The
-    /// bound of the strain energy density W is then ½ Σ k |η|² Ṽ instead of ½ Σ k (|Y| − |ξ|)² Ṽ.
+    /// Test whether the springs of [`Self::stiffness`] must also resist displacements across the bonds. If
+    /// they must, the bound of the strain energy density W is ½ Σ k |η|² Ṽ instead of ½ Σ k (|Y| − |ξ|)² Ṽ.
     fn resists_across(&self) -> bool {
         false
     }
@@ -436,8 +438,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         1.0
     }
 
-    /// Return the factor on the critical stretch of a bond, from the numbers of points i and j and the law of
-    /// point j. Points i and j compute the same factor.
+    /// Return the factor on the critical stretch of a bond. The factor is computed from the point numbers of
+    /// i and j, and from the law of point j. Points i and j compute the same factor.
     #[inline(always)]
     fn toughness_scale(&self, _bond: &Bond<D>, _points: [&Self::Point; 2], _other: &Self) -> Lanes {
         Lanes::splat(1.0)

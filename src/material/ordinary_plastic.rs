@@ -14,13 +14,14 @@
 //! The return to the yield surface is radial: t_d is multiplied by r = √(2ψ₀)/‖t_d‖, and e_p grows by
 //! (1 − r) e_d.
 //!
-//! Plastic flow preserves volume, so Σ ω|ξ| e_p Ṽ = 0. Therefore the law equals Mitchell's law until bonds of
-//! the family break. After that, Σ ω|ξ| e_p Ṽ of the remaining bonds is not 0. Mitchell computes θ from the
-//! total extension e. With this θ, the force on the remaining bonds would not be the derivative of the
-//! energy: the plastic extensions would expand the family, and breaking bonds would add energy.
+//! Mitchell computes θ from the total extension e instead of e − e_p. Plastic flow preserves volume, so
+//! Σ ω|ξ| e_p Ṽ = 0 until bonds of the family break. Until then, both extensions give the same θ, and the law
+//! equals Mitchell's law. After that, Σ ω|ξ| e_p Ṽ of the remaining bonds is not 0. With Mitchell's θ, the
+//! force on the remaining bonds would not be the derivative of the energy: the plastic extensions would
+//! expand the family, and breaking bonds would add energy.
 //!
-//! ψ₀ is calibrated in pure shear: the point yields when the equivalent stress of von Mises reaches σ_y. A
-//! deviatoric strain ε has ½‖t_d‖² = 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent stress
+//! ψ₀ is calibrated in pure shear: the point yields when the equivalent stress of von Mises reaches σ_y. For
+//! a deviatoric strain ε, ½‖t_d‖² is 15 G² ε:ε/m in space and 8 G² ε:ε/m in the plane. The equivalent stress
 //! is σ_y at ε:ε = σ_y²/(6G²). Therefore ψ₀ = (5/2) σ_y²/m in space and (4/3) σ_y²/m in the plane. With m of
 //! an untruncated family, the value in space is Mitchell's 25σ_y²/(8πδ⁵). With the thickness h, Mitchell's
 //! value in the plane is 75σ_y²/(8πhδ⁴). That value belongs to A = 15G, whereas this law has A = 8G in the
@@ -140,7 +141,11 @@ impl Described for OrdinaryPlastic {
 }
 
 impl<const D: usize> Law<D> for OrdinaryPlastic {
-    /// A/m and d κ θ/m (N/m⁷), the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
+    /// Four numbers:
+    /// - A/m, N/m⁷,
+    /// - d κ θ/m, N/m⁷,
+    /// - the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ,
+    /// - 1 − r.
     type Point = [Lanes; 4];
     /// e_p/|ξ|, and the dissipated energy, J/m⁶.
     type BondHistory = [Lanes; 2];
@@ -150,7 +155,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 3;
-    /// Each point has one own number, the dilatation θ.
+    /// The only own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     const FORCE_READS_STRETCH: bool = true;

@@ -60,7 +60,8 @@ macro_rules! register {
         pub(crate) use with_law;
 
         /// Evaluate an expression in which a name stands for the two laws in a [`PairLaw`]. The expression is
-        /// compiled once for each law, and once for points with different laws.
+        /// compiled once for each law, for bonds between points with this law. It is compiled once more for
+        /// bonds between points with different laws.
         macro_rules! with_pair {
             ($d pair:expr, $d laws:ident => $d body:expr) => {
                 match $d pair {

@@ -23,8 +23,8 @@ pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 /// iterations.
 const MOST_ITERATIONS: usize = 40;
 
-/// R has converged if an iteration changes every entry by less than this number. The next change would be of
-/// the order of the square of this number.
+/// R has converged if an iteration changes every entry by less than this number. The next iteration would
+/// change the entries by about the square of this number.
 const CONVERGED: f64 = 1e-9;
 
 /// Return the rotation R of a deformation gradient F in the plane or in space. In the plane, `in_plane`

@@ -12,9 +12,9 @@
 //! | exponential | s0 (exp(−(κ − s0)/a) − r)/(1 − r), sc = s0 + a ln(1/r), with the decay stretch a |
 //!
 //! A body in uniaxial tension bears a stress of more than E s0. When the bonds along the axis soften, the
-//! forces of bonds in other directions still increase. Therefore s0 is chosen such that the tensile strength
-//! f_t is the largest stress in uniaxial tension. This stress is computed by quadrature over the directions
-//! of the bonds.
+//! forces of bonds in other directions still increase. Therefore s0 is chosen such that the largest stress in
+//! uniaxial tension equals the tensile strength f_t. This stress is computed by quadrature over the
+//! directions of the bonds.
 //!
 //! Let s_e be the critical stretch of `pmb` for a given fracture energy. Breaking a `pmb` bond at the stretch
 //! s_e dissipates c |ξ| s_e²/2. Stretching a bond of this law to sc dissipates c |ξ| A with A = ∫ F dκ. With
@@ -74,8 +74,8 @@ const DECAYS: f64 = 4.605_170_185_988_092;
 /// β and γ of a straight line.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
 
-/// β and γ of concrete (Petersson 1981): with the tensile strength f_t and the fracture energy G_F, the
-/// stress is ⅓ f_t at the crack opening 0.8 G_F/f_t, and 0 at 3.6 G_F/f_t.
+/// β and γ of concrete (Petersson 1981). Let f_t be the tensile strength and G_F the fracture energy. The
+/// stress is ⅓ f_t at the crack opening 0.8 G_F/f_t. It is 0 at the crack opening 3.6 G_F/f_t.
 const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 
 const TENSILE_STRENGTH: Key = Key {
@@ -300,8 +300,8 @@ fn rounded(number: f64) -> String {
     digits.parse().map_or(digits, format_number)
 }
 
-/// Return the error message if sc is not above s0, because bonds would then break before they soften. A
-/// possible cause is a long horizon: the energy that the bonds store at s0 then exceeds the fracture energy.
+/// Return the error message if sc is not above s0. Bonds would then break before they soften. A possible
+/// cause is a long horizon: the energy that the bonds store at s0 then exceeds the fracture energy.
 fn horizon_fault(given: &Given) -> Option<String> {
     let (strength, critical) = stretches(given);
     if critical > strength {
@@ -357,7 +357,7 @@ const MOST_STRAINS: usize = 400;
 const ACROSS_ITERATIONS: usize = 25;
 
 impl SofteningPmb {
-    /// Return F on first loading; in compression, the stretch itself.
+    /// Return F on first loading to `stretch`. In compression, return `stretch` itself.
     fn first_loading(&self, stretch: Lanes) -> Lanes {
         let zero = Lanes::splat(0.0);
         let pulled = stretch.max(zero);
@@ -453,7 +453,7 @@ impl SofteningPmb {
         way.max(Lanes::splat(0.0)).min(Lanes::splat(1.0))
     }
 
-    /// Return F/s0 for largest past stretches κ from s0 to sc.
+    /// Return F(κ)/s0. `largest` are the largest past stretches κ, which must lie between s0 and sc.
     #[inline(always)]
     fn relative_force(&self, largest: Lanes) -> Lanes {
         let one = Lanes::splat(1.0);

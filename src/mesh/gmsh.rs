@@ -558,8 +558,9 @@ impl<'a> Cursor<'a> {
         std::str::from_utf8(token).map_err(|_| self.fault("is not UTF-8 text"))
     }
 
-    /// Return an error unless the last word is on the line `line`, on which the node or element `number`
-    /// begins. `what` is `"node"` or `"element"`. In binary files, the line number does not change.
+    /// Return an error if the last word that was read is not on the line `line`. The node or element `number`
+    /// begins on this line. `what` is `"node"` or `"element"`. In binary files, the line number does not
+    /// change.
     fn is_on_line(&self, line: u64, what: &str, number: u64) -> Result<()> {
         if self.line == line {
             return Ok(());
@@ -569,7 +570,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Return an error if further words follow on the line of the node or element `number`. `what` is
-    /// `"node"` or `"element"`. Binary files have no lines.
+    /// `"node"` or `"element"`. Binary files have no lines, so for these files there is no error.
     fn end_of_line(&self, what: &str, number: u64) -> Result<()> {
         let is_text = matches!(self.encoding, Encoding::Text);
         let mut rest = self.bytes[self.at..].iter();
@@ -621,7 +622,6 @@ impl<'a> Cursor<'a> {
         Err(self.fault(message))
     }
 
-    /// Skip a section that is not used.
     fn skip_section(&mut self, section: &str) -> Result<()> {
         let end = format!("$End{section}");
         let rest = &self.bytes[self.at..];

@@ -1,4 +1,4 @@
-//! Types of elements: corners, dimension and the order of their nodes.
+//! Types of elements: corners, dimension and node order of each type.
 //!
 //! In this module, all types have the node order of VTK. Each node after the corners is described by the
 //! corners between which it lies. A node on an edge lies between two corners, a node on a face between three
@@ -101,7 +101,8 @@ impl Kind {
         }
     }
 
-    /// Return, for each node after the corners, the corners between which this node lies.
+    /// For each node that is not a corner, return the corners between which this node lies. In the order
+    /// of the nodes, they follow the corners.
     pub fn between(self) -> &'static [Between] {
         let all: &[Between] = match self.form {
             Point => &[],

@@ -24,8 +24,8 @@ impl Dual {
         }
     }
 
-    /// Return the reference coordinate along `axis`, with this value. Its derivative is 1 along `axis` and 0
-    /// along the other axes.
+    /// Return the reference coordinate along `axis`, which has the value `value`. Its derivative is 1 along
+    /// `axis` and 0 along the other axes.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
@@ -77,7 +77,8 @@ impl Mul<Dual> for f64 {
     }
 }
 
-/// A point of a Gauss rule: its weight, and each node's shape function with its gradient.
+/// A point of a Gauss rule, with its weight. `functions` contains the value and the gradient of each node's
+/// shape function.
 struct GaussPoint {
     weight: f64,
     functions: Vec<Dual>,
@@ -411,7 +412,6 @@ pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
 mod tests {
     use super::*;
 
-    /// Return the nodes of the reference element, in reference coordinates.
     fn reference_nodes(kind: Kind) -> Vec<[f64; 3]> {
         let corners: Vec<[f64; 3]> = match kind.form {
             Form::Point => vec![[0.0; 3]],

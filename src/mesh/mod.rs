@@ -167,7 +167,7 @@ impl Elements {
         &self.nodes[start..start + self.kind(element).nodes]
     }
 
-    /// Return the number of an element in the file.
+    /// Return the number that identifies an element in the file.
     pub fn number(&self, element: usize) -> u64 {
         self.numbers[element]
     }
@@ -197,7 +197,7 @@ pub struct Group {
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
     /// Whether the group is a geometrical entity. A deck can give a number without the kind of the group. If
-    /// both an entity and a group that is not an entity have this number, the number means the latter.
+    /// both an entity and another kind of group have this number, the number refers to the other kind.
     pub is_entity: bool,
     /// Members of the group.
     pub members: Members,
@@ -344,8 +344,8 @@ impl Mesh {
         ))
     }
 
-    /// Return the error message for the name of a group that cannot be read; `None` for other names. The kind
-    /// of the group may come before the name.
+    /// If the group `name` cannot be read, return its error message. Return `None` for other names. In
+    /// `name`, the kind of the group may come before the name of the group.
     fn unsupported(&self, name: &str) -> Option<&str> {
         let kinds = ["node set ", "element set "];
         let bare = kinds.iter().find_map(|kind| name.strip_prefix(kind));

@@ -1,4 +1,4 @@
-//! Variables of netCDF files: the classic formats, and HDF5 as netCDF-4 writes it.
+//! Variables of netCDF files, in the classic formats and in netCDF-4, which uses HDF5.
 
 use std::path::Path;
 
@@ -192,7 +192,7 @@ fn size_of_kind(kind: u32) -> Fault<usize> {
     }
 }
 
-/// Read position in the header. `rest` are the bytes after this position.
+/// Current position in the header. `rest` are the bytes after this position.
 struct Cursor<'a> {
     rest: &'a [u8],
     version: u8,
@@ -243,8 +243,8 @@ impl<'a> Cursor<'a> {
         Ok(String::from_utf8_lossy(self.padded(length)?).into_owned())
     }
 
-    /// Read the number of entries of a list. The number is not checked: if it is too large, reading the
-    /// entries fails at the end of the file, because no entry is empty.
+    /// Read the number of entries of a list. The number is not checked. Each entry takes at least one byte of
+    /// the file. Therefore, if the number is too large, reading the entries fails at the end of the file.
     fn list(&mut self) -> Fault<usize> {
         self.word()?;
         self.count()

@@ -27,7 +27,7 @@ impl Runs {
         }
     }
 
-    /// Test whether the set has a number.
+    /// Test whether the set contains `number`.
     pub fn contains(&self, number: u64) -> bool {
         let after = self.ranges.partition_point(|[first, _]| *first <= number);
         after > 0 && number < self.ranges[after - 1][1]

@@ -13,7 +13,7 @@ use super::kind::{Form, Kind};
 use super::{Fault, Group, LARGEST_RATIO, Members, Mesh, Runs, fault, measure, position};
 use crate::error::{Result, excerpt};
 
-/// Largest number of different values of an array that describes groups.
+/// Maximum number of different values of an array. An array with more different values defines no groups.
 const MOST_GROUPS: usize = 1000;
 
 /// Return the type of the cells with the VTK cell type `number`. Also return their node order if it differs
@@ -129,7 +129,8 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     Ok(mesh)
 }
 
-/// Compare an attribute of a piece, if it is given, with the number of entries in the arrays.
+/// Return an error if an attribute of a piece differs from `count`, the number of entries in the arrays. A
+/// missing attribute is not an error.
 fn has_count(piece: Node, attribute: &str, count: usize) -> Fault<()> {
     match piece.attribute(attribute) {
         Some(given) if given.trim().parse() != Ok(count) => Err(format!(
@@ -268,7 +269,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Add a group of cells or points for each value of an array of whole numbers.
+    /// Add a group of cells or points for each distinct value of an array of whole numbers.
     fn add_groups(
         &self,
         array: Node,
@@ -402,7 +403,8 @@ impl File<'_> {
 struct Source<'a> {
     bytes: &'a [u8],
     is_raw: bool,
-    /// Decoded bytes of the last base-64 group that [`Source::take`] has not returned yet, in reverse order.
+    /// Bytes of the last decoded base-64 group, in reverse order, without the bytes that [`Source::take`] has
+    /// already returned.
     decoded: Vec<u8>,
 }
 

@@ -19,7 +19,7 @@ use super::collective::CollectiveFile;
 use super::dataset::Rows;
 use super::seal;
 
-/// Names of the two files.
+/// Names of the two checkpoint files.
 const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 
 /// Name of the file into which a checkpoint is written. A complete file is renamed to one of [`NAMES`].
@@ -338,7 +338,7 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
     })
 }
 
-/// Return the path of the dataset of a column of the state.
+/// Return the path of the dataset that contains a column of the state.
 fn dataset_name(column: &str) -> String {
     format!("/{column}")
 }

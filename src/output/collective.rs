@@ -36,9 +36,10 @@ const OBJECT_BYTES: u64 = 8192;
 /// # Kill and loss of power
 /// A killed process leaves the file in the state of the last flush, because metadata stays in memory between
 /// flushes. A loss of power leaves at least the state of the last [fsync](Self::sync). If the file has
-/// grown, a flush includes an fsync. All other flushes only change values in place.
+/// grown, a flush includes an fsync. If the file has not grown, a flush only changes values in place.
 ///
-/// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
+/// Dropping the value closes a serial file, but not a collective file. All ranks must [close](Self::close) a
+/// collective file.
 pub struct CollectiveFile<'a> {
     inner: ManuallyDrop<hdf5::File>,
     transfer: Transfer,

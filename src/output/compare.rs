@@ -1,8 +1,8 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
-//! Outputs and history rows are matched by time, points by id. Values are read in blocks of points; the
-//! history is read as a whole. If the lists of ids of two outputs differ and at least one
-//! list does not ascend, both lists are also read as a whole. This case occurs on refined grids.
+//! Outputs and history rows are matched by time, points by id. Values at points are read for at most `BLOCK`
+//! points at a time. The history is read as a whole. If the lists of ids of two outputs differ and at least
+//! one list does not ascend, both lists are also read as a whole. This case occurs on refined grids.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};
@@ -36,7 +36,7 @@ pub struct Place {
     pub time: f64,
     /// Index of the component of a field; 0 for other quantities.
     pub component: usize,
-    /// Point of a field; `None` for a column of the history.
+    /// Point at which the values differ most, if the quantity is a field; `None` for a column of the history.
     pub point: Option<PointPlace>,
 }
 
@@ -58,7 +58,8 @@ pub struct Difference {
     pub unit: String,
     /// Names of the components; empty for a scalar.
     pub components: &'static [&'static str],
-    /// Largest absolute difference; infinite if one of two unequal numbers is not finite.
+    /// Largest absolute difference; infinite if the values of a pair differ and at least one of them is not
+    /// finite.
     pub largest: f64,
     /// Largest finite absolute value in the first result.
     pub scale: f64,
@@ -233,8 +234,8 @@ struct OutputPair<'a> {
 
 /// How the points of two outputs are matched.
 enum Matching {
-    /// The points are matched one block after the other. The ids of both outputs ascend, or both outputs have
-    /// the same sequence of ids.
+    /// The points are matched in the order of the rows, in blocks of at most [`BLOCK`] points. The ids of
+    /// both outputs ascend, or both outputs have the same sequence of ids.
     InOrder,
     /// The points are matched by these pairs of rows. A pair has one row of each output. The pairs are sorted
     /// by the row of the first output.
@@ -317,7 +318,7 @@ impl OutputPair<'_> {
         [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]))
     }
 
-    /// Read the ids of some points of one output.
+    /// Read the ids of the points `rows` from the compared output of the result `side`.
     fn ids(&self, side: usize, rows: Range<usize>) -> Result<Vec<u64>> {
         self.readers[side].ids_of(self.indices[side], rows)
     }

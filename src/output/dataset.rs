@@ -127,8 +127,8 @@ impl Dataset {
     }
 }
 
-/// Return the number of rows per chunk. A chunk has about 4 KiB to 4 MiB. It holds the rows of one append,
-/// an equal part of a long append, or the rows of several short appends.
+/// Return the number of rows per chunk. A chunk has about 4 KiB to 4 MiB. It holds the rows of one append.
+/// However, a long append is divided evenly into several chunks, and several short appends share a chunk.
 fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
     let (min, max) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
     let parts = per_append.div_ceil(max).max(1);

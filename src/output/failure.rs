@@ -6,7 +6,7 @@ use std::io;
 /// Prefix of a system error number in HDF5's messages.
 const ERRNO_PREFIX: &str = "errno = ";
 
-/// Return HDF5's description of the innermost error of a stack of errors.
+/// Return HDF5's description of the innermost error on the error stack of `error`.
 pub(super) fn innermost(error: &hdf5::Error) -> String {
     let stack = error.stack();
     let frame = stack.as_ref().and_then(|frames| frames.last());

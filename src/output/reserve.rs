@@ -1,8 +1,8 @@
 //! Reservation of disk space before collective writes.
 //!
-//! If the disk fills up during a collective write, most components of Open MPI 4.1 for collective writes hang
-//! on some ranks: `vulcan` (the default), `dynamic_gen2`, `two_phase` and ROMIO. If one rank reserves the
-//! space before the write, a full disk causes an ordinary error instead.
+//! Open MPI 4.1 has several components for collective writes. If the disk fills up during the write, most
+//! of these components hang on some ranks: `vulcan` (the default), `dynamic_gen2`, `two_phase` and ROMIO. If
+//! one rank reserves the space before the write, a full disk causes an ordinary error instead.
 
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};

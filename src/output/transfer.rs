@@ -109,8 +109,8 @@ impl Transfer {
         })
     }
 
-    /// Return why the last transfer was not collective, as HDF5's `H5D_MPIO_…` bits, combined over all ranks.
-    /// Return 0 if the transfer was collective, or if the file is serial.
+    /// Return the reasons why the last transfer was not collective, as HDF5's `H5D_MPIO_…` bits. The bits of
+    /// all ranks are combined. Return 0 if the transfer was collective, or if the file is serial.
     fn causes(&self) -> hdf5::Result<u32> {
         let (mut local, mut global) = (0, 0);
         if self.collective {

@@ -181,8 +181,8 @@ fn write_document(
     writeln!(text, "</Grid>\n</Domain>\n</Xdmf>")
 }
 
-/// The rows of a step in the datasets of moving fields: first row, number of points of the step, and number
-/// of rows of all steps.
+/// The rows of a step in the datasets of fields that change in time: first row of the step, number of points
+/// of the step, and number of rows of all steps.
 #[derive(Clone, Copy)]
 struct StepRows {
     first: usize,

@@ -144,8 +144,8 @@ impl Cells {
         occupation
     }
 
-    /// The computing time of each rank, and the present owner of each cell. `time` is the time of this rank,
-    /// ns. Collective.
+    /// The computing time of each rank, and the present owner of each cell. `time` is the computing time of
+    /// this rank, ns. Collective.
     pub fn loads(&self, comm: &dyn Communicator, points: &[Point], time: u64) -> Loads {
         let mut owners = vec![-1.0; self.count()];
         for point in points {

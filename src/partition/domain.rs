@@ -1,4 +1,4 @@
-//! The local points of a rank, owned points before ghosts, and the halo plan.
+//! The local points of a rank (owned points first, then ghosts) and the halo plan.
 
 use crate::comm::Halo;
 use crate::points::Point;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 
 use super::cells::{Cells, Loads};
 
-/// Largest total weight, because METIS sums weights in 32-bit integers.
+/// Upper limit of the total weight. METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
 /// Additional factor on the weight of graph edges between cells at different x positions. Cuts between such
@@ -16,8 +16,8 @@ const ALONG_X: f64 = 1.5;
 /// Owner of cells without points.
 pub const NO_OWNER: u32 = u32::MAX;
 
-/// With fewer cells per part than this, recursive bisection is used, because the k-way method would leave
-/// parts empty.
+/// Number of cells per part below which recursive bisection is used. With so few cells, the k-way method
+/// would leave parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
 /// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points. If the number
@@ -261,7 +261,8 @@ mod tests {
     }
 
     /// Points in a dense region have more bonds, and therefore take more time. The weights must not count
-    /// both this time and the bonds. In this test, both ranks take the same time, so few cells must move.
+    /// the density twice: once in the number of bonds, and again in the time. In this test, both ranks take
+    /// the same time, so few cells must move.
     #[test]
     fn dense_regions_count_once() {
         let mut plate = Plate::new();

@@ -20,9 +20,9 @@ pub struct Pen<'a> {
 
 /// A line with ticks, labels and a caption.
 pub struct Ruler<'a> {
-    /// The end with the low numbers, in pixels.
+    /// Position of the end with the low numbers, in pixels.
     pub from: [f64; 2],
-    /// The end with the high numbers, in pixels.
+    /// Position of the end with the high numbers, in pixels.
     pub to: [f64; 2],
     /// Unit vector towards the side of the labels.
     pub outward: [f64; 2],

@@ -1,9 +1,10 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
-//! These cells are the Voronoi cells of the points. The volume of a point limits the distance between the
-//! point and the border of its cell, so borders, holes and open cracks of a body stay visible. This limit is
-//! larger at pixels that have points on all sides, so the cells close the gaps between points. A slice shows
-//! the sections of the 3-D Voronoi cells with the plane of the slice.
+//! These cells are the Voronoi cells of the points. The distance between a point and the border of its cell
+//! has an upper limit, which follows from the volume of the point. Therefore the outline, holes and open
+//! cracks of a body stay visible. This limit is larger at pixels that have points on all sides, so the cells
+//! close the gaps between points. A slice shows the sections of the 3-D Voronoi cells with the plane of the
+//! slice.
 
 use super::canvas::{Colour, Image};
 use super::layout::Layout;
@@ -13,7 +14,8 @@ use super::scene::Mark;
 
 /// Largest distance between a point and a pixel of its cell, divided by the size of the point. The size is
 /// the edge of a cube with the volume of the point. In 2-D, the size is the edge of a square with the area of
-/// the point. In comparison, the border of a square lattice cell is 0.5 to 0.71 sizes away from the point.
+/// the point. For comparison, the distance from a lattice point to the border of its square cell is 0.5 to
+/// 0.71 times the size.
 const REACH: f64 = 0.6;
 
 /// Limit that replaces [`REACH`] at pixels between points. Such a pixel has points on all sides within this
@@ -61,7 +63,6 @@ struct Point {
     colour: Colour,
 }
 
-/// A pixel of the frame.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
     /// Square of the distance from the nearest point so far, pixels².
@@ -160,8 +161,8 @@ fn eighth(along: f64, down: f64) -> u32 {
 }
 
 /// Test whether a pixel has points on all sides. This is true if each group of three adjacent eighths of a
-/// full turn contains at least one point. Every half turn then has a point, because a half turn contains
-/// three whole eighths.
+/// full turn contains at least one point. In this case, every half turn also contains a point, because
+/// every half turn contains at least three whole adjacent eighths.
 fn is_surrounded(directions: u8) -> bool {
     let empty = !directions;
     empty & empty.rotate_left(1) & empty.rotate_left(2) == 0

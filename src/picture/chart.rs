@@ -67,8 +67,8 @@ pub struct Label<'a> {
 pub struct Series {
     /// Name for the legend.
     pub name: String,
-    /// Points of the curve. A point that is not finite breaks the curve, and an isolated point is drawn as a
-    /// marker.
+    /// Points of the curve. A point that is not finite breaks the curve into parts. A part with only one
+    /// point is drawn as a marker.
     pub points: Vec<[f64; 2]>,
 }
 

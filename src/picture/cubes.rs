@@ -34,14 +34,14 @@ const LEAST_COSINE: f64 = 1e-3;
 /// Painter of cubes in an orthographic view, with a depth buffer: each pixel shows the nearest cube.
 pub struct Cubes<'a> {
     image: &'a mut Image,
-    /// Three edges of a cube with an edge of 1, as vectors in the picture (to the right and down). The edges
-    /// are parallel to x, y and z, and start at the corner nearest to the viewer.
+    /// Three edges of a unit cube, as vectors in the picture. The components of a vector point to the right
+    /// and down. The edges are parallel to x, y and z, and start at the corner nearest to the viewer.
     edges: [[f64; 2]; 3],
     /// Decrease of depth along each of these edges: the cosine of the angle between the direction of view and
     /// the axis.
     cosines: [f64; 3],
-    /// Increase of the edges along x, y and z from a cube to the larger cube behind it, divided by the edge
-    /// of the cube.
+    /// A larger cube is painted behind each cube, see [`BACKING`]. Along x, y and z: edge of the larger cube
+    /// minus edge of the cube, divided by the edge of the cube.
     growth: [f64; 3],
     /// Surface that each pixel shows.
     surfaces: Vec<Surface>,
@@ -52,7 +52,6 @@ pub struct Cubes<'a> {
 struct Surface {
     /// Depth times the scale of the picture, pixels. A larger depth is nearer to the viewer.
     depth: f32,
-    /// Brightness of the face.
     brightness: f32,
     /// Edge of the cube, pixels.
     edge: f32,

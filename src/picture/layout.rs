@@ -138,7 +138,7 @@ impl Layout {
         ]
     }
 
-    /// Return the position in the drawing plane (m) of pixel coordinates.
+    /// Return the position in the drawing plane (m) that has the given pixel coordinates.
     pub fn position(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         [
             self.origin[0] + (column - self.columns[0]) / self.scale,

@@ -1,4 +1,4 @@
-//! Painting of points as squares or, in orthographic views, as cubes; colours of values.
+//! Painting of points as squares or, in orthographic views, as cubes. Also the mapping of values to colours.
 
 use super::canvas::{Colour, Image};
 use super::colours::ColourMap;

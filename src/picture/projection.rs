@@ -18,7 +18,7 @@ pub enum Projection {
 pub struct Camera {
     /// Unit vector to the right of the picture.
     across: [f64; 3],
-    /// Unit vector up the picture.
+    /// Unit vector towards the top of the picture.
     up: [f64; 3],
     /// Unit vector from the body to the camera.
     to_camera: [f64; 3],
@@ -118,7 +118,7 @@ impl Projection {
         }
     }
 
-    /// Return the coordinates of a position in the drawing plane, m: the horizontal and the vertical one.
+    /// Project a position onto the drawing plane. Return the horizontal and the vertical coordinate, m.
     pub fn project(self, position: [f64; 3]) -> [f64; 2] {
         match self {
             Self::Strip => [position[0], 0.0],

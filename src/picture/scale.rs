@@ -142,7 +142,7 @@ const PREFIXES: [(i32, &str); 10] = [
 /// Unit symbols that take a prefix. Other symbols have a prefix already (kg, MPa) or take none (°C, %).
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
-/// Return the exponent of a power of ten that suits numbers up to `magnitude`, and the unit with this power.
+/// Choose a power of ten for numbers up to `magnitude`. Return its exponent, and the unit with this power.
 /// The power becomes a prefix, as in "MPa". If the unit takes no prefix, the power becomes a factor, as in
 /// "×10⁻³ m²". A unit that takes no prefix stays as it is if `magnitude` is from 0.01 to 10⁴.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
@@ -175,7 +175,6 @@ fn takes_prefix(unit: &str) -> bool {
     PREFIXABLE.contains(&symbol) && (rest.is_empty() || rest.starts_with(['/', '·', ' ', '*']))
 }
 
-/// Format an integer in superscript digits.
 fn superscript(number: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     number

@@ -18,7 +18,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Return the index of the coordinate in a position.
+    /// Return the index of this axis in a position: 0 for x, 1 for y, 2 for z.
     pub fn index(self) -> usize {
         self as usize
     }
@@ -100,7 +100,7 @@ pub struct Scene<'a> {
     /// Line of small text below the title; may be empty.
     pub note: &'a str,
     /// Drawn box, for example a common box of a series of pictures. Points outside the box are omitted.
-    /// `None` for the box of the points.
+    /// With `None`, the picture shows the box that contains all drawn points.
     pub bounds: Option<Bounds>,
 }
 
@@ -277,8 +277,8 @@ fn index_limit(points: usize) -> Result<u32> {
 /// Fraction of the vectors whose arrows are never cut. These vectors are the shortest ones.
 const WHOLE_ARROWS: f64 = 0.995;
 
-/// Largest ratio L/w at which no arrow is cut. L is the length of the longest of all vectors, and w is the
-/// length of the longest vector whose arrow is never cut (see [`WHOLE_ARROWS`]).
+/// Largest ratio L/w at which no arrow is cut. L is the length of the longest vector. The arrows of the
+/// shortest vectors are never cut (see [`WHOLE_ARROWS`]); w is the length of the longest of these vectors.
 const LONG_ARROWS: f64 = 4.0;
 
 /// The drawn points of a scene, in painting order.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::error::excerpt;
 
-/// Names of the columns of the coordinates, in the order of the directions.
+/// Names of the coordinate columns, in the order of the axes.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
 
 /// Accepted names of the column of volumes.
@@ -210,7 +210,8 @@ pub fn is_comment(row: &str) -> bool {
     row.trim_start().starts_with(['#', '/', '*'])
 }
 
-/// Return the names of a heading; `None` if the row contains a number or an empty entry.
+/// Return the names of the columns if the row is a heading; `None` if the row contains a number or an empty
+/// entry.
 fn names(row: &str) -> Option<Vec<String>> {
     let row = row.strip_prefix(PERILAB_HEADER).unwrap_or(row);
     let entries = entries(row).ok()?;
@@ -236,7 +237,7 @@ pub fn entries(row: &str) -> Result<Vec<&str>, String> {
     Ok(entries)
 }
 
-/// Test whether an entry is a number, possibly mistyped or in quotes.
+/// Test whether an entry is a number or looks like a mistyped number. Quotes around the entry are ignored.
 fn resembles_number(entry: &str) -> bool {
     let bare = entry.trim_matches(['"', '\'']);
     let digits = bare.trim_start_matches(['+', '-', '.']);

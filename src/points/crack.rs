@@ -72,7 +72,7 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
 }
 
 /// Test with bounding boxes whether a bond can cross the crack. The bond starts at `position` (m) and is at
-/// most `length` (m) long. The result may be true for bonds that do not cross.
+/// most `length` (m) long. The result may also be true for a bond that does not cross the crack.
 pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     let (corners, width) = match crack {
         Crack::Segment { from, to, width } => ([*from, *to, *from, *to], width),
@@ -121,8 +121,9 @@ fn between_faces(
     within(bond, height, [-0.5, 0.5])
 }
 
-/// Return the part of a segment on which a linear coordinate lies in an interval; `None` if there is no such
-/// part. The interval extends from low − [`RIM`] to high + [`RIM`]. The difference high − low is 1.
+/// Return the part of a segment on which `coordinate` lies in an interval; `None` if there is no such part.
+/// `coordinate` is a linear function of the position. The interval extends from low − [`RIM`] to
+/// high + [`RIM`]. The difference high − low is 1.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,

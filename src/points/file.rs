@@ -1,8 +1,8 @@
 //! Points from a text file; each rank reads a part of the bytes.
 //!
 //! A row is `x [y [z]] volume block`, unless the deck or a heading names other columns. Entries are separated
-//! by commas, semicolons or white space. Empty rows, comments and a heading are skipped. A heading is a first
-//! row without any number.
+//! by commas, semicolons or white space. Empty rows, comments and a heading are skipped. The first row that
+//! is neither empty nor a comment is a heading if it contains neither a number nor an empty entry.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ const PIECE: u64 = 1 << 16;
 /// Number of pieces that are sampled from a long file.
 const SAMPLED: u64 = 256;
 
-/// Largest accepted absolute coordinate, m. This limit prevents an overflow of squared distances.
+/// Largest accepted absolute value of a coordinate, m. This limit prevents an overflow of squared distances.
 const FARTHEST: f64 = 1e30;
 
 /// Return the columns that the deck names for the file of the body with index `user`; `None` if the deck
@@ -44,7 +44,7 @@ fn columns<'a>(bodies: &[BodyPoints<'a>], user: usize) -> Option<&'a Columns> {
     }
 }
 
-/// Find the layout of a file, for points with this number of coordinates.
+/// Find the layout of a file whose points have `dimension` coordinates.
 ///
 /// # Errors
 /// Same as for [`layout`].
@@ -197,8 +197,8 @@ mod tests {
     use crate::elastic::Isotropic;
     use crate::problem::{Law, Material, Shape};
 
-    /// Read a 2-D file. Return the x coordinates of its points by id, or the error. Asserts that the result
-    /// is equal on any number of ranks.
+    /// Read a 2-D file. Return the x coordinates of its points in the order of the rows, or the error.
+    /// Asserts that the result is equal on any number of ranks.
     fn read(name: &str, text: &[u8]) -> std::result::Result<Vec<f64>, String> {
         let folder = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();

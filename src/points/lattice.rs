@@ -108,7 +108,7 @@ impl<'a> LatticeBody<'a> {
     }
 
     /// Return the grid index of a position (m): the number of steps from the centre of cell 0, in each
-    /// direction. A step is 1/`steps` of an edge.
+    /// direction. A step is the edge of a cell, divided by `steps`.
     pub fn index_at(&self, position: [f64; 3], steps: f64) -> [i64; 3] {
         std::array::from_fn(|k| {
             if k < self.dimension {

@@ -18,8 +18,8 @@ use super::{BodyPoints, Point, check_no_empty_body, file, mesh};
 /// meshes. The result is the same on any number of ranks.
 ///
 /// # Errors
-/// If a file or mesh of a wanted body is unreadable or invalid. If any body that uses the file or mesh of a
-/// wanted body has no points. The error is the same on all ranks.
+/// If a file or mesh of a wanted body is unreadable or invalid. If this file or mesh has no points for one of
+/// the bodies that use it. The error is the same on all ranks.
 pub fn mean_spacings(
     bodies: &[BodyPoints],
     dimension: Dimension,

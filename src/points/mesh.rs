@@ -27,8 +27,8 @@ const NO_VOLUME: &str = "only single-node elements without a volume; sphere elem
 /// Maximum number of corners of an element.
 const MOST_CORNERS: usize = 8;
 
-/// Largest distance of an element from the plane of a plane mesh, or from the line of a 1-D mesh, relative to
-/// the size of the element.
+/// Tolerance for the elements of 2-D and 1-D meshes: largest distance of a node from the plane or line of the
+/// mesh, divided by the size of the element.
 const PLANE_SLACK: f64 = 1e-6;
 
 /// A body whose points come from a mesh.
@@ -434,8 +434,8 @@ fn solid(
     Ok((size * dimension.out_of_plane_measure(), measure.centroid))
 }
 
-/// Check that an element lies in the line or plane of the problem, which contains the position `first`.
-/// `nodes` are the positions of the nodes of the element. All positions are in the unit of the mesh.
+/// Check that an element lies in the line or plane of the problem. This line or plane contains the position
+/// `first`. `nodes` are the positions of the nodes of the element. All positions are in the unit of the mesh.
 fn lies_in_plane(
     nodes: &[[f64; 3]],
     dimension: usize,

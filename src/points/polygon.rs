@@ -48,12 +48,12 @@ impl Polygon {
         polygon
     }
 
-    /// For each axis, compute the total length of the edges in the direction of the axis, divided by the
-    /// extent of the polygon in this direction. Build the index along the axis with the smaller ratio.
+    /// For each axis, divide the sum of the extents of all edges along the axis by the extent of the polygon
+    /// along the axis. Build the index along the axis with the smaller ratio.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
-        // For each axis, the total length of the edges in the direction of this axis, divided by the extent
-        // of the polygon in this direction.
+        // For each axis, the sum of the extents of all edges along the axis, divided by the extent of the
+        // polygon along the axis.
         let turns = [0, 1].map(|k| {
             let all: f64 = (0..count)
                 .map(|edge| {
@@ -92,8 +92,9 @@ impl Polygon {
         (self.lower, self.upper)
     }
 
-    /// Test a position by the even-odd rule. A position at most |tolerance| (m) away from an edge counts as
-    /// inside if the tolerance is positive, otherwise as outside.
+    /// Test by the even-odd rule whether a position is inside. The rule is not used for a position at most
+    /// |tolerance| (m) away from an edge. Such a position is inside if the tolerance is positive, and outside
+    /// if the tolerance is 0 or negative.
     pub fn contains(&self, position: [f64; 2], tolerance: f64) -> bool {
         let (along, across) = (self.axis, 1 - self.axis);
         let at = position[along];
@@ -183,7 +184,7 @@ mod tests {
     }
 
     /// Assert that [`Polygon::contains`], which uses the index of the edges, agrees with [`by_all_edges`].
-    /// The tested positions form a half-unit grid. They include vertices and positions on edges.
+    /// The tested positions form a grid with the spacing 0.5. They include vertices and positions on edges.
     #[track_caller]
     fn assert_same(vertices: &[[f64; 2]], tolerance: f64) {
         let polygon = Polygon::new(vertices.to_vec());

@@ -1,5 +1,5 @@
-//! The candidate cells of a lattice: cells whose centres can lie within a shape. Their order is x fastest,
-//! then y, then z.
+//! The candidate cells of a lattice: cells whose centres can lie within a shape. The cells are ordered so
+//! that x varies fastest, then y, then z.
 //!
 //! If the shape is a union of distant parts, the cells between the parts are excluded.
 

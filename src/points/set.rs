@@ -8,7 +8,8 @@ use super::shape;
 const TOLERANCE: f64 = 1e-9;
 
 /// Test whether a point belongs to a set. The point has the given id, reference position (m) and body index.
-/// `TOLERANCE` is multiplied by `horizon` (m).
+/// `horizon` is the horizon of the grid, m. The tolerance of membership in a shape is `TOLERANCE` ×
+/// `horizon`.
 pub fn contains(set: &Set, horizon: f64, id: u64, position: [f64; 3], body: usize) -> bool {
     match &set.selector {
         Selector::All => true,

@@ -105,8 +105,11 @@ pub type Row = (u64, Vec<f64>);
 /// Read this rank's part of the rows. `total` is the number of points. Collective.
 ///
 /// # Errors
-/// If the file cannot be read, a row is invalid, a row has an id that no point has, or a file without ids has
-/// more rows than there are points. The message gives the file, and the line of a wrong row.
+/// - If the file cannot be read.
+/// - If a row is invalid, or has an id that no point has.
+/// - If a file without ids has more rows than there are points.
+///
+/// The message gives the file, and the line of a wrong row.
 pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<Vec<Row>> {
     let columns = &file.columns;
     let mut rows = Vec::new();

@@ -170,7 +170,8 @@ pub struct InterfacePair {
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
     /// Bonds break by the damage laws of both bodies. If the horizons are equal, a bond breaks at the smaller
-    /// of the two thresholds. Otherwise, both thresholds determine the threshold of the bond.
+    /// of the two thresholds. Otherwise, the threshold of the bond depends on both thresholds and on both
+    /// horizons.
     OfBodies,
     /// Bonds never break.
     Unbreakable,
@@ -253,8 +254,9 @@ pub struct Damage {
     pub alpha: f64,
     /// Scatter of the strength of the points; `None` without scatter.
     pub weibull: Option<Weibull>,
-    /// Dependence of the fracture energy on the direction of the crack; `None` if all directions are equal.
-    /// Otherwise, `toughness` is the fracture energy of cracks along the axis a of [`ToughnessByDirection`].
+    /// Dependence of the fracture energy on the direction of the crack; `None` if the fracture energy is the
+    /// same in all directions. Otherwise, `toughness` is the fracture energy of cracks along the axis a of
+    /// [`ToughnessByDirection`].
     pub direction: Option<ToughnessByDirection>,
     /// Indices of the no-failure sets, whose bonds never break.
     pub no_failure: Vec<usize>,
@@ -410,7 +412,7 @@ pub enum Selector {
         ids: Vec<u64>,
         /// The file that contains the ids; `None` if the deck contains them.
         file: Option<IdFile>,
-        /// Span of the largest id in the deck, or of the name of the file that contains the ids.
+        /// Span of the largest id. If a file contains the ids, span of the name of this file in the deck.
         largest: Range<usize>,
     },
     /// Points of a group of elements or nodes in the meshes.

@@ -33,7 +33,7 @@ pub enum CheckpointRule {
 /// Schedule and threshold for the rebalancing of points between ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
-    /// Number of steps between comparisons of rank times.
+    /// Number of steps between two comparisons of the computing times of the ranks.
     pub every_steps: u64,
     /// Ratio of the time of the slowest rank to the mean time of all ranks, above which points are
     /// rebalanced.
@@ -84,7 +84,7 @@ impl Output {
 pub struct History {
     /// Interval of rows; `None` for the default of [`Problem::row_interval`](super::Problem::row_interval).
     pub every: Option<Interval>,
-    /// Sets whose reaction force is recorded, by component.
+    /// Sets whose reaction force is recorded. Each component of the force has its own column.
     pub reactions: Vec<Reaction>,
     /// Sets whose reaction force along a direction is recorded.
     pub support_forces: Vec<SupportForce>,
@@ -178,7 +178,7 @@ pub struct Front {
     pub line: Line,
     /// Length of the line, m.
     pub length: f64,
-    /// Largest distance of the evaluated points from the line, m.
+    /// Maximum distance from the line at which points are evaluated, m.
     pub radius: f64,
     /// Field whose values are compared with the threshold.
     pub field: Field,
@@ -411,13 +411,14 @@ impl Problem {
         [&self.output].into_iter().chain(&self.further_outputs)
     }
 
-    /// Return the further outputs that contain the number of bonds that have broken since their last output.
+    /// Return the further outputs that contain the number of newly broken bonds, see
+    /// [`Output::counts_newly_broken`].
     pub fn further_counts(&self) -> impl Iterator<Item = &Output> {
         let further = self.further_outputs.iter();
         further.filter(|output| output.counts_newly_broken())
     }
 
-    /// Return the interval of rows of the history.
+    /// Return the interval between rows of the history.
     pub fn row_interval(&self) -> Interval {
         let seconds = self.time.end / ROWS;
         let default = if self.is_quasi_static() {

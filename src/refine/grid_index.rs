@@ -13,8 +13,8 @@ pub(super) fn between(low: GridIndex, high: GridIndex) -> impl Iterator<Item = G
     })
 }
 
-/// The parents of an index, in spacings of the next coarser level. An index that lies half-way between
-/// coarser indices in 0, 1, 2 or 3 directions has 1, 2, 4 or 8 parents, respectively.
+/// The parents of an index. The results are grid indices in spacings of the next coarser level. An index that
+/// lies half-way between coarser indices in 0, 1, 2 or 3 directions has 1, 2, 4 or 8 parents, respectively.
 pub(super) fn parents(index: GridIndex) -> impl Iterator<Item = GridIndex> {
     let low = index.map(|x| x.div_euclid(2));
     let high = index.map(|x| (x + 1).div_euclid(2));

@@ -16,7 +16,7 @@ pub struct GridIndexSet {
     words: FxHashMap<GridIndex, u64>,
 }
 
-/// The word that contains an index, and the bit of the index.
+/// Return the key of the word that contains an index, and the number of the bit that represents the index.
 pub(super) fn split(index: GridIndex) -> (GridIndex, usize) {
     let [x, y, z] = index.map(|x| x.rem_euclid(EDGE) as usize);
     let edge = EDGE as usize;

@@ -137,8 +137,8 @@ impl<'a> Grids<'a> {
 
     /// Coarsen nodes, except permanent nodes and parents of refined nodes.
     ///
-    /// Return each removed node once, finest level first: body, canonical level, and index in spacings of the
-    /// finest level.
+    /// Return the keys of the removed nodes, finest level first and without duplicates. A key contains the
+    /// body, the canonical level, and the grid index in spacings of the finest level.
     pub fn coarsen(&mut self, keys: &[NodeKey]) -> Vec<NodeKey> {
         let mut coarse: Vec<NodeKey> = keys.to_vec();
         // Finer nodes come first, because they block the coarsening of their parents.
@@ -234,7 +234,7 @@ impl<'a> Grids<'a> {
     }
 
     /// Apply two lists that [`Self::state`] returned: refine the nodes of the first list, and suppress the
-    /// nodes of the second list. Return whether any node of the first list was not refined before.
+    /// nodes of the second list. Return true if at least one node of the first list was not refined before.
     pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
@@ -343,8 +343,9 @@ impl<'a> Grids<'a> {
         coarse
     }
 
-    /// For each level from 1 on, the test for coarser nodes within the horizon. The result is empty if
-    /// horizons are not enlarged at interfaces.
+    /// Return one test for each level from 1 on. The test of a level checks whether a node of this level has
+    /// nodes of coarser levels within its horizon. The result is empty if horizons are not enlarged at
+    /// interfaces.
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<NearCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
@@ -397,7 +398,8 @@ impl<'a> Grids<'a> {
         Some(grid.pattern.changed())
     }
 
-    /// The cell of level 0 that contains the position `index`, counted in spacings of the finest level.
+    /// The cell of level 0 that contains the position `index`. The position is in spacings of the finest
+    /// level.
     pub fn cell_of(&self, index: GridIndex) -> GridIndex {
         index.map(|x| x >> self.finest)
     }

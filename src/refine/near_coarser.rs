@@ -4,15 +4,16 @@ use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
-/// Test whether a node of a given level has coarser nodes within a given distance.
+/// A test for the nodes of a given level: whether nodes of coarser levels lie within a given distance of a
+/// node.
 pub struct NearCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
-    /// Indices at which the refinement of nodes of coarser levels adds nodes to the grid of level 0, in
-    /// spacings of the level. A node exists at such an index only if [`Pattern::is_possible`] holds there.
+    /// Grid indices in spacings of `level`. At these indices, the refinement of coarser nodes adds nodes to
+    /// the grid of level 0. A node exists at such an index only if [`Pattern::is_possible`] holds there.
     finer: GridIndexSet,
-    /// Bits of a word whose indices lie on the grid of level 0. These bits are the same for all words that
-    /// contain indices of this grid.
+    /// In a word that contains indices of the grid of level 0: the bits of these indices. These bits are the
+    /// same in all such words.
     coarsest: u64,
     /// For each bit of a word, the words that contain indices near the index of the bit. An index is near if
     /// it lies within the given distance. Each of these words is stored as two values: its offset from the

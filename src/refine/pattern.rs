@@ -18,7 +18,8 @@ pub struct Node {
     pub has_cell_volume: bool,
 }
 
-/// The refined nodes of a body, by level. A node is stored as a grid index in spacings of its level.
+/// The refined nodes of a body, by level. A node is stored as a grid index. The unit of the index is the
+/// spacing of the node's level.
 ///
 /// - The arguments `body` of the methods are functions that test whether a level-0 cell belongs to the body.
 /// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level, except
@@ -135,7 +136,8 @@ impl Pattern {
         self.exists_if_possible(level, index) && self.is_possible(body, level, index)
     }
 
-    /// Test whether a node exists at an index of a level, given that a node is possible at this index.
+    /// Test whether a node exists at an index of a level. The result is valid only if a node is possible at
+    /// this index ([`Self::is_possible`]).
     fn exists_if_possible(&self, level: u32, index: GridIndex) -> bool {
         let (level, index) = canonical(level, index);
         level == 0 || {

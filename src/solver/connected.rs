@@ -1,4 +1,5 @@
-//! Pieces: sets of points that chains of intact bonds connect, across ranks.
+//! Pieces: sets of points that are connected by chains of intact bonds. A piece can contain points of several
+//! ranks.
 
 use crate::comm::total;
 

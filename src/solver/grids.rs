@@ -11,8 +11,8 @@ use crate::points::Point;
 use crate::points::bins::Bins;
 use crate::problem::{FamilyRule, Kind, PointSource, Problem, Quadrature};
 
-/// Tolerance as a fraction of a cell's edge: for points that must lie at cell centres, and for grids that
-/// must coincide. Also, two coordinates count as equal if their difference is at most this fraction of the
+/// Tolerance for points that must lie at cell centres and for grids that must coincide, as a fraction of the
+/// edge of a cell. Also, two coordinates count as equal if their difference is at most this fraction of the
 /// length of the longest bond.
 const ON_GRID: f64 = 1e-6;
 
@@ -22,7 +22,7 @@ const FARTHEST: f64 = 1e15;
 /// Largest accepted relative difference between the volume of a point and the volume of a cell.
 const VOLUME: f64 = 1e-2;
 
-/// A grid: the centre of one cell, and the edges of all cells, m.
+/// A grid, given by the centre of one cell and the edge lengths of its cells, in m. All cells are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Cells {
     centre: [f64; 3],

@@ -47,7 +47,6 @@ impl Progress {
 struct Words<'a>(&'a [u64]);
 
 impl<'a> Words<'a> {
-    /// Take the next `N` words.
     fn next<const N: usize>(&mut self) -> [u64; N] {
         let (words, rest) = self.0.split_first_chunk().expect("enough words");
         self.0 = rest;
@@ -63,7 +62,7 @@ impl<'a> Words<'a> {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Encode the progress of the run, which does not include point data.
+    /// Encode the progress of the run as words. The progress does not include point data.
     pub fn progress_words(&self) -> Vec<u64> {
         let mut words = self.progress_without_factors();
         words.extend(self.progress.load_factors.words());

@@ -398,8 +398,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(bond_update);
     }
 
-    /// Same as [`Self::evaluate`], after [`Part::write_bond_inputs`] has been called for all parts of the
-    /// points.
+    /// Evaluate the internal forces from the bond inputs. The caller must have called
+    /// [`Part::write_bond_inputs`] for all parts of the points. Collective.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let is_quasi_static = self.is_quasi_static();
         let longest = self.longest_next_step();
@@ -489,8 +489,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Copy from `before` the data that a saved state does not contain. `before` is the same run before its
-    /// points were redistributed or refined.
+    /// Copy the data that a saved state does not contain. The source of the copy, `before`, is the same run
+    /// before its points were redistributed or refined.
     pub(super) fn take_over(&mut self, before: &Self) {
         self.times = before.times;
         self.bad = before.bad;
@@ -508,8 +508,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Of the owned points whose motion, force or reaction is not finite, return the one with the smallest
-    /// id. The step and the time of the returned [`BadPoint`] are those of `clock`.
+    /// Return the point with the smallest id among the owned points whose motion, force or reaction is not
+    /// finite. The step and the time of the returned [`BadPoint`] are those of `clock`.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -626,8 +626,8 @@ fn starts_deformed(problem: &Problem) -> bool {
 }
 
 /// Break the bonds that cross a pre-crack. Return the number of these bonds for each pre-crack. The test
-/// starts from the end with the lower id. Both ends of a bond, also on different ranks, therefore get the
-/// same result.
+/// starts from the end with the lower id. Its result is therefore the same for both ends of a bond, even if
+/// the ends are on different ranks.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

@@ -56,7 +56,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
     }
 
-    /// A clock with the expected number of steps of the whole run, if no bond breaks.
+    /// Clock of the whole run, with the number of steps that is expected if no bond breaks.
     pub fn expected_clock(&self) -> Clock {
         match &self.stages.all[..] {
             [stage] if stage.time.adaptive.is_none() => self.clock,
@@ -105,8 +105,8 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// Set the velocities of supported points at the start of a stage. A support that changes the velocity of
     /// a point exerts an impulse. The work of this impulse equals the change of kinetic energy and is added
-    /// to the external work. `density_ratio` is the ratio of the present density to the density at the
-    /// impulse. Returns whether the velocities and reactions of supported points are finite.
+    /// to the external work. The density at the impulse is the present density divided by `density_ratio`.
+    /// Returns whether the velocities and reactions of supported points are finite.
     fn begin_supports(&mut self, density_ratio: f64) -> bool {
         let squares = |velocity: &[Vec<f64>; D], point: usize| -> f64 {
             velocity.iter().map(|column| column[point].powi(2)).sum()
@@ -180,7 +180,6 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Scale the densities of the blocks for the present stage.
     pub(super) fn scale_density(&mut self) {
         let scale = self.time_rule().density_scale;
         for (density, block) in self.model.density.iter_mut().zip(self.problem.blocks()) {

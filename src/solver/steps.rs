@@ -9,12 +9,12 @@ use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time
 use super::motion::Clock;
 use super::motion::clock::steps_to;
 
-/// Maximum number of steps of a stage. Much larger numbers are not exact in floating point. With
-/// that many steps, a step could be so short that adding it to the time does not change the time.
+/// Maximum number of steps of a stage. A much larger number of steps would not be exact in floating point.
+/// The steps could also be so short that adding a step to the time would not change the time.
 const MOST_STEPS: f64 = 1e15;
 
-/// Return the length of the first step of each stage (s), and the number of steps of the stage if no bond
-/// breaks. `stable` is the stable step (s) for the density of the materials, without `density_scale`. An
+/// For each stage, return the length of the first step (s), and the number of steps that the stage has if no
+/// bond breaks. `stable` is the stable step (s) for the density of the materials, without `density_scale`. An
 /// automatic step divides the stage evenly, unless `[time.adaptive] largest` limits the step.
 ///
 /// # Errors
@@ -40,8 +40,8 @@ pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
 }
 
 /// Return the length of the first step of a stage (s), and the number of steps of the stage if no bond
-/// breaks. `length` is the duration of the stage (s), and `stable` is the stable step with the density of the
-/// materials (s).
+/// breaks. `length` is the duration of the stage (s). `stable` is the stable step (s) for the density of the
+/// materials, without `density_scale`.
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
         if stable.is_infinite() {

@@ -22,8 +22,8 @@ const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 /// Bytes of a bond in a lattice, at each end: one bit, which is 1/8 byte.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
-/// Memory of a rank without points, bytes: for one rank without a launcher, and for several ranks, which
-/// need MPI buffers.
+/// Memory of a rank without points, bytes. The first entry is for one rank without a launcher. The second
+/// entry is for several ranks, which need MPI buffers.
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
@@ -64,9 +64,9 @@ pub struct Measured {
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Total memory of all ranks at the peak of the time loop (during an output, a checkpoint, a restart or a
-    /// contact search), without ghosts, bytes. The first entry is for runs on one rank, the second for runs
-    /// on several ranks.
+    /// Total memory of all ranks at the peak of the time loop, without ghosts, bytes. The peak occurs during
+    /// an output, a checkpoint, a restart or a contact search. The first entry is for runs on one rank, the
+    /// second for runs on several ranks.
     pub time_loop: [f64; 2],
     /// Disk space of each result. The first entry is the main result, including the history. The other
     /// entries are the further results.

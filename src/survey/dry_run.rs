@@ -1,4 +1,5 @@
-//! A dry run: points and bonds on one rank, without the time loop, for the figures of `check`.
+//! A dry run creates the points and bonds on one rank, and does not run the time loop. It computes figures
+//! for `check`.
 
 use std::time::{Duration, Instant};
 
@@ -33,7 +34,7 @@ pub struct DryRun {
     pub ghosts: f64,
     /// Memory and disk space.
     pub cost: Cost,
-    /// Stable step of the first stage, with the scaled density of this stage, s.
+    /// Stable step (s) of the first stage, for the scaled density of this stage.
     pub stable_step: f64,
     /// For each stage: length of the first time step (s), and number of steps if no bond breaks.
     pub steps: Vec<(f64, f64)>,
@@ -57,7 +58,7 @@ pub struct Seconds {
 /// measure the times of a force evaluation, a history row and the outputs.
 ///
 /// # Errors
-/// Same as for a run before its first step.
+/// The same errors that a run can return before its first step.
 pub fn dry_run(problem: &Problem, ranks: u32, measure: bool) -> Result<DryRun> {
     match problem.dimension.count() {
         1 => dry_run_in::<1>(problem, ranks, measure),

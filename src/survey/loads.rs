@@ -13,8 +13,8 @@ use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
 /// Largest factor between the thickness of a loaded layer and the depth of the load. A warning is printed if
-/// the thickness is larger or smaller by more than this factor. The thickness is measured along the axes. For
-/// a curved layer one cell thick, the measured thickness is therefore up to π/2 cells.
+/// the thickness is larger or smaller than the depth by more than this factor. The thickness is measured
+/// along the axes. For a curved layer one cell thick, the measured thickness is therefore up to π/2 cells.
 const MAX_THICKNESS_RATIO: f64 = 1.8;
 
 /// Maximum number of points of a layer for which the thickness is checked.
@@ -207,10 +207,10 @@ fn layer<const D: usize>(
     }
 }
 
-/// Return the thickness of a layer and the cell edge, m. The thickness is the mean length of rows of adjacent
-/// cells, in the direction with the shortest rows. If the layer has points of several bodies, the result is
-/// that of the body for which thickness and cell edge differ most. `None` if there are no cells. Each entry
-/// of `cells` contains the index of a body and the three indices of a cell.
+/// Return the thickness of a layer and the cell edge, m. Along each axis, adjacent cells form rows. The
+/// thickness is the smallest of the mean row lengths along the axes. If the layer has points of several
+/// bodies, the result is that of the body for which thickness and cell edge differ most. `None` if there are
+/// no cells. Each entry of `cells` contains the index of a body and the three indices of a cell.
 fn thickness<const D: usize>(problem: &Problem, cells: &HashSet<[i64; 4]>) -> Option<[f64; 2]> {
     let of_body = |body: usize| {
         let own = || cells.iter().filter(move |cell| cell[0] == body as i64);

@@ -255,8 +255,9 @@ fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
 
-/// Warn of a refinement level whose horizon is shorter than the spacing of level 0. The points at opposite
-/// faces of a crack remain this spacing apart, so they have no bonds with each other, not even broken ones.
+/// Warn of a refinement level whose horizon is shorter than the spacing of level 0. If a crack exists before
+/// the refinement, the points at its opposite faces remain one spacing of level 0 apart. These points
+/// therefore have no bonds with each other, not even broken ones.
 fn refined_cracks(problem: &Problem, warnings: &mut Vec<Warning>) {
     let Some(refinement) = &problem.refinement else {
         return;
@@ -283,8 +284,8 @@ fn refined_cracks(problem: &Problem, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Warn of pre-cracks without width that pass through more points than there are dimensions. All of these
-/// points count as points on one side of the pre-crack, so the actual cut lies beside them.
+/// Warn of pre-cracks without width that pass through more than `D` points. All of these points count as
+/// points on one side of the pre-crack, so the actual cut lies beside them.
 fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let is_on = |crack: &Crack, point: &usize| {

@@ -1,4 +1,4 @@
-//! Check that a picture shows points. If the picture shows no points, the error gives the reason.
+//! Check that a picture shows points. Otherwise, return an error that gives the reason.
 
 use fissure::error::{Error, Result};
 use fissure::picture::{Axis, View};
@@ -8,8 +8,9 @@ use super::painter::Painter;
 
 impl Painter<'_> {
     /// Check that the options `--slice`, `--clip` and `--threshold` leave points to draw in at least one of
-    /// these outputs. With `--log`, at least one drawn value must be above 0. For each of these outputs, also
-    /// check that the result of `--minus` has an output at the same time with the same number of points.
+    /// the outputs `indices`. With `--log`, at least one drawn value must be above 0. For each of these
+    /// outputs, also check that the result of `--minus` has an output at the same time with the same number
+    /// of points.
     ///
     /// # Errors
     /// If a check fails, or if the result is damaged.
@@ -49,7 +50,8 @@ impl Painter<'_> {
 
     /// Return the error for an output of which no point is drawn. The options `--clip`, `--slice` and
     /// `--threshold` are applied in this order. The message names the option that leaves no points. It also
-    /// gives the range of positions or values of the points to which this option was applied.
+    /// describes the points that remained before this option was applied. It gives the range of their
+    /// positions or, for `--threshold`, of their values.
     fn nothing_drawn(&self, index: usize) -> Result<Error> {
         let none = [f64::INFINITY, f64::NEG_INFINITY];
         let include = |ends: &mut [f64; 2], value: f64| {

@@ -42,8 +42,9 @@ pub fn number(text: &str, wanted: &str) -> Result<f64> {
 /// list is a time (s) or `last`. `path` is the path of the result, for the error message.
 ///
 /// # Errors
-/// If there is no output, if the text is wrong, or if a time is more than half an output interval before the
-/// first output or after the last output.
+/// - If there is no output.
+/// - If an entry of `text` is not allowed.
+/// - If a time is more than half an output interval before the first output or after the last output.
 pub fn choose_times(text: &str, path: &Path, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
         return Err(without_output(path));

@@ -5,7 +5,7 @@ use std::ops;
 use fissure::error::Result;
 use fissure::output::ResultReader;
 
-/// Number of points that are read at once, to limit the memory of a picture.
+/// Maximum number of points that are read at once. It limits the memory that is needed to draw a picture.
 const CHUNK: usize = 1 << 18;
 
 /// Largest difference of coordinates that count as equal, as a fraction of the extent of the body.
@@ -39,10 +39,11 @@ pub fn is_zero(result: &ResultReader, field: &str, index: usize) -> Result<bool>
 /// For each body, return whether its points are scattered (not on a lattice) at output `index`. The list is
 /// empty if the problem is 1-D or if the result has no outputs.
 ///
-/// The number of combinations of a body is the product of the numbers of different x, y and (in 3-D) z
-/// coordinates of its points. A body of n points is scattered if its number of combinations is above
-/// [`MOST_COMBINATIONS`] n^1.5. The number of combinations is about n for a lattice; for scattered points, it
-/// is n² in 2-D and n³ in 3-D. In 2-D, 16 points or fewer never count as scattered.
+/// The number of combinations of a body is n_x n_y in 2-D and n_x n_y n_z in 3-D. Here n_x, n_y and n_z are
+/// the numbers of different x, y and z coordinates of its points. A body of n points is scattered if its
+/// number of combinations is above [`MOST_COMBINATIONS`] n^1.5. The number of combinations is about n for a
+/// lattice; for scattered points, it is n² in 2-D and n³ in 3-D. In 2-D, 16 points or fewer never count as
+/// scattered.
 ///
 /// # Errors
 /// If the result is damaged.

@@ -199,7 +199,9 @@ pub fn is_csv(path: &Path) -> bool {
 /// number of the ignored line.
 ///
 /// # Errors
-/// If the file cannot be read or has no complete line, or a row does not have one number per column.
+/// - If the file cannot be read.
+/// - If the file has no complete line.
+/// - If a row does not have one number per column.
 pub fn read_csv(path: &Path) -> Result<(Vec<StoredColumn>, Option<usize>)> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| Error::input(format!("cannot read {}: {error}", path.display())))?;

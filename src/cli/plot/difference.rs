@@ -18,8 +18,8 @@ const SAME_TIME: f64 = 1e-9;
 pub struct Subtrahend {
     path: PathBuf,
     result: ResultReader,
-    /// Time (s) of each output of the minuend, and index of the subtrahend's output at the same time; `None`
-    /// if the subtrahend has no such output.
+    /// For each output of the minuend: its time (s), and the index of the subtrahend's output at this time.
+    /// The index is `None` if the subtrahend has no output at this time.
     outputs: Vec<(f64, Option<usize>)>,
 }
 
@@ -27,8 +27,8 @@ impl Subtrahend {
     /// Open the result that is subtracted from `minuend`.
     ///
     /// # Errors
-    /// If the file is not a result, if it lacks the field of the quantity, or if this field has another
-    /// number of components.
+    /// If the file is not a result, if it lacks the field of the quantity, or if the numbers of components of
+    /// this field and of the quantity differ.
     pub fn open(path: &Path, minuend: &ResultReader, quantity: &Quantity) -> Result<Self> {
         let path = result_file(path);
         let result = ResultReader::open(&path)?;

@@ -15,7 +15,7 @@ pub struct Clip {
     axis: Axis,
     /// True if the half space is below `position`, false if it is above.
     is_below: bool,
-    /// Coordinate along `axis` of the plane that bounds the half space, m.
+    /// Coordinate of the half space's boundary along `axis`, m.
     position: f64,
 }
 
@@ -63,7 +63,8 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Read the arguments of `--threshold`, such as `0.3:1`, `0.3:` or `:1`, and of `--threshold-field`.
+    /// Read the arguments of two options. `text` is the argument of `--threshold`, such as `0.3:1`, `0.3:` or
+    /// `:1`. `field` is the argument of `--threshold-field`.
     ///
     /// # Errors
     /// If the text is not LOW:HIGH, if both ends are open, if LOW is above HIGH, or if the field or component

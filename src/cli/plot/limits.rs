@@ -20,7 +20,7 @@ const DECADES: i32 = 6;
 /// Requested range of the colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
-    /// All values. If there are outliers, the values between the two [`PERCENTILES`].
+    /// All values if there are no outliers; otherwise the values between the two [`PERCENTILES`].
     Automatic,
     /// All values.
     All,
@@ -68,7 +68,7 @@ pub fn range_of(text: &str) -> Result<Range> {
 pub struct Limits {
     /// Values at the low and the high end of the colour bar.
     pub shown: [f64; 2],
-    /// Smallest and largest value.
+    /// Smallest and largest value before [`Cut`] excludes values.
     all: [f64; 2],
     cut: Cut,
 }
@@ -77,7 +77,7 @@ pub struct Limits {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Cut {
     Nothing,
-    /// Exclude values below the first percentile and above the second percentile.
+    /// Exclude values below the lower percentile and above the upper percentile.
     Percentiles([f64; 2]),
     /// Exclude values that are more than [`DECADES`] decades below the largest value.
     Decades,
@@ -85,9 +85,9 @@ enum Cut {
 
 impl Limits {
     /// Return the limits of `values` for the requested `range`; `None` if `values` is empty. For
-    /// [`Range::Values`], the limits are those of all values, because the painter applies the two numbers of
-    /// this range itself. For [`Range::Automatic`] and [`Range::Percentiles`], the limits are also those of
-    /// all values if the values at the low and the high percentile are equal.
+    /// [`Range::Values`], the limits are those of all values. The painter later replaces these limits by the
+    /// two numbers of [`Range::Values`]. If the values at the low and the high percentile are equal, the
+    /// limits for [`Range::Automatic`] and [`Range::Percentiles`] are also those of all values.
     pub fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);
@@ -142,8 +142,8 @@ impl Limits {
         self.cut != Cut::Nothing
     }
 
-    /// Return limits whose colour bar has 0 in its middle and includes all values of the colour bar of
-    /// `self`.
+    /// Return limits with a colour bar that has 0 in its middle. This colour bar includes all values of the
+    /// colour bar of `self`.
     pub fn symmetric(self) -> Self {
         let [low, high] = self.shown;
         let reach = low.abs().max(high.abs());

@@ -7,7 +7,7 @@ use fissure::output::StoredField;
 
 use super::choice::{choose_field, number};
 
-/// The values for which `--contours` requests lines of equal value.
+/// Argument of `--contours`: the number of contour values, or the contour values themselves.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contours {
     /// Number of contour values, which lie at equal distances on the colour bar.

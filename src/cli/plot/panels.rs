@@ -110,8 +110,8 @@ fn check_alike(painters: &[Painter]) -> Result<()> {
     Ok(())
 }
 
-/// Set the factor on the drawn displacements to the same value for all results: the smallest factor of the
-/// results that have displacements.
+/// Set the factor on the drawn displacements to the same value for all results. This value is the smallest
+/// factor of the results that have displacements.
 fn share_factor(painters: &mut [Painter]) {
     let displaced = painters.iter().filter(|painter| painter.is_displaced);
     let factors = displaced.map(|painter| painter.factor);

@@ -9,7 +9,8 @@ use crate::cli::file_error;
 /// A line through positions in the plane, m.
 pub type Line = Vec<[f64; 2]>;
 
-/// Read lines from a CSV file with columns `x` and `y` (m), named in the first row.
+/// Read the lines to draw from a CSV file. The first row of the file names the columns. The columns `x` and
+/// `y` (m) are required.
 ///
 /// Consecutive rows with the same entry in the column `branch` form a line. Without this column, all rows
 /// form one line.

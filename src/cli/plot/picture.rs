@@ -39,8 +39,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "AXIS=POSITION")]
     pub(super) slice: Option<String>,
 
-    /// Direction of the camera that looks at a solid: its angle from +x towards +y, and its angle above the
-    /// x-y plane, in degrees [default: -45,35.26].
+    /// Direction from a solid to the camera: its angle from +x towards +y, and its angle above the x-y plane,
+    /// in degrees [default: -45,35.26].
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION",
@@ -58,8 +58,8 @@ pub struct PictureArguments {
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
     pub(super) threshold: Option<String>,
 
-    /// Field whose values must be in the range of `--threshold`. A component or invariant may follow after a
-    /// colon, such as stress:xx [default: the drawn field and component].
+    /// Field whose values are compared with the range of `--threshold`. A component or invariant may follow
+    /// after a colon, such as stress:xx [default: the drawn field and component].
     #[arg(long, value_name = "NAME[:COMPONENT]", requires = "threshold")]
     pub(super) threshold_field: Option<String>,
 
@@ -106,8 +106,10 @@ pub struct PictureArguments {
 /// or all outputs.
 ///
 /// # Errors
-/// If the file is not a result, an argument is wrong, the field or component is missing, or a picture
-/// cannot be written.
+/// - If the file is not a result.
+/// - If an argument is wrong.
+/// - If the field or component is missing.
+/// - If a picture cannot be written.
 pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> Result<()> {
     let file = result_file(result);
     let result = ResultReader::open(&file)?;

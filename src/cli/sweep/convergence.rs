@@ -1,6 +1,7 @@
 //! Observed rates of convergence.
 
-/// Largest absolute rate of convergence that the search can find.
+/// Bound of the search for a rate of convergence p: only roots from −`LARGEST_RATE` to `LARGEST_RATE` are
+/// found.
 const LARGEST_RATE: f64 = 30.0;
 
 /// Number of bisections. They reduce the search interval below the round-off of [`LARGEST_RATE`].
@@ -10,8 +11,8 @@ const BISECTIONS: usize = 60;
 /// pair (h, f). h is a parameter such as the spacing. f is the value of a run, or `None` if the run has no
 /// value.
 ///
-/// - With a reference, |f − reference| ∝ h^p gives p from a row and the previous row.
-/// - Without a reference, f − f₀ ∝ h^p with unknown f₀ gives p from a row and the previous two rows.
+/// - With a reference, p follows from |f − reference| ∝ h^p at the row and the previous row.
+/// - Without a reference, p follows from f − f₀ ∝ h^p with unknown f₀ at the row and the previous two rows.
 pub fn rates(series: &[(f64, Option<f64>)], reference: Option<f64>) -> Vec<Option<f64>> {
     let rate = |row: usize| -> Option<f64> {
         match reference {

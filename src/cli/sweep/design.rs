@@ -88,7 +88,7 @@ pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
 /// Combinations of the values of all axes. An axis is a parameter or key with its values.
 pub struct Design {
     pub axes: Vec<Axis>,
-    /// For each row (combination), one index per axis. The index selects one of the values of the axis.
+    /// Each row is one combination. It contains one index per axis, which selects a value of the axis.
     pub rows: Vec<Vec<usize>>,
     zip: bool,
 }
@@ -98,7 +98,8 @@ impl Design {
     /// combines the k-th values of all axes; an axis with one value has this value in all rows.
     ///
     /// # Errors
-    /// If a name is given twice, or if zipped axes with several values have different numbers of values.
+    /// If a name is given twice. With `zip`, also if two axes with more than one value have different numbers
+    /// of values.
     pub fn new(axes: &[Axis], zip: bool) -> Result<Self> {
         for (number, axis) in axes.iter().enumerate() {
             if axes[..number].iter().any(|other| other.name == axis.name) {
@@ -148,7 +149,7 @@ impl Design {
         &self.axes[axis].values[row[axis]]
     }
 
-    /// Return the name of each axis and its value in a row.
+    /// Return the name of each axis, with the value of the axis in `row`, as text.
     pub fn assignments(&self, row: &[usize]) -> Vec<(String, String)> {
         let assignment = |axis: usize| {
             (
@@ -202,9 +203,10 @@ impl Design {
         number(self.value(row, axis))
     }
 
-    /// Return the index of the abscissa: the axis over which pictures are drawn and rates of convergence are
-    /// computed. With a `name`, it is the axis of this name. Without a `name`, it is the first axis with
-    /// several values that are all numbers; the result is `None` if no axis has such values.
+    /// Return the index of the abscissa. This axis of the sweep is the x axis of the pictures, and its values
+    /// are used to compute rates of convergence. With a `name`, the abscissa is the axis of this name.
+    /// Without a `name`, it is the first axis with several values that are all numbers; the result is `None`
+    /// if no axis has such values.
     ///
     /// # Errors
     /// If the named axis is missing, has one value, or has values that are not numbers.

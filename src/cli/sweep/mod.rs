@@ -74,8 +74,8 @@ pub struct SweepArguments {
     #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
     reference: Vec<Reference>,
 
-    /// Parameter on the horizontal axis of pictures; rates are computed over this parameter [default: the
-    /// first parameter with several values that are all numbers].
+    /// Parameter on the horizontal axis of pictures. Rates of convergence are computed over this parameter
+    /// [default: the first parameter with several values that are all numbers].
     #[arg(long, value_name = "NAME")]
     x: Option<String>,
 
@@ -144,7 +144,8 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
     design.rows.iter().zip(design.folders()).map(run).collect()
 }
 
-/// Run the combinations that `--rows` chooses, by default all. Without `--overwrite`, skip complete runs.
+/// Run the combinations that `--rows` selects, or all combinations if `--rows` is not given. Without
+/// `--overwrite`, skip complete runs.
 /// Write the table and pictures of all combinations.
 ///
 /// # Errors

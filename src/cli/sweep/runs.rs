@@ -78,8 +78,8 @@ impl Run {
     /// sweep nor a result. With `overwrite`, the folder may hold any run of a sweep.
     ///
     /// # Errors
-    /// If the folder holds a result that does not belong to a sweep. Without `overwrite`, also if the folder
-    /// holds another run of a sweep.
+    /// - If the folder holds a result that does not belong to a sweep.
+    /// - If the folder holds another run of a sweep, and `overwrite` is false.
     pub fn check(&self, overwrite: bool) -> Result<()> {
         let path = self.folder.join(DECK);
         match std::fs::read_to_string(&path) {
@@ -119,7 +119,7 @@ impl Run {
     }
 }
 
-/// The program that executes a run: this executable. If `--launcher` is given, its command starts this
+/// The program that executes a run: this executable. With `--launcher`, the given command starts this
 /// executable.
 pub struct Program<'a> {
     arguments: &'a SweepArguments,
@@ -155,16 +155,17 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// Execute the runs with the indices `due`, as many at a time as `--jobs` allows. Call `ended` with the
-    /// index, the state and the run time (s) of each run that is complete or failed. Return true if a signal
-    /// or a time limit stopped a run.
+    /// Execute the runs with the indices `due`, as many at a time as `--jobs` allows. When a run
+    /// is complete or has failed, call `ended` with its index, its state and its run time (s). Return true if
+    /// a signal or a time limit stopped a run.
     ///
-    /// A first SIGINT, SIGTERM or SIGUSR1 makes all runs write checkpoints and stop; another one more than
-    /// 1 s later kills the runs. SIGUSR2 makes all runs write checkpoints and continue.
+    /// The first SIGINT, SIGTERM or SIGUSR1 makes all runs write checkpoints and stop. Another of these
+    /// signals kills the runs if it arrives more than 1 s after the first. SIGUSR2 makes all runs write
+    /// checkpoints and continue.
     ///
     /// # Errors
     /// If signals cannot be received, a run cannot be started, a marker file cannot be created, or `ended`
-    /// fails. All running runs are then stopped.
+    /// fails. In these cases, the runs that are still in progress are stopped.
     pub fn run_all(
         &self,
         runs: &[Run],
@@ -324,7 +325,7 @@ fn words(status: ExitStatus) -> String {
     }
 }
 
-/// Send a signal to processes that this program has not yet waited for.
+/// Send a signal to all `processes`. This program must not have waited for any of them yet.
 fn kill(processes: &[Process], signal: i32) {
     for process in processes {
         // SAFETY: the call only sends a signal. The id belongs to the child: the system does not reuse an id

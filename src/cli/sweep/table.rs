@@ -22,7 +22,8 @@ pub struct Table<'a> {
     /// Whether rates are also computed for values without a reference. This is the case if the runs differ in
     /// resolution or `--x` is given.
     has_rates: bool,
-    /// Values by run and column; `None` for incomplete runs and for values that are not finite.
+    /// Values by run and column. The outer `None` stands for an incomplete run. The inner `None` stands for a
+    /// value that is not finite, and for each value of a history without rows.
     values: Vec<Option<Vec<Option<f64>>>>,
     /// States of the incomplete runs.
     states: Vec<&'static str>,
@@ -113,7 +114,8 @@ impl<'a> Table<'a> {
         self.values[row].as_ref()?[column]
     }
 
-    /// Return the columns of the table: values of the axes, state, and picked values with errors and rates.
+    /// Return the columns of the table: the values of each axis, the state of the runs, and each picked
+    /// value. The errors and the rates of convergence of a picked value follow in further columns.
     fn cells(&self) -> Vec<Cells> {
         let rows = 0..self.design.rows.len();
         let alike = |text: String| [text.clone(), text];

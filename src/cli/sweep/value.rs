@@ -103,8 +103,8 @@ impl Column {
         format!("{}:{}", self.pick_name(), self.name)
     }
 
-    /// Return the name of the value, such as `max_damage`. File names and column names of sweep.csv contain
-    /// this name.
+    /// Return the name of the value, such as `max_damage`. The file names of pictures contain this name. The
+    /// column names in sweep.csv also contain it.
     pub fn key(&self) -> String {
         format!("{}_{}", self.pick_name(), self.name)
     }
@@ -128,8 +128,8 @@ impl Column {
     }
 }
 
-/// Check that a history has the columns of all values. `columns` are the names and units of the columns of
-/// the history.
+/// Check that a history has all columns that `values` names. `columns` are the names and units of the columns
+/// of the history.
 ///
 /// # Errors
 /// If the column of a value is missing.

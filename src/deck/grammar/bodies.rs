@@ -15,8 +15,8 @@ pub struct Body {
     /// Name of the material.
     pub material: Text,
     /// Name of the damage law. Without a damage law, bonds within the body never break, except bonds of
-    /// `softening_pmb` and `fatigue_pmb`. Bonds to another body can break by the damage law of that body or
-    /// of the pair.
+    /// `softening_pmb` and `fatigue_pmb`. Bonds to another body can break by the damage law of that body, or
+    /// by the damage law in `[interface.pair.NAME]` for the two bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
@@ -82,7 +82,7 @@ pub enum Shape {
         /// Radius, m.
         radius: Number,
     },
-    /// A cylinder (3-D) between the centres of its two ends.
+    /// A cylinder (3-D), given by the centres of its two ends and by its radius.
     Cylinder {
         /// Centre of one end, m.
         from: Vector,
@@ -134,7 +134,7 @@ pub struct Set {
     /// Path, relative to the deck, of a file with the ids of the points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Id that the file gives to the first point; 0 if not given.
+    /// Id that the file uses for the point with the id 0; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
     /// Name or number of a group in a mesh that defines the points of a body.

@@ -14,7 +14,8 @@ use crate::deck::spanned::Spanned;
 pub struct Contact {
     /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon.
     /// `"short-range"`: short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`:
-    /// contact only for the pairs of bodies for which a table `[contact.pair.NAME]` gives another `model`.
+    /// no contact between points, except in pairs of bodies for which a table `[contact.pair.NAME]` gives
+    /// another `model`.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
     /// With `"penalty"`, two points repel one another as if a layer of material lay between them; `stiffness`

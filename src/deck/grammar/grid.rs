@@ -21,9 +21,10 @@ pub struct Grid {
     /// evaluated separately for each body without its own horizon.
     pub horizon: Number,
     /// Position in m of a corner of a lattice cell. The default is chosen separately for each spacing and
-    /// each direction. It depends on the first body with this spacing that has two flat faces normal to this
-    /// direction, a whole number of cells apart. The default is 0 if a grid with the origin 0 fills this body
-    /// exactly, otherwise the position of the lower face of the body. Without such a body, the default is 0.
+    /// each direction. One body with this spacing determines the default. It is the first body with two flat
+    /// faces that are normal to this direction and a whole number of cells apart. The default is 0 if a grid
+    /// with the origin 0 fills this body exactly, otherwise the position of the lower face of the body.
+    /// Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
     /// Volume correction of points near the edge of a family: `"exact"`, `"linear"`, `"linear-inside"` or
@@ -75,7 +76,7 @@ pub enum VolumeCorrection {
     /// Ha & Bobaru 2010; PA-HHB in Seleson 2014). δ is the horizon, dx the spacing, and |ξ| the length of the
     /// bond.
     Linear,
-    /// As `linear`, without points beyond the horizon (as in LAMMPS).
+    /// The factor of `linear` for points within the horizon, and 0 for points beyond it (as in LAMMPS).
     LinearInside,
     /// The factor on the volume is the fraction of the cell that lies within the horizon.
     Exact,

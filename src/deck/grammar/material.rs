@@ -233,8 +233,8 @@ pub struct BondEnergy {
     /// How the critical work follows from the toughness. `"energy"`: breaking all bonds across an area
     /// dissipates the fracture energy. `"opening"`: the energy for separating a block of the body into two
     /// halves, per crack area, equals the fracture energy. This energy is computed before the run.
-    /// `"willberg2022"`: eq. 16 and 18 of Willberg et al. (2022). `"perilab"`: as in PeriLab, for 2-D and
-    /// 3-D. `"peridigm2021"`: as in Peridigm in 2021, for 2-D.
+    /// `"willberg2022"`: eq. 16 and 18 of Willberg et al. (2022). `"perilab"`: the formula of PeriLab; only
+    /// in 2-D and 3-D. `"peridigm2021"`: the formula that Peridigm had in 2021; only in 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
     /// Whether only bonds that are longer than in the undeformed body can break; true if not given. If false,
@@ -243,13 +243,13 @@ pub struct BondEnergy {
     pub tension_only: bool,
     /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside
     /// surfaces have fewer bonds, so each bond stores more energy at the same strain. Without the correction,
-    /// the body therefore breaks at its surfaces first. With 1, the critical work of a bond is larger by the
-    /// same factor as the stored energy.
+    /// the body therefore breaks at its surfaces first. With degree 1, the critical work of a bond increases
+    /// by the same factor as its stored energy.
     #[serde(default = "zero")]
     pub family_correction: Number,
-    /// α: the critical work is computed for the stretch s0 − α s_min instead of the critical stretch s0.
-    /// s_min is the smallest stretch of the intact bonds of a point. The default 0 gives a constant critical
-    /// work.
+    /// α: the critical work at a point is computed for the stretch s0 − α s_min instead of the critical
+    /// stretch s0. s_min is the smallest stretch of the intact bonds of this point. The default 0 gives a
+    /// constant critical work.
     #[serde(default = "zero")]
     pub alpha: Number,
     /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not
@@ -301,7 +301,7 @@ pub enum StressMeasure {
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Calibration {
-    /// From the energy that all bonds across an area dissipate when they break.
+    /// All bonds that cross a unit area together dissipate the fracture energy when they break.
     #[default]
     Energy,
     /// From the computed energy of separating a block into two halves.

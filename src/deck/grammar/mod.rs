@@ -2,8 +2,9 @@
 //!
 //! Any number except counts, levels, ids and seeds may be a string with an expression of the `[parameters]`.
 //! All values are in SI units. Unknown keys are errors. A choice, such as the law of a material, is a table
-//! with the name of the chosen variant (`[material.glass.pmb]`). If a key named the variant instead, the
-//! deserializer would lose the locations of the values, which error messages need.
+//! with the name of the chosen variant (`[material.glass.pmb]`). The variant is not given as the value of a
+//! key, such as `law = "pmb"`, because the deserializer would then lose the locations of the values. Error
+//! messages need these locations.
 
 mod bodies;
 mod conditions;
@@ -101,7 +102,7 @@ pub struct Deck {
     /// Loads, supports and temperatures by name.
     #[serde(default)]
     pub condition: Tables<Condition>,
-    /// End time and step.
+    /// End time and time step.
     pub time: Spanned<Time>,
     /// The stages of the run in their order; if none is given, `[time]` is the only stage.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -120,7 +121,8 @@ pub struct Deck {
     pub balance: Option<Spanned<Balance>>,
 }
 
-/// Dimension of the problem; for plane problems, also whether the out-of-plane stress or strain is 0.
+/// Dimension of the problem. For plane problems, also which quantity is 0: the out-of-plane stress or the
+/// out-of-plane strain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum DimensionName {
     /// A bar.

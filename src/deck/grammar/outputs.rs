@@ -192,8 +192,8 @@ pub struct History {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if the
-    /// section gives none of its keys.
+    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`. If `[checkpoint]` has no
+    /// keys, checkpoints are written every 10 minutes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Text>,
     /// Steps between checkpoints.
@@ -299,9 +299,10 @@ pub enum Statistic {
     Maximum,
 }
 
-/// A front: the position that a field has reached along a line. Of the points near the line, the search finds
-/// the farthest point at which the absolute value of the field exceeds the threshold. Linear interpolation to
-/// the next point ahead gives the position where the absolute value crosses the threshold.
+/// A front: the position that a field has reached along a line. Only points near the line are searched. The
+/// search finds the point farthest along the line at which the absolute value of the field exceeds the
+/// threshold. Linear interpolation to the next point ahead gives the position where the absolute value
+/// crosses the threshold.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {

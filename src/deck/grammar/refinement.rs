@@ -23,12 +23,12 @@ pub struct Refinement {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
     /// Factor on the horizon of points that have points of a coarser level inside their horizon. Without this
-    /// factor, the families of these points may lose volume. The default is √2 with `rule = "delta"`, and 1
+    /// factor, these points may have too few neighbours. The default is √2 with `rule = "delta"`, and 1
     /// with `rule = "delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
-    /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with
-    /// `"average"`, both ends use the mean horizon.
+    /// Horizon in the force of a bond between two levels. With `"own"`, each end uses its own horizon for its
+    /// half of the force. With `"average"`, both ends use the mean of the two horizons.
     #[serde(default)]
     pub bonds: LevelBonds,
     /// Regions that are refined from the start; each region has a freely chosen name.
@@ -48,10 +48,11 @@ pub struct Trigger {
     /// Steps between evaluations of the criteria; 20 if not given.
     #[serde(default = "default_interval")]
     pub every_steps: Spanned<Count>,
-    /// Smallest strain energy density of a trigger, as a fraction of the current maximum over all points.
+    /// Smallest strain energy density at which a point is a trigger, as a fraction of the current maximum
+    /// over all points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Number>,
-    /// Smallest damage of a trigger.
+    /// Smallest damage at which a point is a trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Number>,
     /// A condition on the reference position and t; a point that fulfils the condition is a trigger.
@@ -89,7 +90,7 @@ pub enum LevelBonds {
     /// Each end uses its own horizon.
     #[default]
     Own,
-    /// Both ends use the mean horizon.
+    /// Both ends use the mean of their two horizons.
     Average,
 }
 

@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::deck::from_toml::from_text;
 
-    /// Return the keys of the deck, read from a deserialization error.
+    /// Deserialize a deck with an unknown key, and return the allowed keys that the error message lists.
     fn fields(deck: &str) -> Vec<String> {
         let error = from_text::<Deck>(deck).unwrap_err();
         let fields = error.message.split('`').skip(3).step_by(2);

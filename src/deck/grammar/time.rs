@@ -57,7 +57,7 @@ pub struct Stage {
     /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Spanned<Method>>,
-    /// Same key as in `[time]`. If not given in an explicit stage, the value in `[time]` applies.
+    /// Same key as in `[time]`. If an explicit stage does not give this key, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
     /// Same key as in `[time]`. If not given, the value in `[time]` applies.
@@ -72,7 +72,7 @@ pub struct Stage {
     /// Same key as in `[time]`. If not given, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_scale: Option<Number>,
-    /// Same key as in `[time]`. If not given in an explicit stage, the value in `[time]` applies.
+    /// Same key as in `[time]`. If an explicit stage does not give this key, the value in `[time]` applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
     /// Names of the conditions (loads, supports and temperatures) that act; all conditions if neither `on`
@@ -101,7 +101,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Return the name of the method in a deck.
+    /// Return the name that decks use for this method.
     pub fn name(self) -> &'static str {
         match self {
             Self::Explicit => "explicit",
@@ -139,7 +139,7 @@ pub struct Adaptive {
     /// The smallest step in s; 1/100 of the largest if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smallest: Option<Number>,
-    /// The largest step in s; the step given by `step` or `safety` if not given.
+    /// The largest step in s. If not given, the step that `step` or `safety` gives is the largest step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest: Option<Number>,
 }
@@ -206,7 +206,7 @@ fn default_iterations() -> Count {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Static {
-    /// Number of load steps; `load_steps` of the relaxation if not given.
+    /// Number of load steps. If not given, the value of `load_steps` of the relaxation applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
     /// Largest residual: norm of the unbalanced force, divided by the sum of the norms of loads and

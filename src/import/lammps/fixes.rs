@@ -12,7 +12,8 @@ use crate::import::translation::Translation;
 /// Name of the rigid body of an indenter.
 const INDENTER: &str = "indenter";
 
-/// Fix styles that are loads or supports, without the part of a style after `/`, as in `wall/reflect`.
+/// Fix styles that are loads or supports. An entry is the part of a style before the first `/`. For example,
+/// `wall` stands for `wall/reflect`.
 const LOADS: [&str; 18] = [
     "addforce",
     "addtorque",

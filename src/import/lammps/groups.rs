@@ -128,9 +128,9 @@ pub(super) fn write_set(
     written
 }
 
-/// Test whether a region has an atom at the start. If the region has more than `MOST_SITES` lattice sites,
-/// test only every n-th site in each direction. If none of the tested sites of such a region has an atom,
-/// return `None`, because the other sites are not tested.
+/// Test whether a region contains an atom at the start of the run. If the region has more than `MOST_SITES`
+/// lattice sites, test only every n-th site in each direction. If none of the tested sites of such a region
+/// has an atom, return `None`, because the other sites are not tested.
 pub(super) fn has_atoms(model: &Model, region: &Region) -> Option<bool> {
     let spacing = model.spacing.unwrap_or(1.0);
     let bounds = region.bounds();

@@ -9,14 +9,15 @@ use crate::import::regions::Region;
 use crate::import::script::Command;
 use crate::import::translation::Translation;
 
-/// Fix styles that integrate the motion of atoms, without the part of a style after `/`, as in `nve/limit`.
+/// Fix styles that integrate the motion of atoms. Each entry is the part of a style before the first `/`: the
+/// entry `nve` also stands for `nve/limit`.
 const INTEGRATORS: [&str; 8] = ["move", "nph", "npt", "nve", "nvk", "nvt", "poems", "rigid"];
 
 /// Name of the set of points that no fix integrates, and of the condition that holds these points.
 const HELD: &str = "held";
 
-/// Write a condition that holds the points that no fix integrates. `fixes` are the fixes that act in the
-/// first run, and `run` is its command.
+/// Write a condition with velocity 0 for the points that no fix integrates. `fixes` are the fixes that act in
+/// the first run, and `run` is its command.
 pub(super) fn hold(
     translation: &mut Translation,
     model: &Model,

@@ -6,7 +6,7 @@ use crate::import::log::OMITTED_BONDS;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Write contact, and the rule of the bonds between blocks.
+/// Write the contact sections of the new deck, and the key `[interface] rule` for the bonds between blocks.
 pub(super) fn contact(
     translation: &mut Translation,
     root: &Node,

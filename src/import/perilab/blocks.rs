@@ -60,7 +60,8 @@ fn block_of_points(
     Some(Value::text(set))
 }
 
-/// Write the materials and bodies. Return name, number and body of each block.
+/// Read the blocks, and write the materials and bodies of the new deck. Return name, number and body of each
+/// block.
 pub(super) fn read_blocks(
     translation: &mut Translation,
     node: &Node,

@@ -119,8 +119,8 @@ pub(super) fn conditions(
 }
 
 /// Return the step number and the start time of each step in which a condition acts. The start time is
-/// measured from the start of the run. `steps` are the step numbers that the condition gives; empty for all
-/// steps.
+/// measured from the start of the run. `steps` are the step numbers that the condition gives. If `steps` is
+/// empty, the condition acts in all steps.
 fn acting_steps(stages: &[solver::Stage], steps: &[u64], run_start: f64) -> Vec<(u64, f64)> {
     let mut acting: Vec<(u64, f64)> = Vec::new();
     let mut start = 0.0;

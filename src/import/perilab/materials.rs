@@ -8,8 +8,8 @@ use crate::import::log::Fate;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: text that the name of the model contains, the law, and how the law differs from the
-/// model. The first match is used. If the law is empty, the model has no counterpart.
+/// Laws for the material models. Each entry has three texts: a part of the model's name, the law, and how the
+/// law differs from the model. The first match is used. If the law is empty, the model has no counterpart.
 const MATERIALS: [(&str, &str, &str); 9] = [
     (
         "unified bond-based",
@@ -26,8 +26,8 @@ const MATERIALS: [(&str, &str, &str); 9] = [
     ("correspondence vumat", "", ""),
 ];
 
-/// Elastic constants by precedence. If more than two are given, PeriLab computes the moduli from the first
-/// two.
+/// Elastic constants by precedence. If more than two are given, PeriLab computes the moduli from the two that
+/// come first in this list.
 const PRECEDENCE: [&str; 4] = [
     "bulk_modulus",
     "poisson_ratio",
@@ -76,7 +76,6 @@ pub(super) struct Laws<'n> {
     pub(super) expansions: Vec<Expansion>,
 }
 
-/// Read the material models.
 pub(super) fn read_materials<'n>(
     translation: &mut Translation,
     node: &'n Node,

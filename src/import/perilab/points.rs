@@ -43,7 +43,8 @@ impl MeshBlocks {
 /// order of the block numbers. Return `None` if the file cannot be read.
 ///
 /// A set is a block if it has elements that no earlier set has. Sets that conditions use as node sets come
-/// last. PeriLab has no fixed order for the other sets, so here their order is that of the file.
+/// last. PeriLab has no fixed order for the other sets. This function takes these sets in the order of the
+/// file.
 fn blocks_of_abaqus(
     translation: &Translation,
     path: &str,
@@ -98,8 +99,8 @@ const POINTWISE_CONSTANTS: [&str; 5] = [
 /// unreadable.
 const MOST_IDS: usize = 1_000_000;
 
-/// Return the node sets of an Exodus mesh with the ids of their points, by name. PeriLab gives the name
-/// `Set-N` to the N-th set if this set has no name.
+/// Return the name of each node set of an Exodus mesh, with the ids of the points in the set. PeriLab gives
+/// the name `Set-N` to the N-th set if this set has no name.
 ///
 /// In PeriLab, an element belongs to a node set if all nodes of the element are in the set. (In Peridigm and
 /// Fissure, one node is enough.) The result is empty if the mesh cannot be read, or if some of its elements
@@ -225,8 +226,12 @@ pub(super) fn points(
     Err(translation.error(node.line, message))
 }
 
-/// Return the `dimension` of the new deck, from the header of the point file or else from the symmetry of the
-/// materials.
+/// Return the `dimension` of the new deck. The number of dimensions is taken from the header of the point
+/// file. For 2-D points, the first material whose `Symmetry` names plane stress or plane strain decides
+/// between these two; without such a material, plane stress is used.
+///
+/// If there is no such header, for example for a mesh, the same material decides; without such a material,
+/// the deck is 3-D.
 pub(super) fn setting(
     translation: &mut Translation,
     discretization: &Node,

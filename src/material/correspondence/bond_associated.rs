@@ -1,5 +1,5 @@
 //! Bond-associated correspondence: a classical stress for each bond, from the bond's own deformation
-//! gradient. This law has no zero-energy modes and needs no control.
+//! gradient. This law has no zero-energy modes, so it needs no zero-energy control.
 //!
 //! Breitzman & Dayal 2018. The deformation gradient F_ξ of a bond maps ξ to Y. For vectors v
 //! perpendicular to ξ, F_ξ v = F v, with the deformation gradient F of the family.

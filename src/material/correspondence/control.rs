@@ -22,11 +22,12 @@ pub enum Control {
     /// untruncated family. Long shear waves then have no dispersion.
     ///
     /// Derivation: consider a wave along the axis x with the amplitude u, the wavenumber κ and the modulus M,
-    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. H is smaller than the gradient of the wave by the
-    /// fraction κ²q/(6k). Therefore the energy density of the stress is ½ M κ² (1 − κ²q/(3k)) |u|². The part
-    /// z of η is −½ (κ ξ_x)² u. Therefore a control B = (b/k) I with a modulus b has the energy density
-    /// ½ b κ⁴q/(4k) |u|². For b = (4/3) M, the sum of the two energy densities is independent of q, for every
-    /// dimension, influence function and lattice.
+    /// which is G for shear waves. Let q = Σ ω ξ_x⁴ Ṽ. The displacement gradient H that is computed from the
+    /// family is smaller than the exact gradient of the wave by the fraction κ²q/(6k). Therefore the energy
+    /// density of the stress is ½ M κ² (1 − κ²q/(3k)) |u|². The part z of η is −½ (κ ξ_x)² u. Therefore a
+    /// control B = (b/k) I with a modulus b has the energy density ½ b κ⁴q/(4k) |u|². For b = (4/3) M, the
+    /// sum of the two energy densities is independent of q, for every dimension, influence function and
+    /// lattice.
     Dispersion {
         /// Product (4/3) G/k, N/m⁷.
         strength: f64,
@@ -114,8 +115,8 @@ impl Control {
     }
 
     /// Return the constant that [`Self::matrix`] needs for a point, N/m⁷. `weight` is ω₀ (m³) of the initial
-    /// family of the point. The constant is 0 for `none` and `wan2019`, which do not use the constant, and
-    /// for ω₀ = 0 with `silling2017`.
+    /// family of the point. For `none` and `wan2019`, which do not use the constant, the constant is
+    /// 0. For `silling2017`, the constant is 0 if ω₀ = 0.
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,

@@ -30,7 +30,7 @@ pub struct Hooke {
     out_of_plane_factors: Option<[f64; 3]>,
 }
 
-/// Keys of the full matrix: its upper triangle.
+/// Keys of the full matrix, by row and column. The matrix is symmetric, so only its upper triangle has keys.
 const FULL: [[&str; 6]; 6] = [
     ["c11", "c12", "c13", "c14", "c15", "c16"],
     ["", "c22", "c23", "c24", "c25", "c26"],
@@ -133,7 +133,7 @@ macro_rules! keys_with_hooke {
 }
 pub(super) use keys_with_hooke;
 
-/// Return the first of these keys that has a value.
+/// Return the first key in `names` that has a value in `values`.
 fn given_of(
     values: &Values,
     names: impl IntoIterator<Item = &'static str>,
@@ -153,7 +153,8 @@ fn fault_at(key: &'static str, message: impl Into<String>) -> Option<LawFault> {
     })
 }
 
-/// Return the first given key of an anisotropic solid; `None` if all constants are isotropic.
+/// Return the first key with a value among the keys of anisotropic solids; `None` if all constants are
+/// isotropic.
 pub fn own_constants(values: &Values) -> Option<&'static str> {
     given_of(values, full_entries().chain(ORTHOTROPIC))
 }
@@ -451,7 +452,7 @@ impl Hooke {
     }
 }
 
-/// Return the indices that tensor components in `D` dimensions have in Voigt's order.
+/// Return the indices, in Voigt's order, of the tensor components that exist in `D` dimensions.
 fn components<const D: usize>() -> impl Iterator<Item = usize> {
     const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
     let used: &[usize] = match D {

@@ -236,8 +236,8 @@ pub struct Surface {
     pub limit: f64,
     /// Ratio of `limit` to `by_strain`.
     factor: f64,
-    /// Increment of ε̄ in the step at the reference strain rate. Infinite if the yield stress does not depend
-    /// on the rate, or if no time passes.
+    /// Increment of ε̄ in a step during which ε̄ grows at the reference strain rate. Infinite if the yield
+    /// stress does not depend on the rate, or if no time passes.
     threshold: f64,
 }
 

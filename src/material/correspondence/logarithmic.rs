@@ -20,8 +20,8 @@ use super::plastic::{Plastic, tensor_of};
 /// Largest number of sweeps of Jacobi's method; about six are needed.
 const MOST_SWEEPS: usize = 30;
 
-/// Jacobi's method has converged if the sum of the squares of the mixed entries is at most this fraction of
-/// the sum of the squares of all entries.
+/// Jacobi's method has converged if m ≤ `CONVERGED` · a. Here m is the sum of the squares of the three mixed
+/// entries, and a is the sum of the squares of all nine entries.
 const CONVERGED: f64 = 1e-32;
 
 /// Elastic trial state of a point, before any flow.

@@ -178,8 +178,9 @@ impl Described for Correspondence {
     }
 }
 
-/// Two constants, then A and the diagonal and mixed entries of B; all in N/m⁷. The constants are a spring
-/// constant that bounds the energy, and [`Control::constant`].
+/// Two constants, then A and the diagonal and mixed entries of B; all in N/m⁷. The first constant is the
+/// spring constant of [`Law::stiffness`], which bounds the strain energy density. The second constant is
+/// [`Control::constant`].
 type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
@@ -188,19 +189,19 @@ const CONSTANTS: usize = 2;
 /// (J/m³), and a flag, which is 1 if the point has no force.
 ///
 /// If the law has plasticity and a zero-energy control, two more numbers follow. The first is
-/// ½ tr(B H K Hᵀ), the part of
-/// ½ Σ ω η·B η Ṽ that is not energy of the control (J/m³). The second is the factor s on B at the start of
-/// the step.
+/// ½ tr(B H K Hᵀ) (J/m³). This number equals ½ Σ ω η·B η Ṽ minus the energy ½ Σ ω z·B z Ṽ of the control. The
+/// second is the factor s on B at the start of the step.
 const OWN: usize = 4;
 
-/// Count of the own numbers of a point if the body does not yield or has no control.
+/// Count of a point's own numbers if the law has no plasticity or no zero-energy control.
 const OWN_OF_ELASTIC: usize = 2;
 
-/// A, and the diagonal and mixed entries of B, N/m⁷.
+/// Matrices of the force state ω (A ξ + B η), N/m⁷: A, and the diagonal and mixed entries of the symmetric
+/// matrix B.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
-/// Return A ξ + B η, N/m⁶. The rows are written out, because the compiler would not unroll a loop over the
-/// rows, and would keep the data of such a loop in memory instead of registers.
+/// Return A ξ + B η, N/m⁶. There is no loop over the rows. The compiler would not unroll such a
+/// loop, and would keep its data in memory instead of registers.
 #[inline(always)]
 fn times_bond<S: Simd, const D: usize>(
     simd: S,
@@ -248,7 +249,7 @@ struct Family<const D: usize> {
 
 impl Correspondence {
     /// Compute K⁻¹, H, P and W of a point, and update its plastic state. `sums` are the sums of the first
-    /// pass, `initial_spring_constant` is the spring constant of the initial family (N/m⁷), and `step` is the
+    /// pass. `initial_spring_constant` is the spring constant of the initial family (N/m⁷). `step` is the
     /// length of the step (s).
     ///
     /// The result is `None` in three cases:

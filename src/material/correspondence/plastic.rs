@@ -31,7 +31,7 @@ use super::stress::{green_strain, stretch_of};
 use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
 
-/// The constants of the law.
+/// Constants of J2 plasticity with isotropic hardening.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plastic {
     /// Yield stress σ_y, Pa.
@@ -50,7 +50,7 @@ pub struct Plastic {
 /// Dependence of the yield stress on the plastic state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Hardening {
-    /// σ_y + H ε̄ with the hardening modulus H, Pa.
+    /// The yield surface is q = σ_y + H ε̄. The number is the hardening modulus H, Pa.
     Linear(f64),
     JohnsonCook(JohnsonCook),
 }
@@ -249,7 +249,8 @@ impl Plastic {
 
     /// Return the factor on the zero-energy control: (σ/(σ + 3G ε̄))², where σ is the yield stress without
     /// the factor of rate and temperature. The result is the square of the ratio of the secant shear modulus
-    /// to G. The result is 1 before any flow and never grows, because σ depends on ε̄ only.
+    /// to G. The result is 1 before any flow. It never grows, because σ depends on ε̄ only, and σ/ε̄
+    /// decreases as ε̄ grows.
     ///
     /// The motion z of the zero-energy modes grows with ε̄. With the ratio instead of its square, the energy
     /// of the control would grow with the plastic work. This energy would then contribute to the computed
@@ -425,8 +426,9 @@ mod tests {
         }
     }
 
-    /// Keys of Johnson–Cook hardening by strain and strain rate, and of softening by heat. In the random
-    /// walk, the temperature rises by about half of the difference between melting and initial temperature.
+    /// Keys and values of Johnson–Cook plasticity. The yield stress rises with strain and strain rate, and
+    /// falls with temperature. In the random walk, the temperature rises by about half of the difference
+    /// between melting and initial temperature.
     const JOHNSON_COOK: [(&str, f64); 8] = [
         ("hardening_modulus", 0.02),
         ("hardening_exponent", 0.3),

@@ -35,7 +35,7 @@ pub struct NeoHooke {
     largest: f64,
 }
 
-/// Stresses and energies of eight bonds at the displacement gradients of these bonds.
+/// Stresses and energies of eight bonds. The values of a bond follow from its displacement gradient.
 #[derive(Debug, Clone, Copy)]
 pub struct OfBonds<const D: usize> {
     /// P, Pa.
@@ -203,7 +203,8 @@ impl Stress {
     }
 }
 
-/// Return E = ½ (H + Hᵀ + HᵀH), which avoids the cancellation of FᵀF − I.
+/// Return the Green strain E = ½ (H + Hᵀ + HᵀH) for the displacement gradient H = F − I. This form avoids the
+/// cancellation in ½ (FᵀF − I).
 #[inline(always)]
 pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tensor<T, D> {
     tensor(|a, b| {

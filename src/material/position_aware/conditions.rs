@@ -1,5 +1,6 @@
 //! Conditions on the functions ω and σ of a point. n is the direction of a bond, and N has the components
-//! N_a = n_a². In a sum over the family, each bond has the weight |ξ|² Ṽ, unless a formula gives the terms.
+//! N_a = n_a². Where a comment describes a sum over the family in words, each bond has the weight |ξ|² Ṽ.
+//! Formulas contain this weight explicitly.
 
 use crate::material::monomials::index_of;
 use crate::material::symmetric::mixed;
@@ -36,14 +37,17 @@ pub(super) fn of_product(a: usize, b: usize) -> [usize; 3] {
 pub struct Conditions<const D: usize> {
     /// The value c of g in an untruncated family of the continuum.
     pub(super) constant: f64,
-    /// A polynomial of degree 2 whose value is 1 for every direction n: n·n, or (Σ N_a)².
+    /// A polynomial of degree 2 in the components of n or N. Its value is 1 for every direction n. The
+    /// polynomial is n·n, or (Σ N_a)² with N_a = n_a².
     pub(super) one: Vec<Monomial>,
-    /// p_k and wanted_k: for unit extensions along the axes, then for shears between the axes.
+    /// p_k and wanted_k of each condition. The conditions for unit extensions along the axes come first, then
+    /// the conditions for shears between two axes.
     pub(super) each: Vec<(Vec<Monomial>, f64)>,
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Create the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab on ω, with m = Σ |ξ|² Ṽ (m⁵) and c = ω₀ = d/m.
+    /// Create the conditions Σ |ξ|² ω n_a n_b Ṽ = δ_ab on ω. `weighted_volume` is m = Σ |ξ|² Ṽ (m⁵). The
+    /// constant c of these conditions is ω₀ = d/m.
     ///
     /// Conditions with a ≠ b have the weight √2, because each of them represents the components ab and ba.
     /// Therefore, if the family rotates, the function ω of [`Nearest`](super::Nearest) rotates in the same
@@ -58,8 +62,9 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Create the conditions on σ/σ₀, with σ₀ = A/m, m = Σ |ξ|² Ṽ (m⁵) and c = 1. The condition for a probe
-    /// strain H is Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H.
+    /// Create the conditions on g = σ/σ₀, with c = 1. Here σ₀ is A/m, and m = Σ |ξ|² Ṽ (m⁵) is
+    /// `weighted_volume`. The condition for a probe strain H is
+    /// Σ |ξ|² σ (n·dev H n)² Ṽ = 2G dev H : dev H.
     ///
     /// The probe strains H are unit strains H_aa = 1 along the axes, and pure shears H_ab = H_ba = 1/√2
     /// between the axes.
@@ -108,7 +113,8 @@ pub(super) fn one_in_squares<const D: usize>() -> Vec<Monomial> {
     pairs.map(|(a, b)| (of_product(a, b), 1.0)).collect()
 }
 
-/// Return the weighted volume Σ |ξ|² Ṽ (m⁵) from the sums of |ξ|² Ṽ times the monomials of n.
+/// Return the weighted volume Σ |ξ|² Ṽ (m⁵). `sums` contains Σ |ξ|² Ṽ p for each monomial p of degree 4 in
+/// the components of n.
 pub(super) fn weighted_volume<const D: usize>(sums: &[f64]) -> f64 {
     let one = one_in_directions::<D>();
     product(sums, &one, &one)

@@ -1,8 +1,9 @@
 //! Functions ω and σ of the bond direction. ω/ω₀ and σ/σ₀ are the radii of two ellipsoids in this direction.
 //! The ellipsoid of ω/ω₀ has a semi-axis along each coordinate axis a. This semi-axis is a ratio of
-//! dilatations at a unit strain along a: the dilatation of the solid, divided by the dilatation of the family
-//! with ω₀. Semi-axis a of σ/σ₀ is a ratio of deviatoric energies at the same strain: the energy of the
-//! solid, divided by the energy of the family with σ₀.
+//! dilatations at a unit strain along axis a: the dilatation of the solid, divided by the dilatation of the
+//! family with ω₀. The ellipsoid of σ/σ₀ also has a semi-axis along each axis a. This semi-axis is a ratio of
+//! deviatoric energies at the same strain: the energy of the solid, divided by the energy of the family with
+//! σ₀.
 
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use super::{Fit, Form};
@@ -55,7 +56,7 @@ fn semi_axes<const D: usize>(conditions: &Conditions<D>, sums: &[f64]) -> [f64; 
 /// `sigma` are the semi-axes of the ellipsoids of ω/ω₀ and σ/σ₀. `sums` are the sums of |ξ|² Ṽ times the
 /// monomials of n. `reference` is σ₀, N/m⁷.
 ///
-/// Let g be the radius of an ellipsoid with the semi-axes g_a, in the direction n of a bond. Then g and g²
+/// Let g be the radius, in the direction n of a bond, of an ellipsoid with the semi-axes g_a. Then g and g²
 /// are convex functions of the numbers n_a², whose sum is 1. Therefore g ≤ Σ g_a n_a² and g² ≤ Σ g_a² n_a²
 /// for each bond. With M_a = Σ |ξ|² n_a² Ṽ, Jensen's inequality for the sum over the family gives
 /// Σ |ξ|² g Ṽ ≥ m (Σ (M_a/m)/g_a²)^(−½).

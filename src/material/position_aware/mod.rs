@@ -104,7 +104,7 @@ pub struct PositionAware<F> {
 }
 
 impl<F: Form> PositionAware<F> {
-    /// Create the law of a body with this influence function, in the plane or in space.
+    /// Create the law of a 2-D or 3-D body, with the given influence function.
     pub(super) fn of(given: &Given, influence: Influence) -> Self {
         Self {
             ordinary: Ordinary::of(given, influence),
@@ -188,8 +188,8 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
     /// recomputed before each force evaluation: k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
     type BondHistory = [Lanes; 0];
-    /// Sums of |ξ|² Ṽ times each monomial of degree 4 of n, followed by sums of |ξ|² Ṽ times each monomial of
-    /// degree 4 of the squares N_a = n_a², m⁵.
+    /// Sums (m⁵) of |ξ|² Ṽ times each monomial of degree 4. The monomials are first those of n, then those of
+    /// the squares N_a = n_a².
     type ReferenceSum = [Lanes; 2 * MONOMIALS];
     /// θ, Σ σ|ξ| e Ṽ (Pa) and Σ σ|ξ|² Ṽ (Pa), all over the intact bonds.
     type Sum = [Lanes; 3];
@@ -197,7 +197,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
-    /// Each point has one own number, the dilatation θ.
+    /// The only own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const SCALED: bool = true;
@@ -386,7 +386,7 @@ mod tests {
         }
     }
 
-    /// Return ω and σ of the bonds of a point, and λ.
+    /// Return ω and σ of all bonds of a point with the family `family`, and λ of this point.
     fn functions<F: Form>(family: &[Vector3<f64>]) -> (Vec<[f64; 2]>, f64) {
         functions_of::<F>(family, family)
     }
@@ -473,7 +473,8 @@ mod tests {
         }
     }
 
-    /// Check that λ lies between the largest eigenvalue of the energy and `most` times this eigenvalue.
+    /// Check the upper bound λ. It must be at least the largest eigenvalue of the energy, and at most `most`
+    /// times this eigenvalue.
     fn check_bound<F: Form>(name: &str, family: &[Vector3<f64>], most: f64) {
         let law = law::<F>();
         let (functions, bound) = functions::<F>(family);

@@ -67,7 +67,7 @@ impl Form for Nearest {
 
 /// The function of the bond direction that satisfies the conditions and is nearest to a constant.
 struct Function<const D: usize> {
-    /// Matrix T of the function. The function is n·T n or N·T N.
+    /// Matrix T of the function. The function is n·T n for ω, and N·T N for σ/σ₀.
     tensor: SMatrix<f64, D, D>,
     /// Sum of the squared function over the family.
     square: f64,

@@ -1,18 +1,21 @@
 //! Elastic–perfectly plastic solid with the influence functions of [`PositionAware`].
 //!
 //! Each bond has a plastic extension e_p per end. Energy and force are those of [`PositionAware`] at the
-//! elastic extensions e − e_p. Let ε_d be the elastic extension, minus |ξ| times the mean elastic stretch of
-//! the intact bonds, so that Σ ω|ξ| ε_d Ṽ = 0:
+//! elastic extensions e − e_p. Let ε_d be the elastic extension minus |ξ| times the mean elastic stretch of
+//! the intact bonds:
 //!
 //! ε_d = e − e_p − |ξ| Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ.
+//!
+//! This definition implies Σ ω|ξ| ε_d Ṽ = 0.
 //!
 //! A point yields if Σ σ ε_d² Ṽ > σ_y²/(3G). This limit is twice the deviatoric energy density at which the
 //! equivalent stress of von Mises is the yield stress σ_y. Away from surfaces, the yield condition is that of
 //! [`super::super::OrdinaryPlastic`]. The return is radial: e_p grows by (1 − r) ε_d, with r² Σ σ ε_d² Ṽ =
 //! σ_y²/(3G). Because Σ ω|ξ| ε_d Ṽ = 0, plastic flow does not change θ.
 //!
-//! While all bonds are intact, ε_d is ε of [`PositionAware`]. If bonds are broken, ε = ε_d + c|ξ| with a
-//! number c of the point. The energy, as a function of 1 − r, then has its minimum at
+//! While all bonds are intact, ε_d equals the ε of [`PositionAware`] at the elastic extensions. If bonds are
+//! broken, ε = ε_d + c|ξ| with a number c of the point. The energy, as a function of 1 − r, then has its
+//! minimum at
 //! 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, with ε and ε_d before the flow. A larger 1 − r would add energy, so
 //! 1 − r is limited to this value.
 
@@ -87,7 +90,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 3;
     const LEAST_DIMENSION: usize = 2;
-    /// Each point has one own number, the dilatation θ.
+    /// The only own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_STRETCH: bool = true;

@@ -67,7 +67,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
     const CONSTANTS: usize = 4 * D + OTHERS;
     const PASSES: usize = 2;
     const LEAST_DIMENSION: usize = 2;
-    /// Each point has one own number, the dilatation θ.
+    /// The only own number of a point is the dilatation θ.
     const OWN_NUMBERS: usize = 1;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_STRETCH: bool = true;

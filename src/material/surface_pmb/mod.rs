@@ -7,9 +7,10 @@
 //! solid is μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc). Here μ = 2 W₁/(d (d + 2)), with the number of dimensions d
 //! and the energy density W₁ at unit isotropic stretch.
 //!
-//! Bonds of a point to other blocks can have another c and another μ, computed with the mean of two horizons
-//! and of two moduli. The fit therefore uses c/μ of each bond, which depends on the horizon only. If all
-//! bonds of a point have the same μ, the elastic tensor is fitted to that of the solid with this μ.
+//! Bonds of a point to another block can have another c and another μ. For example, c and μ can be computed
+//! with the mean horizon and the mean modulus of the two blocks. The fit therefore uses the quotient c/μ of
+//! each bond. This quotient depends on the horizon only. If all bonds of a point have the same μ, the elastic
+//! tensor is fitted to that of the solid with this μ.
 //!
 //! The micromodulus c_ij(n) of a bond is the mean of the micromoduli of points i and j. A critical stretch
 //! s_c that follows from a fracture energy is scaled to s_c √(c/c_ij). Breaking the bond then takes the same

@@ -47,7 +47,8 @@ pub(super) struct Set {
     /// Whether the set consists of all nodes of the element sets in `names`.
     pub(super) is_nodes_of_elements: bool,
     pub(super) is_surface: bool,
-    /// Whether the set is a union of the surfaces in `names`, and consists of nodes if these surfaces do.
+    /// Whether the set is a union of the surfaces in `names`. A union of surfaces that consist of nodes also
+    /// consists of nodes.
     pub(super) is_union: bool,
     /// Error for the use of a set that cannot be read; `None` if the set can be read.
     pub(super) unsupported: Option<Error>,
@@ -83,8 +84,8 @@ fn qualified(instance: &str, name: &str) -> String {
     }
 }
 
-/// If there are more than `limit` numbers, remove repeated numbers and set a new limit of more than twice the
-/// remaining count.
+/// If there are more than `limit` numbers, sort them and remove repeated numbers. Then set `limit` to more
+/// than twice the number of remaining entries.
 fn compact(numbers: &mut Vec<u64>, limit: &mut usize) {
     if numbers.len() > *limit {
         numbers.sort_unstable();

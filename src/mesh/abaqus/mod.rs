@@ -82,7 +82,7 @@ struct Reader {
     /// capitals, such as `INSTANCE.NAME`.
     surfaces: FxHashMap<(MemberKind, String), Runs>,
     data: Data,
-    /// Number of the element that is being read, followed by the numbers of its nodes that have been read.
+    /// Number of the element that is being read, then the node numbers that are already read for it.
     pending: Vec<u64>,
     included: usize,
     place: Place,

@@ -40,7 +40,8 @@ pub(super) const VTK_VERTEX: u8 = 1;
 /// The group of the steps (outputs).
 pub(super) const STEPS: &str = "/VTKHDF/Steps";
 
-/// Tables of the steps: name, columns, first value and counted quantity.
+/// Tables with one row per step. Each entry contains the name of the table, the number of columns, the first
+/// value and the counted quantity. A table without a number of columns is one-dimensional.
 const STEP_TABLES: [(&str, Option<usize>, i64, Counted); 5] = [
     ("PartOffsets", None, 0, Counted::Steps),
     ("NumberOfParts", None, 1, Counted::Nothing),
@@ -69,7 +70,7 @@ pub struct Piece {
 }
 
 /// A result file open for writing. Every method that returns a `Result` is collective. A method that fails on
-/// one rank fails on all ranks, and the file is abandoned.
+/// one rank fails on all ranks. After a failure, the file is abandoned: further calls fail.
 ///
 /// If all steps have the same points, space for all expected steps is allocated in advance. A new step then
 /// changes little metadata.
@@ -80,8 +81,8 @@ pub struct ResultFile<'a> {
     steps: u64,
     /// In a resumed file: time (s) and number of points of each retained step.
     past: Vec<(f64, usize)>,
-    /// Number of points, summed over all written steps. Each field with values per step has this number of
-    /// written rows.
+    /// Number of points, summed over all written steps. This is also the number of rows that have been
+    /// written to the dataset of each field with values per step.
     rows: u64,
     /// The datasets of the points; `None` if all steps have the same points.
     changing: Option<ChangingPoints>,

@@ -31,9 +31,13 @@ impl<'a> ResultFile<'a> {
     /// Resume a result. Retain its first `steps` steps, and drop later steps. `history` gives the number of
     /// history rows that are retained; later rows are dropped. Return the retained history rows.
     ///
-    /// A file is continued in place if the points never change, the file has the deck and the version of this
-    /// run, and it has space for all expected steps. In addition, dropping the later rows must not free a
-    /// chunk.
+    /// A file is continued in place if these conditions are met:
+    ///
+    /// - The points never change.
+    /// - The deck and the version in the file are those of this run.
+    /// - The file has space for all expected steps.
+    /// - Dropping the later rows does not free a chunk.
+    ///
     /// The retained rows then do not move, so no row is lost if the process is killed. If a condition is not
     /// met, or the file is not writable, the retained part is copied to a new file. The new file then
     /// replaces the old file.
@@ -197,8 +201,8 @@ impl<'a> ResultFile<'a> {
         result.record_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
     }
 
-    /// Write the times (s), the time step numbers (`numbers`) and the count of the copied steps. `points` has
-    /// the number of points of each copied step.
+    /// Write the times (s) and the time step numbers (`numbers`) of the copied steps, and the count of these
+    /// steps. `points` has the number of points of each copied step.
     fn record_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
         for ((time, number), points) in times.iter().zip(numbers).zip(points) {
             append_one(&mut self.file, &mut self.numbers, *number)?;

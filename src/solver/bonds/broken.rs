@@ -33,7 +33,7 @@ pub struct Broken<const D: usize> {
     /// not included.
     pub energy: f64,
     /// The point's part of the overshoot energy of the broken bonds, J. The overshoot energy of a bond is its
-    /// energy above the criterion when it breaks.
+    /// energy when it breaks, minus the energy at which it meets its criterion.
     pub overshoot: f64,
     /// Force density that the point loses, N/m³: the force sum over the broken bonds of the point, plus the
     /// decrease of the force sum over its other bonds.

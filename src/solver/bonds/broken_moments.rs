@@ -15,9 +15,9 @@ type Vector = Vector3<f64>;
 /// [`Moments::mean`].
 const LAYER: f64 = 1e-9;
 
-/// Kernel that sums the moments of the family of a point and of its broken bonds, in 3-D. ω is the influence
-/// function of a bond, and Ṽ is the volume of the neighbour times its volume correction. The sums are, by
-/// index:
+/// Kernel that computes moments of the bonds of each point, in 3-D. Some sums are over all bonds of the
+/// point, and the others are over the broken bonds only. ω is the influence function of a bond, and Ṽ is the
+/// volume of the neighbour times its volume correction. The sums are, by index:
 ///
 /// - 0: Σ ω Ṽ over all bonds, m³;
 /// - 1 to 3: Σ ω ξ Ṽ over all bonds, m⁴;

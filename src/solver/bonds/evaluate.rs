@@ -176,9 +176,9 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Return the first point, from `from` on, that starts a new lane group. If a lane group were cut, its
-    /// last points would get their bond contributions in another order. The round-off of their sums would
-    /// then depend on when messages arrive.
+    /// Return the first point, from `from` on, that starts a new lane group. The loop over the interior
+    /// points is split only at such points. If a lane group were split, its last points would get their bond
+    /// contributions in another order. The round-off of their sums would then depend on when messages arrive.
     pub(super) fn border(&self, from: usize) -> usize {
         let end = self.lane_group(from - 1).end;
         if end == from { from } else { self.border(end) }

@@ -69,9 +69,9 @@ impl<L> Force<L> {
     }
 
     /// Return the work of the force states of each bond, J/m⁶. `total` is the result of [`Self::weighted`].
-    /// The work is computed without volume correction, see [`Group::weights_of_work`]. The force state of an
-    /// end that does not act on the bond does no work. The result is 0 if the criterion does not read the
-    /// work.
+    /// The work is computed without volume correction, see [`Group::weights_of_work`]. If the force state of
+    /// a point does not act on the bond (see [`Weights::acting`]), this force state does no work. The result
+    /// is 0 if the criterion does not read the work.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,

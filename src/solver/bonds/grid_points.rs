@@ -27,7 +27,7 @@ pub struct GridValues<const D: usize> {
 }
 
 impl<const D: usize> GridValues<D> {
-    /// Create the values of a grid with zero displacements. `numbers` is the number of point numbers that
+    /// Create the values of a grid with zero displacements. `numbers` is the count of the point numbers that
     /// bonds read. Bonds also read the limits in `limits`, and thermal stretches if `is_thermal` is true.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();
@@ -43,7 +43,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Whether these are the values of `grid`.
+    /// Test whether `self` holds the values of `grid`.
     pub fn is_of(&self, grid: &Arc<Grid>) -> bool {
         Arc::ptr_eq(&self.grid, grid)
     }

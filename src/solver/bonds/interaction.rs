@@ -33,8 +33,8 @@ pub struct BlockLaws {
     /// Factor on the critical work, as a function of the direction of a bond; `None` if the factor is 1 in
     /// all directions.
     pub direction: Option<ToughnessByDirection>,
-    /// Data of the block's points that are read by the failure criteria of bonds to other bodies. Only pairs
-    /// of bodies with a separate damage law count.
+    /// Which data of the block's points the failure criteria of bonds to other bodies read. Only pairs of
+    /// bodies with a separate damage law count.
     pub pairs: PairReads,
     /// Dimension of the problem, on which the stress perpendicular to the plane depends.
     pub dimension: Dimension,
@@ -42,8 +42,8 @@ pub struct BlockLaws {
     pub elastic: Isotropic,
 }
 
-/// Point data that are read by the failure criteria of bonds between two bodies. Only pairs of bodies with a
-/// separate damage law count.
+/// Point data that are read by the failure criteria of bonds between two bodies. Pairs of bodies without a
+/// separate damage law are ignored.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
     /// Whether some of these bonds can break.

@@ -1,7 +1,7 @@
 //! Sums over the bonds of points: forces, point numbers, energies.
 //!
-//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel is used for both ways of
-//! storing bonds. In a list, the eight bonds belong to one point; in a lattice, to eight points.
+//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel is used for bonds in lists
+//! and for bonds in lattices. In a list, the eight bonds belong to one point; in a lattice, to eight points.
 
 use crate::damage::{Criterion, Ends, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
@@ -69,8 +69,8 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         }
     }
 
-    /// Return the work of the force states of both ends, J/m⁶: the sum of [`Law::end_work`] over the ends,
-    /// each multiplied by its weight in `weights`.
+    /// Return the work of the force states of both ends, J/m⁶. The work [`Law::end_work`] of each end is
+    /// multiplied by the weight of this end in `weights`, and the two products are added.
     #[inline(always)]
     pub fn work_of_ends<S: Simd, L: Law<D>>(
         &self,
@@ -122,8 +122,8 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// Operation that combines two values of a quantity: two lanes of a sum, or a sum and the earlier entry of
-/// the column.
+/// Operation that combines two values of a quantity: two lanes of a sum, or a sum and the value that the
+/// column already contains for the point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
     /// Sum.
@@ -149,7 +149,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// combines each sum with the column of its quantity.
     type Sums: LaneTuple;
 
-    /// Point numbers of points i that the kernel reads.
+    /// Point numbers that the kernel reads for points i.
     type Point: LaneTuple;
 
     /// Point numbers that the kernel reads for points j: none, or the first numbers of [`Self::Point`].
@@ -165,11 +165,12 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether the kernel is implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
 
-    /// Whether [`Self::add`] can break bonds. Such a kernel is run by
-    /// [`sweep_and_break`](super::sweep::sweep_and_break).
+    /// Whether [`Self::add`] can break bonds. If so, [`sweep_and_break`](super::sweep::sweep_and_break) runs
+    /// the kernel.
     const BREAKS: bool = false;
 
-    /// Operation that combines each sum with its column. If the lanes of a sum belong to one point, the
+    /// Operation that combines the sum of a quantity at a point with the entry of this point in the column of
+    /// the quantity. If the lanes of a sum belong to one point, the
     /// operation first combines these lanes.
     const COMBINE: Combine = Combine::Add;
 
@@ -210,8 +211,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         wanted
     }
 
-    /// Whether sums depend only on reference positions and intact bits. The sums over the bonds of a lattice
-    /// are then cached for each pattern of intact bits. Such a kernel must not break or change bonds.
+    /// Whether sums depend only on reference positions and intact bits. If true, the sums over the bonds of a
+    /// lattice are cached for each pattern of intact bits, and the kernel must not break or change bonds.
     #[inline(always)]
     fn is_undeformed(&self) -> bool {
         false
@@ -223,7 +224,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         true
     }
 
-    /// Whether the bits of broken bonds are needed. Called only if [`Self::READS_BROKEN`] is true.
+    /// Whether the kernel needs [`Group::whole`], whose bits are also set for broken bonds. Called only if
+    /// [`Self::READS_BROKEN`] is true.
     #[inline(always)]
     fn needs_broken(&self) -> bool {
         Self::READS_BROKEN

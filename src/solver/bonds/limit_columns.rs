@@ -16,12 +16,12 @@ pub struct LimitsRead {
     pub truncation_factors: bool,
     /// Whether rotations are read.
     pub rotations: bool,
-    /// For each stress measure, in the order of [`StressMeasure::ALL`]: whether it is read.
+    /// Whether each stress measure is read, in the order of [`StressMeasure::ALL`].
     pub stresses: [bool; StressMeasure::ALL.len()],
 }
 
 impl LimitsRead {
-    /// Select the data that damage laws read: the damage laws of the blocks, and the damage laws of pairs of
+    /// Select the data that are read by the damage laws of the blocks and by the damage laws of pairs of
     /// bodies. `D` is the dimension of the problem.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
@@ -46,7 +46,7 @@ impl LimitsRead {
     }
 }
 
-/// [`Limits`] and rotations by column. A column that no criterion reads is empty.
+/// [`Limits`] and rotations of the points, stored in columns. A column that no criterion reads is empty.
 pub struct LimitColumns {
     /// Failure thresholds, indexed by local point (lists) or grid slot (lattices).
     pub thresholds: Column,
@@ -60,7 +60,7 @@ pub struct LimitColumns {
 
 impl LimitColumns {
     /// Allocate the columns that `read` selects, with `count` entries each. `number` is the index of the
-    /// thresholds among all columns that a loop reads, see [`Column`].
+    /// column [`Self::thresholds`] among all columns that a loop reads, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
@@ -97,8 +97,8 @@ pub struct ReadLimits<'a> {
     truncation_factors: Option<&'a [f64]>,
     /// Stress measure that the criterion reads, Pa; `None` if the criterion reads no stress.
     stresses: Option<&'a [f64]>,
-    /// Whether the criterion reads thresholds, truncation factors or stress measures. If not, one branch
-    /// skips all of these columns.
+    /// Whether the criterion reads thresholds, truncation factors or stress measures. If false,
+    /// [`Self::eight`] checks only this flag and skips all columns.
     any: bool,
 }
 
@@ -132,7 +132,7 @@ impl<'a> ReadLimits<'a> {
 
     /// Load the limits of eight points. `take` loads the entries of these points from one column. It is
     /// called only for columns whose length [`Self::new`] has checked. Stresses are loaded only if
-    /// `may_read_stresses`. This argument is a constant, so the compiler removes the branch.
+    /// `may_read_stresses` is true. This argument is a constant, so the compiler removes the branch.
     #[inline(always)]
     pub fn eight(&self, may_read_stresses: bool, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();

@@ -34,8 +34,8 @@ pub struct BondSums {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Allocate columns of zeros over the owned points, and call `sweep` with these columns for each pair of
-    /// blocks with bonds. Return the columns.
+    /// Allocate columns of zeros, with one entry per owned point. Call `sweep` with these columns for each
+    /// pair of blocks that have bonds to each other. Return the columns.
     fn measure(
         &mut self,
         owned: usize,
@@ -243,10 +243,10 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// Compute the rate of change of the strain energy density of each owned point if every point moves with
-    /// its rate v. The result is Σ T·(v_j − v_i) Ṽ over the intact bonds. T are the force states of the last
-    /// [evaluation](Self::evaluate). `rate` contains the components of v at the local points, including
-    /// ghosts. The unit of the result is J/m⁴ times the unit of v.
+    /// Compute the rate of change of the strain energy density of each owned point. v is the given rate of
+    /// change of a point's displacement. The result is Σ T·(v_j − v_i) Ṽ over the intact bonds. T are the
+    /// force states of the last [evaluation](Self::evaluate). `rate` contains the components of v at the
+    /// local points, including ghosts. The unit of the result is J/m⁴ times the unit of v.
     pub fn energy_rate(&mut self, owned: usize, rate: [Column; D]) -> Vec<f64> {
         // The kernel reads the rates as the first point numbers.
         for grid in &mut self.grids {

@@ -139,9 +139,10 @@ fn add_tensor<S: Simd, const D: usize>(
 }
 
 /// Kernel that sums the tensor D = Σ V_j C n⊗n (N/m⁴) over the intact bonds in the reference configuration.
-/// The sums are xx, yy, zz, xy, yz, xz. n is ξ/|ξ|. C is the sum over both ends of [`Law::stiffness`] times
-/// the weight of the end. If the law of an end [resists displacements across](Law::resists_across) the bonds,
-/// the part of this end in C is multiplied by the identity I instead of n⊗n.
+/// The sums are xx, yy, zz, xy, yz, xz. n is ξ/|ξ|. C is a sum over both ends: each end contributes its
+/// [`Law::stiffness`] times its weight. If the law of an end
+/// [resists displacements across](Law::resists_across) the bonds, the contribution of this end to C is
+/// multiplied by the identity I instead of n⊗n.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -253,8 +254,10 @@ impl<const D: usize> Kernel<D> for OutOfPlaneStress {
     }
 }
 
-/// Kernel that sums two tensors over the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ (diagonal
-/// entries, then mixed entries), and Σ ω η⊗ξ Ṽ (row by row).
+/// Kernel that sums two tensors over the intact bonds of a point, m⁵:
+///
+/// - the shape tensor Σ ω ξ⊗ξ Ṽ: the diagonal entries, then the mixed entries;
+/// - Σ ω η⊗ξ Ṽ, row by row.
 #[derive(Clone, Copy)]
 pub struct FamilyTensors {
     /// Exclude thermal stretches.

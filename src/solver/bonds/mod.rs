@@ -4,9 +4,8 @@
 //! over the bonds of every point. For a bond ij, later passes read the results of an earlier pass either of
 //! point i only, or of both points. A pass begins with a halo exchange if it reads values that other ranks
 //! have changed. The first exchange sends displacements and thermal stretches. Later exchanges send
-//! thresholds and point numbers. Point numbers are values of a point, such as the dilatation, that the law of
-//! the point computes from sums over the bonds of the point. Interior points are processed while messages
-//! are in flight.
+//! thresholds and point numbers. Point numbers are values, such as the dilatation, that a law computes for a
+//! point from sums over the bonds of this point. Interior points are processed while messages are in flight.
 //!
 //! Bonds that meet their criterion break in the pass that sums the forces. Point numbers and forces that
 //! depend on broken bonds are then recomputed, see `broken.rs`.
@@ -364,8 +363,7 @@ impl<const D: usize> Forces<D> {
         &self.halo
     }
 
-    /// Break the bonds for which `crosses(i, j)` is true; i and j are local indices. Only bonds ij of points
-    /// i for which `concerned(i)` is true are checked.
+    /// Break the bonds ij for which `concerned(i)` and `crosses(i, j)` are true; i and j are local indices.
     pub fn cut(
         &mut self,
         concerned: impl Fn(usize) -> bool,

@@ -15,7 +15,7 @@ use super::interaction::BlockLaws;
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
 
-/// Maximum number of point numbers.
+/// Maximum count of point numbers per point.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
 /// Index of the first column of the plastic state among the columns of a pass.
@@ -28,9 +28,11 @@ const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
 /// Point numbers, one column per number. The first columns contain owned points and ghosts, because bonds
-/// read these columns. The other columns, which only laws read, contain owned points only.
+/// read these columns. The other columns contain owned points only, because bonds do not read them. Laws read
+/// them per point.
 pub struct PointNumbers {
-    /// The point numbers by column; 0 for points whose law does not have that number.
+    /// The point numbers, one column per number. An entry is 0 if the law of the point does not have the
+    /// number of the column.
     pub columns: Vec<Column>,
     /// Number of columns that bonds read.
     pub read: usize,
@@ -45,8 +47,8 @@ pub struct PointNumbers {
 }
 
 impl PointNumbers {
-    /// Allocate the point numbers that the laws of the blocks declare, with the value 0. The blocks and laws
-    /// are the same on all ranks.
+    /// Allocate the point numbers that the laws of the blocks declare. Their initial value is 0. The blocks
+    /// and laws are the same on all ranks.
     pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);

@@ -7,8 +7,8 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Request only x of the bonds, see [`crate::material::bond`]. The stretch and the extension over the
-/// deformed length are not requested.
+/// Request only x (`relative_square_extension`) of the bonds, see [`crate::material::bond`]. The stretch
+/// and the extension over the deformed length are not requested.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -22,8 +22,8 @@ const fn extension_only(linear: bool) -> Wanted {
 pub struct PassSum<L, const N: usize> {
     /// The law of point i.
     pub law: L,
-    /// Bond update of the force sum that follows. If this update advances the bond history, point sums with
-    /// [`Law::reads_advanced_history`] read the advanced history.
+    /// Bond update of the force sum that follows. If this update advances the bond history, and if
+    /// [`Law::reads_advanced_history`] is true for pass `N`, the point sum reads the advanced history.
     pub bond_update: BondUpdate,
 }
 
@@ -69,10 +69,10 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Kernel that sums the data for a point's constants over the undeformed family. For laws without a shape
-/// tensor, the sum contains only the intact bonds, so it omits the bonds that pre-cracks cut. For laws with a
-/// shape tensor, the sum contains the cut bonds, too, because such laws compare the intact family with the
-/// whole family.
+/// Kernel that sums over the undeformed family of a point. The constants of the point are computed from the
+/// sum. For laws without a shape tensor, the sum contains only the intact bonds, so it omits the bonds that
+/// pre-cracks cut. For laws with a shape tensor, the sum contains the cut bonds, too, because such laws
+/// compare the intact family with the whole family.
 #[derive(Clone, Copy)]
 pub struct FamilySum<const D: usize> {
     /// The law of point i.
@@ -119,8 +119,8 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     }
 }
 
-/// Kernel of the smallest stretch s_min of the intact bonds within the horizon of each point. The stretch is
-/// stored as x of [`crate::material::bond`]; +∞ if no such bond exists.
+/// Kernel that finds, for each point, the smallest stretch s_min of the intact bonds within the horizon. The
+/// stretch is stored as x of [`crate::material::bond`]; +∞ if no such bond exists.
 #[derive(Clone, Copy)]
 pub struct SmallestStretch;
 

@@ -1,8 +1,8 @@
 //! The separation energy of a body. In this file, the block is a rectangular sample of the body's lattice. A
-//! plane between two layers of points divides the block into two halves. The middle column contains the
-//! points within half a cell of the line through the centre of the block along the normal of the plane. The
-//! upper half moves away from the lower half until no intact bond of a point in the middle column crosses the
-//! plane.
+//! plane between two layers of points divides the block into two halves. The centre line of the block runs
+//! through the centre of the block, normal to the plane. The middle column contains the points within half a
+//! cell of this line. The upper half moves away from the lower half until no intact bond of a point in the
+//! middle column crosses the plane.
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};

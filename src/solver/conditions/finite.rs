@@ -132,7 +132,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
 
     /// Return an error if a component is not finite at a point of a set. `components` contains an expression
     /// and a factor for each component. The component is the product of both. `names` has one entry per
-    /// component, such as "component x is". The message has this entry before the value. Collective.
+    /// component, such as "component x is". In the error message, the entry of the component precedes its
+    /// value. Collective.
     fn check_values<'e>(
         &self,
         key: &str,

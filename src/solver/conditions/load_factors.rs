@@ -1,6 +1,7 @@
 //! Factors on loads, which an observer may change during a run.
 
-/// Multiplier of the hash, an odd number with random bits: 2⁶⁴ divided by the golden ratio.
+/// Multiplier in the hash of requests: 2⁶⁴ divided by the golden ratio, rounded to an odd number. The bits of
+/// this number look random.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only factors of

@@ -354,8 +354,8 @@ impl<const D: usize> Conditions<D> {
         self.temperatures.set_time(time);
     }
 
-    /// Make [`PartConditions::apply_temperatures`] set all temperatures after the next call of
-    /// [`Self::set_temperatures`].
+    /// Make the next call of [`Self::set_temperatures`] mark all temperatures as changed.
+    /// [`PartConditions::apply_temperatures`] then sets the temperatures of all points.
     pub fn reset_temperatures(&mut self) {
         self.temperatures.reset();
     }
@@ -437,8 +437,8 @@ impl<const D: usize> Conditions<D> {
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in one step,
     /// but that is not part of the recorded work. `step` is the length of the step, s. The work is
     /// integrated by the trapezoidal rule, which misses this energy. A load contributes the energy that it
-    /// adds in one step to points initially at rest. A supported component contributes the energy of its
-    /// velocity. It also contributes the energy that a point initially at rest gains from the prescribed
+    /// adds in one step to points initially at rest. A supported component contributes the kinetic energy of
+    /// its velocity. It also contributes the energy that a point initially at rest gains from the prescribed
     /// acceleration in one step.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density on a point jumps
@@ -474,7 +474,7 @@ fn part_of(point: u32) -> usize {
     point as usize / PART
 }
 
-/// Return the indices of owned points in their part, and their positions (m).
+/// Return two values for each of these owned points: its index in its part, and its position (m).
 fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16>, Vec<[f64; 3]>) {
     let each = points.iter().map(|point| *point as usize);
     each.map(|point| ((point % PART) as u16, model.position(point)))
@@ -482,7 +482,7 @@ fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16
 }
 
 impl<'a, const D: usize> PartConditions<'a, D> {
-    /// Combine the conditions of the stage with the points of one part on which they act.
+    /// Combine the conditions of the stage with `on`, the points of one part on which these conditions act.
     pub fn new(stage: StageConditions<'a, D>, on: &'a mut OnPart<D>) -> Self {
         Self { stage, on }
     }

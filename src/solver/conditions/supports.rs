@@ -31,7 +31,7 @@ pub struct Support {
 struct PrescribedDisplacement {
     /// Length of the last step, s; 0 at the start.
     step: f64,
-    /// The prescribed values (displacements or velocities) at the start and the end of this step.
+    /// The prescribed values (displacements or velocities) at the start and the end of the last step.
     values: [At; 2],
 }
 
@@ -147,8 +147,8 @@ impl Supported {
         (supports[self.support].component, points)
     }
 
-    /// Store reactions and displacements for the work of the next step. The arguments are the displacements
-    /// (m) and reactions (N/m³) of all points of the part.
+    /// Store reactions and displacements. [`Self::add_work`] uses them to compute the work of the support.
+    /// The arguments are the displacements (m) and reactions (N/m³) of all points of the part.
     pub fn record_for_work<const D: usize>(
         &mut self,
         supports: &[Support],

@@ -54,7 +54,7 @@ impl Temperatures {
         }
     }
 
-    /// Make [`Self::apply`] set all temperatures after the next call of [`Self::set_time`].
+    /// Ensure that [`Self::apply`] sets all temperatures after the next call of [`Self::set_time`].
     pub fn reset(&mut self) {
         self.time = None;
     }

@@ -9,8 +9,9 @@
 //! N_b ≤ stable_broken in `steps` consecutive steps    Δt ← Δt · raise, up to the largest
 //! ```
 //!
-//! N_b is the largest number of bonds of a point that break in a step, over all ranks. All ranks therefore
-//! make the same decision. The other names are those of [`Adaptive`] and of the keys of `[time.adaptive]`.
+//! For each point, the bonds that break in the step are counted. N_b is the largest of these counts over the
+//! points of all ranks. All ranks therefore make the same decision. The other names are those of [`Adaptive`]
+//! and of the keys of `[time.adaptive]`.
 
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
@@ -80,7 +81,7 @@ impl StepControl {
     }
 
     /// Return whether a step of `size` (s) must be rolled back, and set the size of the next step. `broken`
-    /// is the largest number of bonds of a point that broke in the step.
+    /// is the largest number of bonds that one point has lost in the step.
     fn undoes(&mut self, rule: &Adaptive, size: f64, broken: u64) -> bool {
         let [smallest, largest] = self.limits;
         if broken > rule.most_broken && size > smallest {

@@ -1,10 +1,11 @@
-//! The coarse grid of a preconditioner, for long waves in the displacement of a body.
+//! The coarse grid of a preconditioner. The grid is effective for long waves in the displacement of a body.
 //!
 //! A grid of box cells covers all bodies. Each edge of a cell is at least one horizon long, except along an
 //! axis with a single cell. Displacements are defined at the nodes and are linear along each axis within a
 //! cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
 //! volume-weighted averages over its points. Each point contributes its constants times its fraction of
-//! intact bonds. A supported component of a point acts as a spring at the position of the point in its cell.
+//! intact bonds. If a support prescribes a component of a point's motion, a spring resists this component
+//! of the displacement at the position of the point.
 //! Forces on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
 //! interpolated to the points (prolongation) with the same weights, so the preconditioner is symmetric.
 //!
@@ -26,15 +27,15 @@ use super::load_step::CHUNK;
 /// Minimum edge of a cell, in horizons.
 const EDGE: f64 = 1.0;
 
-/// Factor by which edges grow until the matrix is small enough.
+/// The edges of the cells are multiplied by this factor repeatedly until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Maximum number of multiply-adds per point to solve with the factored matrix. A force evaluation needs
-/// about as many multiply-adds for a point with few bonds.
+/// Maximum number of multiply-adds per point to solve with the factored matrix. The force evaluation of a
+/// point with few bonds needs about this number of multiply-adds.
 const SOLUTION: f64 = 16.0;
 
-/// Maximum number of multiply-adds to solve with the factored matrix, if there are so few points that
-/// `SOLUTION` gives a smaller maximum.
+/// Maximum number of multiply-adds to solve with the factored matrix if there are few points. This maximum
+/// applies if `SOLUTION` times the number of points is smaller.
 const LEAST_SOLUTION: f64 = 2e4;
 
 /// Maximum number of multiply-adds of the factorization.

@@ -14,8 +14,8 @@ const CONTACT_RESERVE: f64 = 0.95;
 /// the first long step.
 const GROWTH: f64 = 2.0;
 
-/// Number of consecutive adaptive steps that contact does not limit, after which the step may grow by any
-/// factor.
+/// Number of consecutive adaptive steps. If contact has not limited this number of steps, the next step may
+/// grow by any factor.
 const LONG_CALM: u64 = 400;
 
 /// A step counts as not limited by contact if it is below this fraction of the step that contact allows.

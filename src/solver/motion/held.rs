@@ -26,7 +26,8 @@ struct UnheldLoad {
     force: f64,
 }
 
-/// Loads that rotate a piece that no support holds; the same on all ranks.
+/// Loads that rotate a piece, although no support holds the piece in the plane of the rotation; the same on
+/// all ranks.
 pub struct UnheldTorque {
     /// Index of the condition with the largest contribution to the torque.
     pub condition: usize,
@@ -39,8 +40,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Collective.
     ///
     /// # Errors
-    /// If a piece is loaded along an axis, but no support holds it along this axis. Of several such pieces,
-    /// the message names the one with the smallest point id.
+    /// If a piece is loaded along an axis, but no support holds it along this axis. If there are several such
+    /// pieces, the message names the piece that contains the point with the smallest id.
     pub(in crate::solver) fn check_loads_are_held(&mut self) -> Result<()> {
         for stage in 0..self.stages.all.len() {
             let found = self.at_load_steps(stage, |simulation, pieces, time| {
@@ -119,8 +120,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Return an error if a piece is loaded along an axis, but no support holds it along this axis. The
-    /// message begins with `failure`. Of several such pieces, the message names the one with the smallest
-    /// point id. Collective.
+    /// message begins with `failure`. If there are several such pieces, the message names the piece that
+    /// contains the point with the smallest id. Collective.
     pub(super) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
         let pieces = self.find_pieces(self.unloaded_points());
         self.unheld_load(&pieces).map_or(Ok(()), |unheld| {

@@ -31,7 +31,7 @@ use super::stable_step::largest_eigenvalue;
 /// Minimum number of points of a task in a parallel loop; the last task may have fewer.
 pub(super) const CHUNK: usize = 4096;
 
-/// Factor on the fictitious density: a reserve for bonds that rotate.
+/// Safety factor on the fictitious density, because rotations of bonds can increase the stiffness of a point.
 const MARGIN: f64 = 1.2;
 
 /// The unbalanced force is round-off if its norm is below this fraction of ‖V ρ u‖.
@@ -43,16 +43,18 @@ pub struct LoadStep {
     /// Number of iterations in this load step. The prediction with which Newton's method begins a load step
     /// does not count.
     pub iterations: u64,
-    /// Number of iterations since bonds last broke in this load step, or since the start of the load step.
+    /// Number of iterations in this load step since bonds last broke. If no bonds have broken in this load
+    /// step, the number of all its iterations.
     pub since_breaking: u64,
     /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
     /// point. The residual is 0 if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation, see [`super::relaxation`]; NaN if all points are at rest.
     pub(super) damping: f64,
-    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, and largest ‖f‖ at the start of a load step
-    /// without loads and reactions, N. The tolerance is relative to at least this norm, so the allowed ‖f‖
-    /// does not shrink when a body is unloaded or breaks.
+    /// The larger of two values, N. The first is the largest ‖loads‖ + ‖reactions‖ of the equilibria so far.
+    /// The second is the largest ‖f‖ at the start of a load step without loads and reactions. The tolerance
+    /// is relative to at least the larger value, so the allowed ‖f‖ does not shrink when a body is unloaded
+    /// or breaks.
     pub(super) scale: f64,
     /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,
@@ -85,7 +87,8 @@ impl LoadStep {
         format!("t = {time:.6e} s: no equilibrium after {iterations} iteration(s)")
     }
 
-    /// Compute the residual from the squared norms: the values of [`balance`], summed over all points.
+    /// Compute the residual. `squares` contains the squares of four norms: the values of [`balance`], summed
+    /// over all points.
     pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
         // A free body without loads, for example under a temperature, has only this force to compare with.
@@ -199,7 +202,8 @@ impl<const D: usize> Simulation<'_, D> {
         };
     }
 
-    /// Record the last equilibrium. With `again`, repeat the motion of the last load step.
+    /// Record the present displacements and reactions as the last equilibrium. If `again` is true, the points
+    /// then repeat their motion of the last load step.
     fn note_equilibrium(&mut self, again: bool) {
         let owned = self.model.owned();
         let fields = &mut self.fields;

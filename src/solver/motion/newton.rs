@@ -63,7 +63,7 @@ const LINE_SEARCH_TOLERANCE: f64 = 0.9;
 /// Value of η for the first linear problem of a run.
 const FIRST_FORCING: f64 = 0.01;
 
-/// Upper limit of later values of η.
+/// Upper limit of η for all linear problems after the first.
 const MOST_FORCING: f64 = 0.1;
 
 /// Lower bound of the tolerance of the linear problem, as a fraction of the tolerance of the load step.
@@ -79,10 +79,10 @@ pub struct NewtonState {
     /// Number of force evaluations of the present load step, by relaxation or by Newton's method. In explicit
     /// stages, the number of force evaluations of the present time step.
     pub evaluations: u64,
-    /// η of the next solution of a linear problem.
+    /// Relative tolerance η for the next solution of the linear problem K x = f.
     forcing: f64,
-    /// Mean of the diagonal of K, divided by the mean of ρ φ, where ρ is the fictitious density and φ the
-    /// fraction of intact bonds of a point; NaN until it is computed.
+    /// Mean of the diagonal of K, divided by the mean of ρ φ; NaN until it is computed. Here ρ is the
+    /// fictitious density, and φ the fraction of intact bonds of a point (not the damage).
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,
@@ -530,8 +530,8 @@ impl<const D: usize> Vectors<D> {
         });
     }
 
-    /// Estimate [`NewtonState::diagonal`], and replace an estimate that is not positive by 1. For a vector s
-    /// of random signs, s·K s approximates the trace of K (Hutchinson 1990). Collective.
+    /// Estimate [`NewtonState::diagonal`]. If the estimate is not positive or not finite, use 1 instead. For
+    /// a vector s of random signs, s·K s approximates the trace of K (Hutchinson 1990). Collective.
     fn measure_diagonal(&mut self, simulation: &mut Simulation<'_, D>) {
         let owned = simulation.model.owned();
         for d in 0..D {
@@ -656,7 +656,8 @@ fn move_from<const D: usize>(
     }
 }
 
-/// Call `change` on several threads, with the first index and the entries of each chunk of a column.
+/// For each chunk of a column, call `change` with the index of the first entry and with the entries. The
+/// calls run on several threads.
 fn in_chunks(column: &mut [f64], change: &(dyn Fn(usize, &mut [f64]) + Sync)) {
     let chunks = column.par_chunks_mut(CHUNK).enumerate();
     chunks.for_each(|(k, chunk)| change(k * CHUNK, chunk));

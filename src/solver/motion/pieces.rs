@@ -45,8 +45,8 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// Find the pieces of all bodies. `is_unloaded` contains the columns of [`Self::unloaded_points`] at one
-    /// time, or the minima of these columns over several times. The supports of the present stage apply.
-    /// Collective.
+    /// time, or the minima of these columns over several times. The supports of the present stage determine
+    /// which components are free. Collective.
     pub(super) fn find_pieces(&mut self, is_unloaded: [Vec<f64>; D]) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
         let mut pieces = Pieces {

@@ -121,8 +121,9 @@ impl<const D: usize> Simulation<'_, D> {
         Ok(())
     }
 
-    /// Check that a saved state has the columns with these names, bond states with these lengths (bytes per
-    /// point), and progress of the expected length.
+    /// Check that a saved state fits this run. `names` are the expected names of the columns. `lengths` are
+    /// the expected lengths of the bond states (bytes per point). Also check the length of the saved
+    /// progress.
     fn check_matches(&self, names: &[String], lengths: &[u32], saved: &Saved) -> Result<()> {
         let error = |what: String| Err(Error::run(format!("the checkpoint {what}")));
         let saved_names: Vec<&str> = (saved.columns.iter())

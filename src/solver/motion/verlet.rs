@@ -33,8 +33,8 @@ fn constants<const D: usize>(model: &Model<D>, block: u16) -> Constants {
     (model.density[block], model.damping[block])
 }
 
-/// Return the constants if all points of the part belong to the same block. The compiler can then vectorize
-/// over points.
+/// Return the constants if all points of the part belong to the same block. With the same constants for all
+/// points, the compiler can vectorize the loop over the points.
 fn same_constants<const D: usize>(part: &Part<'_, D>) -> Option<Constants> {
     let (first, others) = part.blocks().split_first()?;
     let is_same = others.iter().all(|block| block == first);

@@ -181,8 +181,8 @@ pub fn parts(owned: usize) -> usize {
     owned.div_ceil(PART)
 }
 
-/// One or several adjacent parts, with their entries in `each`, an argument of [`walk`]. Each part has one
-/// entry.
+/// One or several adjacent parts, and one entry for each part. The entries come from the argument `each` of
+/// [`walk`].
 type Parts<'a, C, const D: usize> = (Part<'a, D>, &'a mut [C]);
 
 /// Split several parts into two halves; a single part is not split.

@@ -234,7 +234,8 @@ fn drop_stubs(parts: &mut [Part]) {
     }
 }
 
-/// Number the sets of connected points: for each reached point, return the number of its set, from 0 on.
+/// Assign the numbers 0, 1, … to the sets of connected points. For each reached point, return the number of
+/// its set.
 /// Points that are not reached have the number `usize::MAX`.
 fn connected_sets(places: &[[f64; 3]], bins: &Bins, paths: &ShortestPaths) -> Vec<usize> {
     let mut set_of = vec![usize::MAX; places.len()];
@@ -259,9 +260,9 @@ fn connected_sets(places: &[[f64; 3]], bins: &Bins, paths: &ShortestPaths) -> Ve
     set_of
 }
 
-/// Find the parts at which branches begin. In each set of connected points, this is the part without a parent
-/// that has the largest `farthest`; a crack that surrounds a hole or a wide notch thus counts once. If any of
-/// these parts has children, those without children are left out.
+/// Find the parts at which branches begin. In each set of connected points, choose the part with the largest
+/// `farthest` among the parts without a parent. A crack that surrounds a hole or a wide notch thus counts
+/// once. If any of the chosen parts has children, the chosen parts without children are left out.
 fn roots(parts: &[Part], set_of: &[usize]) -> Vec<usize> {
     let mut roots: Vec<usize> = Vec::new();
     let set = |number: usize| set_of[parts[number].members[0]];
@@ -278,7 +279,8 @@ fn roots(parts: &[Part], set_of: &[usize]) -> Vec<usize> {
     roots
 }
 
-/// Construct the branches: lines that join the centroids of successive parts, from the parts `roots` on.
+/// Construct the branches. A branch is a line that joins the centroids of successive parts. The construction
+/// begins at the parts `roots`.
 fn lines(
     from: [f64; 3],
     points: &[Damaged],

@@ -35,7 +35,7 @@ pub struct GlobalState {
     pub force_evaluations: u64,
     /// Number of steps rolled back so far.
     pub undone_steps: u64,
-    /// Largest number of bonds of one point that broke in one step, over the steps since the last row.
+    /// Largest number of bonds that broke at one point in one step, among the steps since the last row.
     pub most_broken: u64,
     /// Energy added by changes of the density scale, J.
     pub density_scale_energy: f64,

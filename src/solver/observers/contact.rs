@@ -5,8 +5,9 @@
 //!
 //! If the bounding boxes of two bodies overlap or nearly touch, a third box is computed. It contains all
 //! points of each body that are near the other body. The points in this box are distributed to the ranks by
-//! spatial cells. Each rank then compares the points of its cells. A point of the second body may be too near
-//! to points of the first body in several cells. It is sent to the ranks of all these cells.
+//! spatial cells. Each rank then compares the points of its cells. Points of
+//! the first body that are too near to a point of the second body may lie in several cells. The point of the
+//! second body is sent to the ranks of all these cells.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -25,9 +26,9 @@ const CELL: f64 = 8.0;
 /// distance is below this fraction of their initial distance.
 const NEARER: f64 = 0.9;
 
-/// If bonds joined two bodies at the start of the run, a point of one body and a point of the other body are
-/// too near if their distance is below this fraction of both their spacing and their initial distance.
-/// Compression alone rarely reaches this distance.
+/// Fraction for two bodies that bonds joined at the start of the run. A point of one body and a point of the
+/// other body are too near if their distance is below this fraction of their spacing, and also below this
+/// fraction of their initial distance. Compression alone rarely reaches this distance.
 const PASSED: f64 = 0.5;
 
 /// Minimum number of points that one task processes; the last task may have fewer.

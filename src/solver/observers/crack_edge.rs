@@ -14,14 +14,14 @@ const ONE_SIDED: f64 = 0.2;
 /// point.
 const CONE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Sine of 14°, the largest angle between the plane of the crack and the bond to an undamaged point ahead.
+/// Sine of 14.5°, the largest angle between the plane of the crack and the bond to an undamaged point ahead.
 const IN_PLANE: f64 = 0.25;
 
 /// Edge of the damaged region at a damaged point.
 pub struct Edge {
     /// Vector from the point to the mid-plane of the crack, m.
     pub to_middle: Vector,
-    /// Unit vector in the plane of the crack that points away from the damaged points.
+    /// Unit vector in the plane of the crack. The vector points away from the damaged points.
     ahead: Vector,
     /// Unit normal of the crack.
     normal: Vector,
@@ -31,9 +31,9 @@ impl Edge {
     /// Return the edge of the damaged region at a damaged point. `None` if the point is inside the region, if
     /// the point is at an edge of the body, or if no other damaged points are around it.
     ///
-    /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of g
-    /// ⊗ g over these points and the point itself, 1/m²; g is the result of
-    /// [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `mean` is the result of
+    /// `bonds` are the vectors (m) from the point to the damaged points around it. `normals` is the sum of
+    /// g ⊗ g over the point and the damaged points around it, 1/m². For each of these points, g is the result
+    /// of [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `mean` is the result of
     /// [`Moments::mean`](crate::solver::bonds::Moments::mean) for the point, m. `radius` is the radius of the
     /// family, m.
     ///

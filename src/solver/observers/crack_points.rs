@@ -9,7 +9,7 @@ use crate::solver::conditions::{members, not_empty};
 /// gap of one point, and short enough to separate two branches soon after their fork.
 const LINK: f64 = 2.0 / 3.0;
 
-/// Find the owned points of the set of a crack. Collective.
+/// Find the owned points in the set that is evaluated for a crack. Collective.
 ///
 /// # Errors
 /// If the set is empty; the error is the same on all ranks.

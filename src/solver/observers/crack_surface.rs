@@ -49,7 +49,9 @@ pub struct CrackSurface {
     points: Vec<u32>,
     /// Distance up to which damaged points are connected, m.
     link: f64,
-    /// Radius around a point within which damaged points are considered, m; at most one horizon.
+    /// Radius in m, at most one horizon. A point contributes to the area only if a damaged point of the crack
+    /// lies within this radius. Whether a damaged point is on the front depends on the damaged points within
+    /// this radius.
     radius: f64,
     /// Minimum distance between points of the front, m.
     front_spacing: f64,

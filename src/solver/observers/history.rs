@@ -45,7 +45,8 @@ pub struct HistoryObserver {
     columns: Columns,
     /// For each set of `reactions` in the deck, this rank's points of the set.
     reactions: Vec<Vec<u32>>,
-    /// For each support force, this rank's points of the set, and the direction of the force component.
+    /// For each `[history.force.NAME]` of the deck, this rank's points of the set, and the direction in which
+    /// the component of the force is taken.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
     statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
@@ -64,8 +65,9 @@ pub struct HistoryObserver {
     largest_past_energy: f64,
 }
 
-/// Columns whose largest value in earlier rows is the largest energy before a restart. The kinetic energies
-/// of rigid bodies, one column per body, are left out.
+/// Columns with energies. After a restart, the largest magnitude in these columns of earlier rows is taken as
+/// the largest energy before the restart. The kinetic energies of rigid bodies, one column per body, are left
+/// out.
 const ENERGIES: [&str; 6] = [
     "kinetic_energy",
     "strain_energy",
@@ -664,7 +666,8 @@ fn columns_of<const D: usize>(problem: &Problem) -> Columns {
     columns
 }
 
-/// Name of the column with the length of the crack that has this tip.
+/// Return the name of the history column for the length of a crack. `tip` is the name of the tip of this
+/// crack.
 fn length_of(tip: &str) -> String {
     format!("tip_{tip}_length")
 }

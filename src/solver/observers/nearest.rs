@@ -1,4 +1,4 @@
-//! Search of the point nearest to a position.
+//! Search for the point nearest to a position.
 
 use crate::comm::{Found, least};
 use crate::points::distance_squared;

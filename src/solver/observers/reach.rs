@@ -71,9 +71,9 @@ impl Course {
     /// distance from the start of the line, measured along the line. Between the farthest point and the next
     /// points, the values are interpolated linearly. The result is the position at which
     /// the interpolated value equals the threshold. Without next points, it is the position of the farthest
-    /// point. If several points are equally far along the line, the largest of their values is used. While
-    /// values grow, the result therefore moves along the line without jumps, also when the value of a next
-    /// point begins to exceed the threshold.
+    /// point. If several points are equally far along the line, the interpolation uses the largest
+    /// of their values. While values grow, the result therefore moves along the line without jumps, also when
+    /// the value of a next point begins to exceed the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

@@ -29,7 +29,7 @@ impl Schedule {
     }
 
     /// Whether output is due. Output is due at the start and at the end of a stage. Output is also due in the
-    /// first step that reaches, up to round-off, a multiple of the interval or a given time.
+    /// first step that reaches a multiple of the interval or one of the given times, up to round-off.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;

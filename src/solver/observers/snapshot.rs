@@ -161,8 +161,9 @@ impl Snapshot {
 }
 
 /// Convert Kirchhoff stress to Cauchy stress, with six components per point. The stress is divided by J, the
-/// ratio of deformed to undeformed volume. J depends on the stretch perpendicular to the plane or bar. In
-/// plane stress, some laws compute this stretch. Otherwise, the stretch follows from Hooke's law with
+/// ratio of deformed to undeformed volume. In plane stress and under uniaxial stress, J depends on the
+/// stretch perpendicular to the plane or bar. In plane stress, some laws compute this stretch. For the other
+/// laws in plane stress, and for all laws under uniaxial stress, the stretch follows from Hooke's law with
 /// logarithmic strains: ε_zz = −ν/(1 − ν) (ε_xx + ε_yy) in plane stress, and ε_yy = ε_zz = −ν ε_xx under
 /// uniaxial stress.
 fn cauchy_stress<const D: usize>(
@@ -283,9 +284,9 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_plane:
 }
 
 /// Thermal stretch of an owned point in 3-D, in plane stress, or in a bar that can expand sideways; 0 without
-/// temperatures. Under plane or uniaxial strain, the result is 0. The stretch ratio perpendicular to the
-/// plane or bar is then 1, so the determinant of F is also the determinant of the 3-D deformation gradient.
-/// No thermal correction is needed.
+/// temperatures. Under plane or uniaxial strain, the result is 0, because no thermal correction is needed.
+/// The stretch ratio perpendicular to the plane or bar is then 1, so the determinant of F is also the
+/// determinant of the 3-D deformation gradient.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],
@@ -293,8 +294,9 @@ fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) ->
     }
 }
 
-/// Thermal stress −E α (T − T₀) of an owned point under plane or uniaxial strain, Pa. E is Young's modulus, α
-/// the coefficient of thermal expansion, T the temperature, and T₀ the reference temperature.
+/// Return −E α (T − T₀) of an owned point, Pa. This is the thermal stress in plane strain. The thermal stress
+/// under uniaxial strain is this value divided by 1 − ν. E is Young's modulus, ν Poisson's ratio, α the
+/// coefficient of thermal expansion, T the temperature, and T₀ the reference temperature.
 fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let Some(temperature) = &simulation.fields.temperature else {
         return 0.0;

@@ -103,8 +103,8 @@ impl Tip {
 ///
 /// If the crack grew by less than one horizon in the interval, the speed would show each jump of the tip from
 /// one point of the lattice to the next. If the interval had a fixed number of rows, the speed would depend
-/// on the time between rows. A crack that has not grown has speed 0. After a crack stops, its speed is about
-/// one horizon divided by the duration of the interval. This duration grows from row to row.
+/// on the time between rows. A crack that has not grown has speed 0. After a crack has stopped, the computed
+/// speed is about one horizon divided by the duration of the interval. This duration grows from row to row.
 struct Growth {
     horizon: f64,
     /// Time (s) and length of the crack (m) in each row with a tip.

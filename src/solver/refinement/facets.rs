@@ -10,8 +10,8 @@ use crate::solver::assign::cutoffs;
 const OVERLAP: f64 = 1.0 + 1e-6;
 
 /// The facets of all ranks. A facet lies between two adjacent points whose bond is broken. A facet also lies
-/// between two points that were adjacent in a coarser grid, if their bond was broken when the grid between
-/// them was refined.
+/// between two points that were adjacent in a coarser grid, if their bond had already broken before the grid
+/// between them was refined.
 pub struct Facets {
     all: Vec<Facet>,
     bins: Bins,
@@ -106,7 +106,8 @@ struct Facet {
 }
 
 impl Facet {
-    /// Whether the line segment between two positions (m) crosses the facet. Adjacent facets leave no gap.
+    /// Whether the line segment between two positions (m) crosses the facet. Facets are enlarged by
+    /// the factor `OVERLAP`, so no segment passes between adjacent facets.
     fn is_crossed(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let axis = self.axis as usize;
         let [before, after] = [from, to].map(|place| place[axis] - self.centre[axis]);

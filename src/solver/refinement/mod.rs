@@ -162,8 +162,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (energy, comm::total(self.comm, snapshot.intact()))
     }
 
-    /// Continue the run on other grids, with the state of all points and bonds. `removed` are the nodes that
-    /// the other grids no longer have. Collective.
+    /// Continue the run on the new `grids`, with the state of all points and bonds. `removed` are the nodes
+    /// that the new grids no longer contain. Collective.
     ///
     /// # Errors
     /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
@@ -203,7 +203,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// Create the points of other grids in the level-0 cells of this rank.
+    /// Create the points of `grids` that lie in the level-0 cells of this rank.
     fn pieces_on(&self, grids: &Grids<'a>) -> Vec<Point> {
         let coarse = self.pieces().into_iter();
         let coarse = coarse.filter(|point| point.id < grids.coarsest());

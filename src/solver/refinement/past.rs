@@ -7,7 +7,7 @@ use crate::refine::{GridIndex, Grids, NodeKey};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
-/// Value that replaces the previous block of a point that did not exist before a refinement.
+/// Placeholder for the previous block of a point that did not exist before a refinement.
 pub const NOWHERE: f64 = -1.0;
 
 /// State of the local points, including ghosts, before a refinement. Energies are stored as densities. The

@@ -14,8 +14,8 @@ use super::super::kernel::Kernel;
 use super::super::list_points::store_history;
 use super::{Part, PointData, Results, Runner};
 
-/// Maximum number of cached bit patterns per task. Many patterns at curved surfaces never recur, so a full
-/// cache is cleared.
+/// Maximum number of cached bit patterns per task. When the cache is full, all patterns are removed. At
+/// curved surfaces, many patterns never recur, and would otherwise stay in the cache.
 const CACHE_CAPACITY: usize = 256;
 
 impl Part for Vectors<'_> {
@@ -38,8 +38,8 @@ pub(super) struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     points: GridPoints<'a, K, D>,
     /// `None` for kernels that break no bonds.
     breaking: Option<BreakingInVectors<'a, D>>,
-    /// The bits of all bonds of all lane groups, including broken bonds; empty if the kernel does not need
-    /// these bits.
+    /// One byte for each lane group and offset. Bit k of a byte is set if lane k has a bond, intact or
+    /// broken. The vector is empty if the kernel does not need these bits.
     whole: Vec<u8>,
 }
 
@@ -208,7 +208,7 @@ impl<N: LaneTuple> Known<N> {
 }
 
 /// Sum over the bonds of a lane group; `None` if |x| of a bond (see [`crate::material::bond`]) exceeds the
-/// limit of the kernel's criterion. The arguments are copied so that they stay in registers.
+/// limit of the kernel's criterion. `kernel` and `points` are passed by value so that they stay in registers.
 ///
 /// # Safety
 /// The lane group must belong to the grid of `points`.

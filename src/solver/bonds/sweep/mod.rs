@@ -1,7 +1,8 @@
 //! Sweeps: a kernel runs over the bonds between two blocks, on all threads.
 //!
 //! Each task owns the bonds of some points i and the results of these points, so no locks or atomics are
-//! needed. The sum of each point takes the same sequence of operations for any division into tasks.
+//! needed. The sum of each point is computed with the same sequence of operations for any division of the
+//! points into tasks.
 
 use std::ops::Range;
 
@@ -108,8 +109,8 @@ pub fn sweep_from<K: Kernel<D>, const D: usize>(
     sweep_if_exists(bonds, points, base, results, (kernel, None), source);
 }
 
-/// Same as [`sweep`], for a kernel that breaks bonds. Clear the intact bits of the bonds that break, and
-/// return the sums of `breaking` over these bonds, in ascending order of the points.
+/// Same as [`sweep`], for a kernel that breaks bonds. Clear the intact bits of the bonds that break. Return
+/// the sums that the kernel `breaking` computes over these bonds, in ascending order of the points.
 pub fn sweep_and_break<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
