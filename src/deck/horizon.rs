@@ -50,8 +50,8 @@ pub fn resolve(scope: &mut Scope, deck: &Deck, comm: &dyn Communicator) -> Resul
     };
     let sources = bodies::point_sources(scope, deck, spacing)?;
     if of_grid && bodies().all(|body| body.horizon.is_some()) {
-        let message = "[grid] horizon: `spacing` is the mean spacing of bodies without their own `horizon`, but each body \
-                       has its own `horizon`; give a length without `spacing`";
+        let message = "[grid] horizon: `spacing` in this expression is the mean spacing of the bodies that have no `horizon`, \
+                       but every body has one; write this horizon without `spacing`";
         return Err(scope.error(in_grid.span(), message));
     }
     let sources = bodies::of_sources(deck, &sources);

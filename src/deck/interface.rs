@@ -247,11 +247,12 @@ fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
         return Ok(());
     };
     let message = format!(
-        "[body.{}] material: the forces of `{}` and `{}` have different directions; \
-         `rule = \"none\"` omits the bonds between the bodies",
+        "[body.{}] material: bonds cannot join `{nonlinear}` and `{linear}`: the forces of `{linear}` act along the \
+         undeformed bond, the forces of `{nonlinear}` do not; give both bodies laws of the same kind, or set \
+         `rule = \"none\"` to omit the bonds between the bodies",
         other.name,
-        law(other).name,
-        law(linear).name,
+        nonlinear = law(other).name,
+        linear = law(linear).name,
     );
     Err(scope.error(other.span.clone(), message))
 }

@@ -27,7 +27,7 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
         let wrong = |c: char| c.is_control() || matches!(c, '"' | '\'' | '\\');
         if name.is_empty() || name.contains(wrong) || name.chars().nth(LONGEST).is_some() {
             let message = format!(
-                "[{section}]: the name {} must have 1 to {LONGEST} characters, among them no quotes, \
+                "[{section}]: the name {} must have 1 to {LONGEST} characters, and must not contain quotes, \
                  backslashes or control characters",
                 excerpt(name)
             );

@@ -55,7 +55,7 @@ pub fn name_fault(name: &str) -> Option<String> {
     let is_possible = is_identifier && !RESERVED.contains(&name);
     (!is_possible).then(|| {
         format!(
-            "it must consist of letters, digits and `_`, start with no digit, and be none of {}",
+            "it must consist of letters, digits and `_`, must not start with a digit, and must not be one of {}",
             RESERVED.join(", ")
         )
     })

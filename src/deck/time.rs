@@ -161,7 +161,7 @@ fn stage_end(
     let about = |other: f64| (end - other).abs() <= UP_TO_ROUNDING * whole;
     let words = if end <= start || about(start) {
         format!(
-            "must be after the start of the stage, {} s (by more than round-off)",
+            "must be above {} s (the start of the stage) by more than round-off",
             format_number(start)
         )
     } else if is_last && !about(whole) {

@@ -3,7 +3,7 @@
 
 use super::draft::{Section, Value};
 use super::elastic::Constants;
-use super::log::{Fate, UNUSED_DAMAGE};
+use super::log::{Fate, INTACT_COMPRESSED, UNUSED_DAMAGE};
 use super::translation::Translation;
 use super::tree::{Node, is_key};
 
@@ -23,8 +23,15 @@ pub struct Material {
 /// Criterion of a damage model.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Criterion {
-    /// Critical stretch: the value to write, and the same stretch as a number.
-    Stretch(Value, f64),
+    /// Critical stretch.
+    Stretch {
+        /// Value to write.
+        value: Value,
+        /// The same value as a number.
+        stretch: f64,
+        /// Whether compressed bonds never break.
+        tension_only: bool,
+    },
     /// Critical work of a bond. PeriLab's formula computes it from the fracture energy.
     Energy {
         /// Fracture energy, J/m².
@@ -84,19 +91,30 @@ pub fn damage(
 ) -> Option<String> {
     let lacks_critical_stretch = WITHOUT_CRITICAL_STRETCH.contains(&material.law);
     match &model.criterion {
-        Criterion::Stretch(value, _) if !lacks_critical_stretch => {
+        Criterion::Stretch {
+            value,
+            tension_only,
+            ..
+        } if !lacks_critical_stretch => {
             let name = translation.name("damage", &model.read);
             let header = format!("damage.{name}.critical_stretch");
             translation
                 .log
                 .taken(&model.node, format!("[{header}] critical_stretch"));
+            if !tension_only {
+                translation.log.approximated(&model.node, INTACT_COMPRESSED);
+            }
             translation
                 .draft
                 .section(&header)
                 .set("critical_stretch", value.clone());
             Some(name)
         }
-        Criterion::Stretch(_, stretch) => {
+        Criterion::Stretch {
+            stretch,
+            tension_only,
+            ..
+        } => {
             let Some([bulk, shear]) = material.constants.moduli() else {
                 let note = format!(
                     "{} breaks by energy only, which needs two moduli",
@@ -121,6 +139,9 @@ pub fn damage(
             translation.log.approximated(&model.node, note);
             let section = translation.draft.section(&header);
             section.set("fracture_energy", Value::number(energy));
+            if !tension_only {
+                section.set("tension_only", Value::Flag(false));
+            }
             Some(name)
         }
         Criterion::Energy {
@@ -139,7 +160,7 @@ pub fn damage(
             let header = format!("damage.{name}.energy");
             let note = format!("[{header}] fracture_energy with PeriLab's calibration");
             if bond_based && !tension_only {
-                let note = format!("{note}; bonds of {} break in tension only", material.law);
+                let note = format!("{note}; {INTACT_COMPRESSED}");
                 translation.log.approximated(&model.node, note);
             } else {
                 translation.log.taken(&model.node, note);

@@ -1,11 +1,17 @@
 //! Translation of initial values, loads, supports and temperatures. In the source decks, each condition
 //! prescribes one component of a vector, or a temperature.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::draft::{Section, Value};
-use super::sets::Sets;
+use super::expression::Dialect;
+use super::log::{ADDED_LOADS, UNORDERED_INITIALS};
+use super::sets::{Members, Sets};
+use super::solver::Stage;
 use super::translation::Translation;
 use super::tree::Node;
 use crate::error::{Result, excerpt};
+use crate::expression::Expression;
 
 /// Quantity that a condition prescribes.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,9 +31,24 @@ pub enum Quantity {
 /// An initial value of one component.
 struct Initial {
     set: String,
+    /// Points of the set, if known.
+    members: Option<Members>,
     key: &'static str,
     component: usize,
     value: Value,
+    /// Node of the value in the source deck, for the log.
+    node: Node,
+}
+
+/// A load that the source code does not add to other loads of its kind.
+struct Load {
+    quantity: Quantity,
+    set: String,
+    /// Points of the set, if known.
+    members: Option<Members>,
+    component: usize,
+    /// Numbers of the steps in which the load acts; empty for all steps.
+    steps: Vec<u64>,
     /// Node of the value in the source deck, for the log.
     node: Node,
 }
@@ -36,6 +57,7 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
+    loads: Vec<Load>,
     /// Name of each condition in the new deck, and the numbers of the steps in which it acts. An empty list
     /// means that the condition acts in all steps.
     pub written: Vec<(String, Vec<u64>)>,
@@ -44,6 +66,7 @@ pub struct Conditions {
 }
 
 /// A condition of the source deck.
+#[derive(Clone)]
 pub struct Given<'n> {
     /// Name of the condition.
     pub name: &'n str,
@@ -53,6 +76,15 @@ pub struct Given<'n> {
     pub quantity: Quantity,
     /// Numbers of the steps in which the condition acts; empty for all steps.
     pub steps: Vec<u64>,
+}
+
+/// A set of the new deck on which a condition acts.
+struct Target {
+    set: String,
+    /// Points of the set, if known.
+    members: Option<Members>,
+    /// Name of the node set if the condition acts on a sum of several targets.
+    part: Option<String>,
 }
 
 /// Return the component of a condition: the node of the key `Coordinate`, the name x, y or z, and the index
@@ -74,8 +106,85 @@ fn component<'n>(
     }
 }
 
+/// Return the first stage of each solver step in which a condition acts. `steps` are the step numbers that
+/// the condition gives; empty for all steps.
+fn acting<'s>(stages: &'s [Stage], steps: &[u64]) -> Vec<(u64, &'s Stage)> {
+    let mut acting: Vec<(u64, &Stage)> = Vec::new();
+    for stage in stages {
+        if let Some(step) = stage.step_id
+            && (steps.is_empty() || steps.contains(&step))
+            && acting.iter().all(|(known, _)| *known != step)
+        {
+            acting.push((step, stage));
+        }
+    }
+    acting
+}
+
+/// Test whether an expression contains a name.
+fn reads(expression: &str, name: &str) -> bool {
+    let mut words = expression.split(|c: char| !c.is_alphanumeric() && c != '_');
+    words.any(|word| word == name)
+}
+
+/// Test whether a value is the number 0, or an expression of the position that is 0 at sample points.
+fn is_zero(value: &Value) -> bool {
+    let Ok(expression) = Expression::of(&value.plain()) else {
+        return false;
+    };
+    let samples = [-1e3, -1.0, -1e-3, 0.0, 1e-3, 1.0, 1e3];
+    let is_zero_at = |x: f64, y: f64, z: f64| expression.evaluate([x, y, z], 0.0) == 0.0;
+    let pairs = || {
+        samples
+            .iter()
+            .flat_map(|x| samples.iter().map(move |y| (*x, *y)))
+    };
+    pairs().all(|(x, y)| samples.iter().all(|z| is_zero_at(x, y, *z)))
+}
+
+/// Return the terms that Peridigm adds to the value of a prescribed displacement in a stage, such as
+/// ` - (0.1)`. Return `None` if they are 0. `Err` holds a message.
+///
+/// Peridigm adds the increment f(t₂) − f(t₁) of the value f in each time step from t₁ to t₂. At the time t of
+/// a solver that starts at s, the displacement is f(t) − f(s) plus the increments of the solvers before.
+fn added_terms(
+    translation: &Translation,
+    text: &str,
+    stages: &[Stage],
+    stage: &Stage,
+) -> std::result::Result<Option<String>, String> {
+    if translation.dialect != Dialect::Peridigm || !reads(text, "t") {
+        return Ok(None);
+    }
+    let before = stages.iter().take_while(|other| *other != stage);
+    let mut times: Vec<(char, f64)> = before
+        .flat_map(|stage| [('-', stage.start), ('+', stage.end)])
+        .collect();
+    times.push(('-', stage.start));
+    // The end of a stage and the start of the next one cancel if they are equal.
+    let mut at = 0;
+    while at + 1 < times.len() {
+        let ((sign, time), (next_sign, next_time)) = (times[at], times[at + 1]);
+        if sign != next_sign && time == next_time {
+            times.drain(at..at + 2);
+        } else {
+            at += 1;
+        }
+    }
+    let mut terms = String::new();
+    for (sign, time) in times {
+        let value = translation.at_time(text, time)?;
+        if !is_zero(&value) {
+            terms += &format!(" {sign} ({})", value.plain());
+        }
+    }
+    let sum = Value::text(format!("0{terms}"));
+    Ok((!is_zero(&sum)).then_some(terms))
+}
+
 impl Conditions {
-    /// Write a condition.
+    /// Write a condition. If the time in its value runs differently in the steps in which it acts, write one
+    /// condition for each of these steps.
     ///
     /// # Errors
     /// If a key is missing or not a text, `Coordinate` is not x, y or z, or the node set is unknown.
@@ -83,8 +192,42 @@ impl Conditions {
         &mut self,
         translation: &mut Translation,
         sets: &mut Sets,
+        stages: &[Stage],
         given: &Given,
     ) -> Result<()> {
+        let acting = acting(stages, &given.steps);
+        let value = given.node.get("Value").and_then(Node::text).unwrap_or("");
+        let has_shifts = acting
+            .iter()
+            .any(|(_, stage)| stage.shift != acting[0].1.shift);
+        let reads_step_time = translation.dialect == Dialect::PeriLab && reads(value, "st");
+        // The variable `st` starts again in each step.
+        let is_split = acting.len() > 1 && reads_step_time || has_shifts && reads(value, "t");
+        if !is_split || matches!(given.quantity, Quantity::Initial(_)) {
+            let stage = acting.first().map_or(&stages[0], |(_, stage)| *stage);
+            return self.add_from(translation, sets, (stages, stage), given);
+        }
+        for (step, stage) in acting {
+            let given = Given {
+                name: &format!("{} in step {step}", given.name),
+                steps: vec![step],
+                ..given.clone()
+            };
+            self.add_from(translation, sets, (stages, stage), &given)?;
+        }
+        Ok(())
+    }
+
+    /// Write a condition whose value has the time of one of the stages.
+    fn add_from(
+        &mut self,
+        translation: &mut Translation,
+        sets: &mut Sets,
+        (stages, stage): (&[Stage], &Stage),
+        given: &Given,
+    ) -> Result<()> {
+        translation.shift = stage.shift;
+        translation.step_start = stage.start_in_run();
         let (name, node) = (given.name, given.node);
         let what = format!("the condition `{name}`");
         let is_initial = matches!(given.quantity, Quantity::Initial(_));
@@ -111,8 +254,18 @@ impl Conditions {
         }
         let value = translation.required(node, "Value", &what)?;
         let text = translation.text(value, "Value")?.to_owned();
-        let expression = match translation.expression(&text, !is_initial) {
-            Ok(expression) => expression,
+        let terms = match given.quantity {
+            Quantity::Support("displacement") => added_terms(translation, &text, stages, stage),
+            _ => Ok(None),
+        };
+        let expression = translation.expression(&text, !is_initial);
+        let expression = match expression.and_then(|expression| Ok((expression, terms?))) {
+            Ok((expression, None)) => expression,
+            Ok((expression, Some(terms))) => {
+                let note = "Peridigm adds up the increments of this displacement from the start";
+                translation.log.approximated(value, note);
+                Value::text(format!("({}){terms}", expression.plain()))
+            }
             Err(message) => {
                 let note = format!("its value cannot be expressed: {message}");
                 translation.leave_out_load(node, section, name, &note);
@@ -120,24 +273,41 @@ impl Conditions {
             }
         };
         let set_node = translation.required(node, "Node Set", &what)?;
-        let set_name = translation.text(set_node, "Node Set")?.to_owned();
-        let mut names = set_name.split('+').map(str::trim);
-        let (first, others) = (names.next().unwrap_or(""), names.next());
-        if others.is_some() {
-            let note = "a sum of node sets; write one condition for each";
-            translation.leave_out_load(node, section, name, note);
-            return Ok(());
-        }
-        let set = sets.find(translation, set_node, first)?;
-        translation.log.taken(set_node, format!("the set `{set}`"));
+        let targets = targets(translation, sets, set_node)?;
         if let Some((coordinate, word, _)) = component {
             translation
                 .log
                 .taken(coordinate, format!("component {word}"));
         }
         let component = component.map_or(0, |(.., index)| index);
+        for target in targets {
+            self.add_to(translation, given, target, (component, &expression, value));
+        }
+        Ok(())
+    }
+
+    /// Write a condition on one set. `value` is the node of the value, `expression` its translation.
+    fn add_to(
+        &mut self,
+        translation: &mut Translation,
+        given: &Given,
+        target: Target,
+        (component, expression, value): (usize, &Value, &Node),
+    ) {
+        let Target { set, members, part } = target;
         let zero = Value::Number("0".to_owned());
         let free = Value::text("free");
+        let expression = expression.clone();
+        if matches!(given.quantity, Quantity::BodyForce | Quantity::ForceOfPoint) {
+            self.loads.push(Load {
+                quantity: given.quantity.clone(),
+                set: set.clone(),
+                members: members.clone(),
+                component,
+                steps: given.steps.clone(),
+                node: value.clone(),
+            });
+        }
         let (key, vector, factor) = match &given.quantity {
             Quantity::Temperature(reference) => {
                 let difference = match reference {
@@ -157,12 +327,13 @@ impl Conditions {
                     .taken(value, format!("[initial.{set}] {key}"));
                 self.initials.push(Initial {
                     set,
+                    members,
                     key,
                     component,
                     value: expression,
                     node: value.clone(),
                 });
-                return Ok(());
+                return;
             }
             Quantity::Support(key) => (
                 *key,
@@ -175,11 +346,12 @@ impl Conditions {
                 None,
             ),
             Quantity::ForceOfPoint => {
-                let Some(count) = sets.size(translation, first) else {
+                let Some(Members::Ids(ids)) = members else {
                     let note = "a force on each point of a set whose number of points is not known";
-                    translation.leave_out_load(node, section, name, note);
-                    return Ok(());
+                    translation.leave_out_load(given.node, "condition", given.name, note);
+                    return;
                 };
+                let count = ids.len();
                 let total = match &expression {
                     Value::Number(number) => match number.parse::<f64>() {
                         Ok(number) => Value::number(count as f64 * number),
@@ -195,7 +367,11 @@ impl Conditions {
                 )
             }
         };
-        let written = translation.name("condition", name);
+        let read = match part {
+            None => given.name.to_owned(),
+            Some(part) => format!("{} on {part}", given.name),
+        };
+        let written = translation.name("condition", &read);
         let mut section = Section::new(format!("condition.{written}"));
         section.set("set", Value::text(set)).set(key, vector);
         translation.add(section);
@@ -211,33 +387,14 @@ impl Conditions {
             }
         }
         self.written.push((written, given.steps.clone()));
-        Ok(())
     }
 
-    /// Write the initial values, one table per set. If a point is in several sets, the last of their tables
-    /// applies to the point. If the source deck gives no value for a component of a vector, the table has 0
-    /// for this component. Log each initial value that a later table may replace by such a 0.
+    /// Write the initial values, and log the conditions that act differently at points of several sets.
     pub fn finish(&mut self, translation: &mut Translation) {
-        for initial in &self.initials {
-            let others = self
-                .initials
-                .iter()
-                .filter(|other| other.key == initial.key);
-            let gives = |set: &str, component: usize| {
-                let mut all = self.initials.iter();
-                all.any(|o| o.key == initial.key && o.set == set && o.component == component)
-            };
-            // The tables are in the order in which their sets first occur.
-            let place = |set: &str| self.initials.iter().position(|other| other.set == set);
-            let mut missing = others.filter(|other| {
-                place(&other.set) > place(&initial.set) && !gives(&other.set, initial.component)
-            });
-            if let Some(other) = missing.next() {
-                let note = format!("0 in points that are in the set `{}` too", other.set);
-                translation.log.approximated(&initial.node, note);
-            }
-        }
-        for initial in std::mem::take(&mut self.initials) {
+        self.note_added_loads(translation);
+        let initials = std::mem::take(&mut self.initials);
+        let overlaps = overlaps(translation, &initials);
+        for initial in initials {
             let header = format!("initial.{}", initial.set);
             let is_new = !translation.draft.has(&header);
             let dimension = translation.dimension;
@@ -252,6 +409,208 @@ impl Conditions {
             };
             components[initial.component] = initial.value;
             section.set(initial.key, Value::List(components));
+        }
+        for overlap in overlaps {
+            let written = translation.new_name("set", "overlap");
+            let mut section = Section::new(format!("set.{written}"));
+            section.set("ids", Value::Ids(overlap.ids));
+            translation.add(section);
+            let mut section = Section::new(format!("initial.{written}"));
+            section.set("set", Value::text(written));
+            section.set(overlap.key, Value::List(overlap.values));
+            translation.add(section);
+        }
+    }
+
+    /// Log the loads on points with another load of the same kind: one of these loads acts in the source
+    /// code, all of them act in the new deck.
+    fn note_added_loads(&self, translation: &Translation) {
+        for (index, load) in self.loads.iter().enumerate() {
+            let others = self.loads[..index].iter().filter(|other| {
+                other.quantity == load.quantity
+                    && other.component == load.component
+                    && (other.steps.is_empty()
+                        || load.steps.is_empty()
+                        || other.steps.iter().any(|step| load.steps.contains(step)))
+            });
+            for other in others {
+                let overlap = match (&load.members, &other.members) {
+                    _ if load.set == other.set => Some(true),
+                    (Some(one), Some(other)) => Some(one.overlap(other)),
+                    _ => None,
+                };
+                let note = match overlap {
+                    Some(true) => ADDED_LOADS.to_owned(),
+                    Some(false) => continue,
+                    None => format!(
+                        "adds to the load on points that are in the set `{}` too",
+                        other.set
+                    ),
+                };
+                translation.log.approximated(&load.node, note);
+            }
+        }
+    }
+}
+
+/// Return the sets on which a condition acts. In PeriLab, `A + B` is the sum of two node sets.
+///
+/// # Errors
+/// If a node set is unknown or invalid.
+fn targets(translation: &mut Translation, sets: &mut Sets, node: &Node) -> Result<Vec<Target>> {
+    let text = translation.text(node, "Node Set")?.to_owned();
+    let names: Vec<&str> = match translation.dialect {
+        Dialect::PeriLab => text.split('+').map(str::trim).collect(),
+        _ => vec![text.trim()],
+    };
+    if let [name] = names[..] {
+        let set = sets.find(translation, node, name)?;
+        translation.log.taken(node, format!("the set `{set}`"));
+        let members = sets.members(translation, &names);
+        return Ok(vec![Target {
+            set,
+            members,
+            part: None,
+        }]);
+    }
+    if let Some(set) = sets.find_sum(translation, node, &names) {
+        let members = sets.members(translation, &names);
+        return Ok(vec![Target {
+            set,
+            members,
+            part: None,
+        }]);
+    }
+    let mut targets = Vec::new();
+    for name in names {
+        let set = sets.find(translation, node, name)?;
+        translation.log.taken(node, format!("the set `{set}`"));
+        targets.push(Target {
+            set,
+            members: sets.members(translation, &[name]),
+            part: Some(name.to_owned()),
+        });
+    }
+    Ok(targets)
+}
+
+/// Points in several sets, at which the tables of these sets would not give the initial values of the source
+/// deck.
+struct Overlap {
+    ids: Vec<u64>,
+    key: &'static str,
+    /// Initial displacement or velocity of these points.
+    values: Vec<Value>,
+}
+
+/// Compare the initial values of the source deck with those of the new deck, which has one table per set.
+///
+/// In the source code, each initial value replaces earlier values of the same component. In the new deck,
+/// the last table replaces all components. Return the points at which both differ. Log the initial values
+/// that may differ at points that are not known.
+fn overlaps(translation: &Translation, initials: &[Initial]) -> Vec<Overlap> {
+    let mut overlaps = Vec::new();
+    // The tables are in the order in which their sets first occur.
+    let place = |set: &str| initials.iter().position(|other| other.set == set);
+    for key in ["displacement", "velocity"] {
+        let of_key: Vec<&Initial> = initials.iter().filter(|other| other.key == key).collect();
+        note_unordered(translation, &of_key);
+        let members: Option<Vec<&Members>> = of_key.iter().map(|o| o.members.as_ref()).collect();
+        let Some(members) = members else {
+            note_unknown_overlaps(translation, &of_key, &place);
+            continue;
+        };
+        let ids: BTreeSet<u64> = members
+            .iter()
+            .filter_map(|members| match members {
+                Members::Ids(ids) => Some(ids),
+                Members::All => None,
+            })
+            .flatten()
+            .copied()
+            .collect();
+        let mut groups: BTreeMap<Vec<Option<usize>>, Vec<u64>> = BTreeMap::new();
+        for id in ids {
+            let here = (0..of_key.len()).filter(|index| members[*index].contains(id));
+            let here: Vec<usize> = here.collect();
+            let last_table = here.iter().max_by_key(|index| place(&of_key[**index].set));
+            let last_of = |component: usize, set: Option<&str>| {
+                let mut all = here.iter().rev().copied();
+                all.find(|index| {
+                    let initial = of_key[*index];
+                    initial.component == component && set.is_none_or(|set| initial.set == set)
+                })
+            };
+            let components = 0..translation.dimension;
+            let expected: Vec<_> = components.clone().map(|k| last_of(k, None)).collect();
+            let table = last_table.map(|index| of_key[*index].set.as_str());
+            if components
+                .map(|k| last_of(k, table))
+                .ne(expected.iter().copied())
+            {
+                groups.entry(expected).or_default().push(id);
+            }
+        }
+        for (expected, ids) in groups {
+            let values = expected.into_iter().map(|index| match index {
+                Some(index) => of_key[index].value.clone(),
+                None => Value::Number("0".to_owned()),
+            });
+            let values = values.collect();
+            overlaps.push(Overlap { ids, key, values });
+        }
+    }
+    overlaps
+}
+
+/// Log the initial values of PeriLab at points with several values of the same component. PeriLab applies
+/// them in no fixed order.
+fn note_unordered(translation: &Translation, initials: &[&Initial]) {
+    if translation.dialect != Dialect::PeriLab {
+        return;
+    }
+    for (index, initial) in initials.iter().enumerate() {
+        let overlaps = initials[..index].iter().any(|other| {
+            other.component == initial.component
+                && other.value != initial.value
+                && match (&initial.members, &other.members) {
+                    (Some(one), Some(other)) => one.overlap(other),
+                    _ => initial.set == other.set,
+                }
+        });
+        if overlaps {
+            translation
+                .log
+                .approximated(&initial.node, UNORDERED_INITIALS);
+        }
+    }
+}
+
+/// Log the initial values that a table of another set may replace. `place` returns the position of the table
+/// of a set.
+fn note_unknown_overlaps(
+    translation: &Translation,
+    initials: &[&Initial],
+    place: &dyn Fn(&str) -> Option<usize>,
+) {
+    for (index, initial) in initials.iter().enumerate() {
+        let later = |other: &&&Initial| place(&other.set) > place(&initial.set);
+        for other in initials.iter().filter(later) {
+            let mut given = initials.iter().enumerate().filter(|(_, given)| {
+                given.set == other.set && given.component == initial.component
+            });
+            let note = match given.next_back() {
+                None => format!("0 in points that are in the set `{}` too", other.set),
+                Some((replacing, _)) if replacing < index => {
+                    format!(
+                        "points that are in the set `{}` too get the value of that set",
+                        other.set
+                    )
+                }
+                Some(_) => continue,
+            };
+            translation.log.approximated(&initial.node, note);
+            break;
         }
     }
 }

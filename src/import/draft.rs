@@ -61,7 +61,7 @@ impl Value {
     /// reads it as the same number.
     pub fn number_or_expression(text: &str) -> Self {
         match text.parse::<f64>() {
-            Ok(_) if is_toml_number(text) => Self::Number(text.to_owned()),
+            Ok(value) if value.is_finite() && is_toml_number(text) => Self::Number(text.to_owned()),
             Ok(value) if value.is_finite() => Self::number(value),
             _ => Self::text(text),
         }

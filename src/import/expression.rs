@@ -29,8 +29,8 @@ pub type Names<'a> = &'a dyn Fn(&str) -> Option<String>;
 /// Translate an expression.
 ///
 /// # Errors
-/// If the text cannot be translated or is too long, or if the result is not an expression in `variables`.
-/// `Err` holds a message.
+/// If the text cannot be translated, is too long, or the result is not an expression of `variables` or is a
+/// constant that is not finite. `Err` holds a message.
 pub fn rewrite(
     text: &str,
     dialect: Dialect,
@@ -52,6 +52,7 @@ pub fn rewrite(
     }
     match Expression::parse(&result, &|_| None, &[], variables) {
         Ok(expression) => Ok(match expression.as_constant() {
+            Some(value) if !value.is_finite() => return Err(format!("`{result}` is not finite")),
             // A plain number keeps its notation. Any other constant expression is replaced by its value.
             Some(value) if result.parse::<f64>().is_err() => format!("{value:?}"),
             _ => result,
@@ -133,6 +134,33 @@ fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
         }
     }
     Err(format!("`{open}` is not closed"))
+}
+
+/// Return the index of the `else` or `elseif` that ends the first branch of a Julia `if`. `tokens` are those
+/// between this `if` and its `end`. Return `None` without `else`.
+fn branch_end(tokens: &[Token]) -> Option<usize> {
+    let mut level = 0_i64;
+    tokens.iter().position(|token| {
+        match token {
+            Token::Name(name) if name == "if" => level += 1,
+            Token::Name(name) if name == "end" => level -= 1,
+            _ => {}
+        }
+        level == 0 && (is_name(token, "else") || is_name(token, "elseif"))
+    })
+}
+
+/// Return the index of the `:` that belongs to the `?` before these tokens.
+fn colon(tokens: &[Token]) -> Option<usize> {
+    let mut level = 0_i64;
+    tokens.iter().position(|token| {
+        match token {
+            Token::Symbol("?") => level += 1,
+            Token::Symbol(":") => level -= 1,
+            _ => {}
+        }
+        level < 0
+    })
 }
 
 /// Return the translation of a function; `$1`, `$2`, `$3` are placeholders for its arguments.
@@ -281,7 +309,8 @@ impl Rewriter<'_> {
         rewriter.formula(tokens, depth)
     }
 
-    /// Translate a Julia formula: `if a b else c end`, `a ? b : c`, or a formula without a choice.
+    /// Translate a Julia formula: `if a b else c end`, `if a b elseif c d else e end`, `a ? b : c`, or a
+    /// formula without a choice.
     fn choice(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());
@@ -290,9 +319,18 @@ impl Rewriter<'_> {
             && tokens.last().is_some_and(|token| is_name(token, "end"));
         if is_choice {
             let inner = &tokens[1..tokens.len() - 1];
-            let middle = inner.iter().rposition(|token| is_name(token, "else"));
-            let middle = middle.ok_or_else(|| "`if` without `else`".to_owned())?;
-            let (before, otherwise) = (&inner[..middle], &inner[middle + 1..]);
+            let middle = branch_end(inner).ok_or_else(|| "`if` without `else`".to_owned())?;
+            let before = &inner[..middle];
+            // `elseif c d else e end` is the same as `else if c d else e end end`.
+            let nested;
+            let otherwise = if is_name(&inner[middle], "elseif") {
+                let mut words = vec![Token::Name("if".to_owned())];
+                words.extend_from_slice(&tokens[middle + 2..]);
+                nested = words;
+                &nested[..]
+            } else {
+                &inner[middle + 1..]
+            };
             let end = self.condition_end(before);
             let end = end.ok_or_else(|| "a value is missing after the condition".to_owned())?;
             return Ok(format!(
@@ -309,8 +347,7 @@ impl Rewriter<'_> {
                 Token::Symbol(")") => level -= 1,
                 Token::Symbol("?") if level == 0 => {
                     let rest = &tokens[index + 1..];
-                    let colon = rest.iter().rposition(|token| is_symbol(token, ":"));
-                    let colon = colon.ok_or_else(|| "`?` without `:`".to_owned())?;
+                    let colon = colon(rest).ok_or_else(|| "`?` without `:`".to_owned())?;
                     return Ok(format!(
                         "if({}, {}, {})",
                         self.formula(&tokens[..index], depth + 1)?,
@@ -347,7 +384,7 @@ impl Rewriter<'_> {
         None
     }
 
-    /// Translate a formula that contains no choice, neither `if a b else c end` nor `a ? b : c`.
+    /// Translate a formula that contains no choice, neither `if … end` nor `a ? b : c`.
     fn formula(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());
@@ -477,7 +514,13 @@ mod tests {
             ("ifelse.(x .> y, 10, 20)", 10.0),
             ("if t>2 0 else 20 end", 20.0),
             ("if (t>1) (3) else 20 end", 3.0),
+            ("if t<1 5 elseif t<2 6 else 7 end", 6.0),
+            ("if t<1 5 elseif t<1.2 6 elseif t<1.6 7 else 8 end", 7.0),
+            ("if t<1 5 else if t<2 6 else 7 end end", 6.0),
+            ("if t>1 if t>2 5 else 6 end else 7 end", 6.0),
             ("t < 1 ? 5 : 6", 6.0),
+            ("t < 1 ? 5 : t < 2 ? 6 : 7", 6.0),
+            ("t > 1 ? t > 2 ? 5 : 6 : 7", 6.0),
             ("atan(y, x)", libm::atan2(y, x)),
             ("2.*t", 3.0),
             ("t > 1 & x < 1", 1.0),
@@ -501,6 +544,8 @@ mod tests {
             ("rand(1)", "`rand(1)`: unknown function `rand`"),
             ("2 $ 3", "unexpected character `$`"),
             ("sin(t", "`(` is not closed"),
+            ("1e999", "`1e999`: the number `1e999` is too large"),
+            ("1/0", "`1/0` is not finite"),
         ] {
             let error = rewritten(text, Dialect::Peridigm).unwrap_err();
             assert!(error.starts_with(message), "{text}: {error}");

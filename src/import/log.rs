@@ -79,7 +79,18 @@ pub(super) const DROPPED_NUMBERS: &str =
 pub(super) const UNSCALED_FAMILIES: &str =
     "families are not scaled: a family has the points within the horizon";
 
-/// Log note for the first `run` of a script, if no fix integrates the motion of atoms in this run.
+/// Log note for a load of Peridigm or PeriLab on points with another load of the same kind.
+pub(super) const ADDED_LOADS: &str =
+    "only one of several loads acts on a point in the source code; in the new deck, they add up";
+
+/// Log note for initial values of PeriLab at points with several values of the same component.
+pub(super) const UNORDERED_INITIALS: &str = "PeriLab applies initial values in no fixed order; in points with several values, the last one counts";
+
+/// Log note for a damage model of PeriLab that also breaks compressed bonds.
+pub(super) const INTACT_COMPRESSED: &str =
+    "compressed bonds break in PeriLab, but not in the new deck";
+
+/// Log note for the first `run` of a script in which no fix integrates the motion of atoms.
 pub(super) const NO_INTEGRATION: &str =
     "no `fix nve` acts in the first run, so no atom moves in LAMMPS; points of the new deck move";
 
@@ -110,6 +121,12 @@ pub struct Losses {
     pub scaled_families: Vec<usize>,
     /// Line of the first `run` of a script, if no fix integrates the motion of atoms in this run.
     pub unmoved: Vec<usize>,
+    /// Lines of loads that act in addition to another load in the new deck only.
+    pub added_loads: Vec<usize>,
+    /// Lines of initial values that have no fixed order in PeriLab.
+    pub unordered_initials: Vec<usize>,
+    /// Lines of damage models whose compressed bonds do not break in the new deck.
+    pub intact_compressed: Vec<usize>,
 }
 
 impl Losses {
@@ -125,6 +142,9 @@ impl Losses {
                 (DROPPED_NUMBERS, &mut losses.dropped_numbers),
                 (UNSCALED_FAMILIES, &mut losses.scaled_families),
                 (NO_INTEGRATION, &mut losses.unmoved),
+                (ADDED_LOADS, &mut losses.added_loads),
+                (UNORDERED_INITIALS, &mut losses.unordered_initials),
+                (INTACT_COMPRESSED, &mut losses.intact_compressed),
             ] {
                 if entry.note.contains(note) {
                     lines.push(entry.line);
@@ -207,6 +227,9 @@ impl fmt::Display for Losses {
             (DROPPED_NUMBERS, &self.dropped_numbers),
             (UNSCALED_FAMILIES, &self.scaled_families),
             (NO_INTEGRATION, &self.unmoved),
+            (ADDED_LOADS, &self.added_loads),
+            (UNORDERED_INITIALS, &self.unordered_initials),
+            (INTACT_COMPRESSED, &self.intact_compressed),
         ] {
             parts.extend(lines.iter().map(|line| format!("{note}: line {line}")));
         }

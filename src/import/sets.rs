@@ -16,6 +16,35 @@ struct Defined<'n> {
     is_declared: bool,
     /// Name of the set in the new deck; `None` until the first use.
     written: Option<String>,
+    /// Whether a sum of node sets contains this set.
+    is_in_sum: bool,
+}
+
+/// The points of a node set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Members {
+    /// All points.
+    All,
+    /// The points with these ids, which start at 0. The ids are in ascending order, without duplicates.
+    Ids(Vec<u64>),
+}
+
+impl Members {
+    /// Test whether a point belongs to the set.
+    pub fn contains(&self, id: u64) -> bool {
+        match self {
+            Self::All => true,
+            Self::Ids(ids) => ids.binary_search(&id).is_ok(),
+        }
+    }
+
+    /// Test whether two sets have a point in common.
+    pub fn overlap(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::All, _) | (_, Self::All) => true,
+            (Self::Ids(ids), other) => ids.iter().any(|id| other.contains(*id)),
+        }
+    }
 }
 
 /// The node sets of a source deck.
@@ -23,6 +52,8 @@ pub struct Sets<'n> {
     defined: Vec<Defined<'n>>,
     /// Sets of the mesh: name in the mesh and name in the new deck.
     of_mesh: Vec<(String, String)>,
+    /// Sums of node sets: names of the node sets, and name of the sum in the new deck.
+    sums: Vec<(Vec<String>, String)>,
     /// Prefix that the new deck needs before the name of a set of the mesh; `None` if the points do not come
     /// from a mesh.
     mesh_prefix: Option<&'static str>,
@@ -41,6 +72,7 @@ impl<'n> Sets<'n> {
         Self {
             defined: Vec::new(),
             of_mesh: Vec::new(),
+            sums: Vec::new(),
             mesh_prefix,
             ids_by_name: None,
             last_number: None,
@@ -69,6 +101,7 @@ impl<'n> Sets<'n> {
             node,
             is_declared,
             written: None,
+            is_in_sum: false,
         });
     }
 
@@ -140,22 +173,103 @@ impl<'n> Sets<'n> {
         Ok(written)
     }
 
-    /// Return the number of points of a node set if the ids of its points are known. The ids are known for
-    /// the sets passed to [`Self::set_ids_by_name`]. The ids are also known for sets that the deck or a file
-    /// gives as a list of point numbers. Return `None` for other sets.
-    pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
-        let mut of_mesh = self.ids_by_name.iter().flatten();
-        if let Some((_, ids)) = of_mesh.find(|(known, _)| known == name) {
-            return Some(ids.len() as u64);
+    /// Return the name that a sum of node sets has in the new deck. Write the sum at its first use. Return
+    /// `None` if the new deck cannot express the sum as one set: the points of some of the node sets are not
+    /// known, and not all of them are conditions.
+    pub fn find_sum(
+        &mut self,
+        translation: &mut Translation,
+        user: &Node,
+        names: &[&str],
+    ) -> Option<String> {
+        if let Some((_, written)) = self.sums.iter().find(|(known, _)| known == names) {
+            translation.log.taken(user, format!("the set `{written}`"));
+            return Some(written.clone());
         }
-        let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
-        let text = set_text(set.node)?;
-        let numbers = match numbers(&text) {
-            Some(numbers) => numbers,
-            None => numbers_of_file(translation, &text)?,
+        let value = match self.members(translation, names) {
+            Some(Members::All) => None,
+            Some(Members::Ids(ids)) if ids.is_empty() => return None,
+            Some(Members::Ids(ids)) => Some(("ids", Value::Ids(ids))),
+            None => {
+                let conditions = names.iter().map(|name| self.condition(translation, name));
+                let conditions: Vec<String> = conditions.collect::<Option<_>>()?;
+                Some(("where", Value::text(conditions.join(" || "))))
+            }
         };
-        let exist = numbers.iter().filter(|number| self.has_point(**number));
-        Some(exist.count() as u64)
+        let written = match value {
+            None => "all".to_owned(),
+            Some((key, value)) => {
+                let written = translation.new_name("set", &names.join(" "));
+                let mut section = Section::new(format!("set.{written}"));
+                section.set(key, value);
+                translation.add(section);
+                written
+            }
+        };
+        let note = format!("the set `{written}`");
+        translation.log.taken(user, note.clone());
+        let last = self.last_number;
+        for set in &mut self.defined {
+            if names.iter().any(|name| is_key(&set.name, name)) {
+                set.is_in_sum = true;
+                translation.log.taken(set.node, note.clone());
+                let largest = listed_numbers(translation, set.node)
+                    .into_iter()
+                    .flatten()
+                    .max();
+                if last
+                    .zip(largest)
+                    .is_some_and(|(last, largest)| largest > last)
+                {
+                    translation.log.taken(set.node, DROPPED_NUMBERS);
+                }
+            }
+        }
+        let names = names.iter().map(|name| (*name).to_owned());
+        self.sums.push((names.collect(), written.clone()));
+        Some(written)
+    }
+
+    /// Return the condition of a node set, in parentheses; `None` if the set is not given by a condition.
+    fn condition(&self, translation: &Translation, name: &str) -> Option<String> {
+        let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
+        let text = set_text(set.node).filter(|text| is_condition(text))?;
+        let condition = translation.expression(&text, false).ok()?;
+        Some(format!("({})", condition.plain()))
+    }
+
+    /// Return the points of a sum of node sets. The points are known for the sets passed to
+    /// [`Self::set_ids_by_name`], for lists of point numbers in the deck or in a file, and for the set of all
+    /// points. Return `None` if the points of another set are asked for.
+    pub fn members(&self, translation: &Translation, names: &[&str]) -> Option<Members> {
+        let parts = names.iter().map(|name| self.members_of(translation, name));
+        let parts: Vec<Members> = parts.collect::<Option<_>>()?;
+        let mut all = Vec::new();
+        for part in parts {
+            match part {
+                Members::All => return Some(Members::All),
+                Members::Ids(ids) => all.extend(ids),
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        Some(Members::Ids(all))
+    }
+
+    fn members_of(&self, translation: &Translation, name: &str) -> Option<Members> {
+        let Some(set) = self.defined.iter().find(|set| is_key(&set.name, name)) else {
+            let mut of_mesh = self.ids_by_name.iter().flatten();
+            let (_, ids) = of_mesh.find(|(known, _)| known == name)?;
+            return Some(Members::Ids(ids.clone()));
+        };
+        if set_text(set.node).is_some_and(|text| is_all(&text)) {
+            return Some(Members::All);
+        }
+        let numbers = listed_numbers(translation, set.node)?.into_iter();
+        let exist = numbers.filter(|number| self.has_point(*number));
+        // The first point has the number 1.
+        let ids: Option<Vec<u64>> = exist.map(|number| number.checked_sub(1)).collect();
+        ids.map(Members::Ids)
     }
 
     /// Test whether a point may have this number.
@@ -167,7 +281,7 @@ impl<'n> Sets<'n> {
     /// node set is not logged, because such an entry is a node set only if something uses it.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
-            if set.written.is_none() && set.is_declared {
+            if set.written.is_none() && set.is_declared && !set.is_in_sum {
                 translation
                     .log
                     .left_out(set.node, "nothing uses this node set");
@@ -176,7 +290,24 @@ impl<'n> Sets<'n> {
     }
 }
 
-/// Read the point numbers that a file lists; `None` if the file cannot be read.
+/// Test whether the text of a node set means all points.
+fn is_all(text: &str) -> bool {
+    text.eq_ignore_ascii_case("all")
+}
+
+/// Test whether the text of a node set is a condition, such as `x>0.5`.
+fn is_condition(text: &str) -> bool {
+    text.contains(['<', '>', '='])
+}
+
+/// Return the numbers of the points of a node set that is given by a list or a file; `None` for other sets,
+/// and if the file cannot be read.
+fn listed_numbers(translation: &Translation, node: &Node) -> Option<Vec<u64>> {
+    let text = set_text(node)?;
+    numbers(&text).or_else(|| numbers_of_file(translation, &text))
+}
+
+/// Read the numbers of points in a file; `None` if the file cannot be read.
 fn numbers_of_file(translation: &Translation, file: &str) -> Option<Vec<u64>> {
     let mut ids = crate::points::id_file::read(&translation.path(file), 1).ok()?;
     for id in &mut ids {
@@ -197,7 +328,7 @@ fn define(
         let message = format!("`{name}` must be a file, numbers of points or a condition");
         return Err(translation.error(node.line, message));
     };
-    if text.eq_ignore_ascii_case("all") {
+    if is_all(&text) {
         translation.log.taken(node, "the set `all`");
         return Ok("all".to_owned());
     }
@@ -248,7 +379,7 @@ fn define(
         }
         let ids = numbers.iter().map(|number| number - 1);
         section.set("ids", Value::Ids(ids.collect()));
-    } else if text.contains(['<', '>', '=']) {
+    } else if is_condition(&text) {
         let condition = translation
             .expression(&text, false)
             .map_err(|message| translation.error(node.line, format!("`{name}`: {message}")))?;

@@ -40,8 +40,12 @@ pub enum Method {
 /// A stage of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
+    /// Start of the stage in the time of the source deck, s.
+    pub start: f64,
     /// End of the stage in the time of the source deck, s.
     pub end: f64,
+    /// Time of the source deck minus the time of the run, s.
+    pub shift: f64,
     /// Solution method.
     pub method: Method,
     /// Number by which conditions refer to this solver step; `None` if the source deck gives no number.
@@ -53,26 +57,92 @@ pub struct Stage {
     pub is_damage_enabled: bool,
 }
 
-/// Read the time at which the first solver starts.
-///
-/// # Errors
-/// If the time is not a number.
-pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
-    let Some(initial) = first.get("Initial Time") else {
-        return Ok(());
-    };
-    let start = translation.number(initial, "Initial Time")?;
-    if start == 0.0 {
-        translation.log.taken(initial, "a run starts at 0");
-    } else {
-        let note = "a run starts at 0; times are shifted";
-        translation.log.approximated(initial, note);
+impl Stage {
+    /// Return the start of the stage in the time of the run, s.
+    pub fn start_in_run(&self) -> f64 {
+        self.start - self.shift
     }
-    translation.start = start;
-    Ok(())
+
+    /// Return the end of the stage in the time of the run, s.
+    pub fn end_in_run(&self) -> f64 {
+        self.end - self.shift
+    }
 }
 
-/// Read a solver that starts at the time `start` (s), and return its stages. `damage_by_default` says whether
+/// Return the duration of a run with these stages, s.
+pub fn duration(stages: &[Stage]) -> f64 {
+    stages.last().map_or(0.0, Stage::end_in_run)
+}
+
+/// Return the time of the source deck at which a solver starts, s. `previous` is the end of the solver before
+/// (s); `None` for the first solver.
+fn start(translation: &Translation, node: &Node, previous: Option<f64>) -> Result<f64> {
+    let initial = node.get("Initial Time");
+    let given = initial
+        .map(|initial| translation.number(initial, "Initial Time"))
+        .transpose()?;
+    let end_before = previous.unwrap_or(0.0);
+    let start = match translation.dialect {
+        // A step of PeriLab never starts before the end of the step before.
+        Dialect::PeriLab => given.map_or(end_before, |given| given.max(end_before)),
+        _ => given.unwrap_or(0.0),
+    };
+    let Some(initial) = initial else {
+        return Ok(start);
+    };
+    let log = &translation.log;
+    let note = |first: &'static str, later: &'static str| match previous {
+        None => first,
+        Some(_) => later,
+    };
+    if given != Some(start) {
+        let later = "PeriLab starts at the end of the step before instead";
+        log.taken(initial, note("PeriLab starts at 0 instead", later));
+    } else if start == end_before {
+        log.taken(
+            initial,
+            note("a run starts at 0", "the end of the stage before"),
+        );
+    } else {
+        let later = "a stage starts at the end of the one before; times are shifted";
+        log.approximated(initial, note("a run starts at 0; times are shifted", later));
+    }
+    Ok(start)
+}
+
+/// Read the key `Time Steps` of a static solver: the start of the solver and the end of each load step, s.
+/// Return `None` if the deck does not give this key, or if Peridigm ignores it.
+fn time_steps(translation: &Translation, node: &Node, solver: &Node) -> Result<Option<Vec<f64>>> {
+    let log = &translation.log;
+    let Some(steps) = solver.get("Time Steps") else {
+        return Ok(None);
+    };
+    if node.get("Final Time").is_some() && solver.get("Number of Load Steps").is_some() {
+        log.left_out(steps, "Peridigm uses `Number of Load Steps` instead");
+        return Ok(None);
+    }
+    let text = translation.text(steps, "Time Steps")?;
+    let times: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
+    let is_rising = |times: &Vec<f64>| {
+        times.len() > 1
+            && times.windows(2).all(|w| w[0] < w[1])
+            && times.iter().all(|time| time.is_finite())
+    };
+    let Some(times) = times.filter(is_rising) else {
+        let message = format!("`Time Steps` must be rising numbers, is {}", excerpt(text));
+        return Err(translation.error(steps.line, message));
+    };
+    log.taken(steps, "one stage for each load step");
+    if let Some(initial) = node.get("Initial Time") {
+        log.taken(initial, "the first of the time steps counts instead");
+    }
+    if let Some(end) = node.get("Final Time") {
+        log.taken(end, "the last of the time steps counts instead");
+    }
+    Ok(Some(times))
+}
+
+/// Read a solver that follows the given stages, and return its stages. `damage_by_default` says whether
 /// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
@@ -83,7 +153,7 @@ pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
 pub fn stage(
     translation: &Translation,
     node: &Node,
-    start: f64,
+    before: &[Stage],
     damage_by_default: bool,
 ) -> Result<Vec<Stage>> {
     let log = &translation.log;
@@ -116,15 +186,23 @@ pub fn stage(
         return Err(translation.error(node.line, message));
     };
     let is = |names: &[&str]| names.iter().any(|known| is_key(name, known));
-    let end = |steps: &[f64]| -> Result<f64> {
-        if let Some(last) = steps.last() {
-            return Ok(*last);
-        }
+    let times = match is(&STATIC) {
+        true => time_steps(translation, node, solver)?,
+        false => None,
+    };
+    let end_before = before.last().map(|stage| stage.end);
+    let start = match &times {
+        Some(times) => times[0],
+        None => start(translation, node, end_before)?,
+    };
+    let end_before = end_before.unwrap_or(0.0);
+    let shift = before.last().map_or(0.0, |stage| stage.shift) + (start - end_before);
+    let end = || -> Result<f64> {
         if let Some(additional) = node.get("Additional Time")
             && node.get("Final Time").is_none()
         {
             log.taken(additional, "end of a stage");
-            return Ok(start + translation.number(additional, "Additional Time")?);
+            return Ok(end_before + translation.number(additional, "Additional Time")?);
         }
         let end = translation.required(node, "Final Time", "the solver")?;
         log.taken(end, "[time] end");
@@ -139,34 +217,24 @@ pub fn stage(
         }
     };
     let new = |end: f64, method: Method| Stage {
+        start,
         end,
+        shift,
         method,
         step_id,
         damping: None,
         is_damage_enabled,
     };
     if is(&STATIC) {
-        if let Some(times) = solver.get("Time Steps") {
-            let text = translation.text(times, "Time Steps")?;
-            let times_read: Option<Vec<f64>> =
-                text.split_whitespace().map(|t| t.parse().ok()).collect();
-            let is_rising =
-                |times: &Vec<f64>| times.len() > 1 && times.windows(2).all(|w| w[0] < w[1]);
-            let Some(list) = times_read.filter(is_rising) else {
-                let message = format!("`Time Steps` must be rising numbers, is {}", excerpt(text));
-                return Err(translation.error(times.line, message));
-            };
-            log.taken(times, "one stage for each load step");
-            if let Some(end) = node.get("Final Time") {
-                log.taken(end, "the last of the time steps");
-            }
-            let after = list.iter().filter(|end| **end > start);
-            let stages: Vec<Stage> = after.map(|end| new(*end, Method::Equilibria(1))).collect();
-            later(*list.last().expect("two at least"), times.line)?;
+        if let Some(times) = times {
+            let spans = times.windows(2).map(|span| Stage {
+                start: span[0],
+                ..new(span[1], Method::Equilibria(1))
+            });
             note_unread_keys(translation, solver);
-            return Ok(stages);
+            return Ok(spans.collect());
         }
-        let end = later(end(&[])?, node.line)?;
+        let end = later(end()?, node.line)?;
         let is_perilab = translation.dialect == Dialect::PeriLab;
         // PeriLab reads the number of steps from the table of the step, Peridigm from that of the solver.
         let given = ["Number of Load Steps", "Number of Steps"]
@@ -247,10 +315,7 @@ pub fn stage(
             log.approximated(solver, "explicit steps without a matrix");
         }
     }
-    let mut stage = new(
-        later(end(&[])?, node.line)?,
-        Method::Explicit { step, safety },
-    );
+    let mut stage = new(later(end()?, node.line)?, Method::Explicit { step, safety });
     if let Some(damping) = solver.get("Numerical Damping") {
         let per_step = translation.number(damping, "Numerical Damping")?;
         match fixed.map(|dt| translation.number(dt, "Fixed dt")).transpose()? {
@@ -299,12 +364,11 @@ pub fn write(
     conditions: &[(String, Vec<u64>)],
     has_contact: bool,
 ) {
-    let start = translation.start;
-    let Some(last) = stages.last() else {
+    if stages.is_empty() {
         return;
-    };
+    }
     let mut time = Section::new("time");
-    time.set("end", Value::number(last.end - start));
+    time.set("end", Value::number(duration(stages)));
     if let [only] = stages {
         method(&mut time, &only.method, has_contact);
         translation.add(time);
@@ -314,7 +378,7 @@ pub fn write(
     for (index, stage) in stages.iter().enumerate() {
         let mut section = Section::new("stage");
         if index + 1 < stages.len() {
-            section.set("end", Value::number(stage.end - start));
+            section.set("end", Value::number(stage.end_in_run()));
         }
         method(&mut section, &stage.method, has_contact);
         let acts = |steps: &[u64]| {

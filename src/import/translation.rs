@@ -30,8 +30,9 @@ pub struct Translation<'a> {
     pub draft: Draft,
     /// Number of dimensions.
     pub dimension: usize,
-    /// Time of the source deck at the start of the run, s.
-    pub start: f64,
+    /// Time of the source deck minus the time of the run, in the first solver step in which the current
+    /// condition acts, s.
+    pub shift: f64,
     /// Files that the new deck reads, relative to the working directory or absolute.
     pub files: RefCell<Vec<PathBuf>>,
     /// Start of the first solver step in which the current condition acts, measured from the start of the
@@ -51,7 +52,7 @@ impl<'a> Translation<'a> {
             log: Log::default(),
             draft: Draft::default(),
             dimension: 3,
-            start: 0.0,
+            shift: 0.0,
             files: RefCell::default(),
             step_start: 0.0,
             names: Vec::new(),
@@ -138,9 +139,10 @@ impl<'a> Translation<'a> {
     /// Translate an expression of the position. If `of_time` is true, the expression may also contain the
     /// time. `Err` holds a message.
     pub fn expression(&self, text: &str, of_time: bool) -> std::result::Result<Value, String> {
-        let start = self.start;
+        let shift = self.shift;
         let names = |name: &str| match name {
-            "t" if start != 0.0 => Some(format!("(t + {start:?})")),
+            "t" if shift > 0.0 => Some(format!("(t + {shift:?})")),
+            "t" if shift < 0.0 => Some(format!("(t - {:?})", -shift)),
             // In PeriLab `st` is the time since the start of a step.
             "st" if self.dialect == Dialect::PeriLab => Some(if self.step_start == 0.0 {
                 "t".to_owned()
@@ -162,11 +164,10 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
-    /// Translate an expression of position and time for the start of the run: the time is replaced by
-    /// [`Self::start`]. `Err` holds a message.
-    pub fn at_start(&self, text: &str) -> std::result::Result<Value, String> {
-        let start = self.start;
-        let names = |name: &str| (name == "t").then(|| format!("({start:?})"));
+    /// Translate an expression of position and time for a given time of the source deck (s). `Err` holds a
+    /// message.
+    pub fn at_time(&self, text: &str, time: f64) -> std::result::Result<Value, String> {
+        let names = |name: &str| (name == "t").then(|| format!("({time:?})"));
         let variables = &POSITION[..self.dimension.min(POSITION.len())];
         let text = rewrite(text, self.dialect, &names, variables)?;
         Ok(Value::number_or_expression(&text))

@@ -312,11 +312,11 @@ fn horizon_fault(given: &Given) -> Option<String> {
         Some(energy) => {
             let elastic = bond_based_critical_stretch(given, energy);
             let held = (strength / elastic).powi(2);
+            let stored = rounded(energy * held);
             format!(
-                "`fracture_energy`, {} J/m², must be above {} J/m², the energy per area at which bonds begin to soften \
-                 with a horizon of {} m; use a horizon below {} m",
+                "`fracture_energy` must be above {stored} J/m², is {} J/m²; with the horizon of {} m, bonds already store \
+                 {stored} J/m² when they begin to soften; use a horizon below {} m",
                 format_number(energy),
-                rounded(energy * held),
                 format_number(given.horizon),
                 rounded(given.horizon / held),
             )

@@ -66,11 +66,11 @@ impl Columns {
         let required = |known: &[&str]| {
             let missing = || {
                 let has = match names {
-                    [] => "none".to_owned(),
-                    names => excerpt(&names.join(" ")),
+                    [] => "it has no columns".to_owned(),
+                    names => format!("its columns are {}", excerpt(&names.join(" "))),
                 };
                 format!(
-                    "has no column `{}`; the columns are {has}, the known names are {} volume block",
+                    "has no column `{}`; {has}; the known names are `{} volume block`",
                     known[0],
                     COORDINATES[..dimension].join(" ")
                 )

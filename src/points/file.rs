@@ -327,7 +327,7 @@ mod tests {
         for (text, message) in [
             (
                 "# volumes\nx y block\n0 0 1\n",
-                "2: has no column `volume`; the columns are `x y block`, the known names are x y volume block",
+                "2: has no column `volume`; its columns are `x y block`; the known names are `x y volume block`",
             ),
             ("x x y volume\n0 0 0 1\n", "1: has two columns `x`"),
             (

@@ -58,7 +58,7 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
     let mut known = vec![ID];
     known.extend(&DISPLACEMENT[..dimension]);
     known.extend(&VELOCITY[..dimension]);
-    let known_names = || format!("the known names are {}", known.join(" "));
+    let known_names = || format!("the known names are `{}`", known.join(" "));
     let Some(heading) = found else {
         return Err(format!("{name}: has no heading; {}", known_names()));
     };
@@ -90,7 +90,7 @@ pub fn columns(path: &Path, dimension: usize) -> std::result::Result<ValueColumn
     };
     if !columns.has_displacement() && !columns.has_velocity() {
         return Err(format!(
-            "{name}:{}: has no column of values, its columns are {}; {}",
+            "{name}:{}: has no column of values; its columns are {}; {}",
             heading.line,
             excerpt(&heading.names.join(" ")),
             known_names()

@@ -101,8 +101,8 @@ impl Condition {
     /// spacing.
     pub fn no_depth(&self, body: &Body) -> Error {
         let message = format!(
-            "[condition.{}]: acts on a layer, and the points of [body.{}] have no single spacing; give the thickness of \
-             the layer as `depth`",
+            "[condition.{}]: a traction or a pressure acts on a layer of points. The default thickness of this layer is \
+             the spacing, but the points of [body.{}] have no single spacing; give the thickness as `depth`",
             self.name, body.name
         );
         Error::input(message).at(&self.place)

@@ -93,7 +93,8 @@ fn without_neighbours(problem: &Problem, missing: &str) -> Error {
 fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(
-            "[time] end: {} s take {steps:.1e} steps of {step:.1e} s; at most {MOST_STEPS:.0e} steps are allowed",
+            "[time] end: a run or stage of {} s would take {steps:.1e} steps of {step:.1e} s; at most {MOST_STEPS:.0e} steps \
+             are allowed",
             format_number(length)
         );
         return Err(Error::input(message).at(&problem.spans.step));
@@ -112,7 +113,8 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     let error = |message: String| Err(Error::input(message).at(&problem.spans.adaptive));
     if length / smallest > MOST_STEPS {
         return error(format!(
-            "[time] adaptive smallest: {} s take {:.1e} steps of {smallest:.1e} s; at most {MOST_STEPS:.0e} steps are allowed",
+            "[time] adaptive smallest: a run or stage of {} s would take {:.1e} steps of {smallest:.1e} s; at most \
+             {MOST_STEPS:.0e} steps are allowed",
             format_number(length),
             length / smallest,
         ));
@@ -121,9 +123,9 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     let repeats = (libm::log(smallest / largest) / libm::log(rule.reduce)).ceil();
     if repeats > MOST_REPEATS {
         return error(format!(
-            "[time] adaptive reduce: with {}, a step of {largest:.3e} s may need {repeats:.0} repeats to reach the size \
-             `smallest`, {smallest:.3e} s; at most {MOST_REPEATS} repeats are allowed; use a smaller `reduce` or a larger \
-             `smallest`",
+            "[time] adaptive reduce: each repeat multiplies the step by {}, so a step of {largest:.3e} s may be repeated \
+             {repeats:.0} times before it reaches `smallest`, {smallest:.3e} s; at most {MOST_REPEATS} repeats are \
+             allowed; use a smaller `reduce` or a larger `smallest`",
             format_number(rule.reduce),
         ));
     }

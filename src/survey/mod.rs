@@ -276,9 +276,10 @@ fn refined_cracks(problem: &Problem, warnings: &mut Vec<Warning>) {
     };
     if let Some(block) = problem.blocks().find(is_short) {
         let message = format!(
-            "[refinement] levels: the horizon of level {} is shorter than one spacing of the grid; a crack that exists \
-             before this refinement then has no damage and no length, because no bond can cross it",
-            block.level,
+            "[refinement] levels: the horizon of level {level} is shorter than the spacing of level 0. If a crack exists \
+             before the grid around it is refined to level {level}, no bond can cross the crack, so it then has no damage \
+             and no length",
+            level = block.level,
         );
         warnings.push(Warning::new(message).at(&refinement.span));
     }

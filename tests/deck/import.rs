@@ -1211,10 +1211,8 @@ fn steps_of_perilab_share_damping_and_damage() {
         Fate::Approximated
     );
     assert_eq!(key("Boundary Conditions > Hold > Step ID"), Fate::Taken);
-    assert_eq!(
-        key("Boundary Conditions > Start > Step ID"),
-        Fate::Approximated
-    );
+    // PeriLab sets initial values only at the time 0, which is not in the second step.
+    assert_eq!(key("Boundary Conditions > Start"), Fate::LeftOut);
     assert_eq!(imported.text.matches("off = [\"hold\"]").count(), 1);
     let error = folder
         .import("strip.yaml", &text.replacen("\"1, 2\"", "\"1; 2\"", 1))
@@ -2227,6 +2225,443 @@ fn plasticity_of_peridigm_can_be_disabled() {
             imported.text.contains(&header),
             "{value}: {}",
             imported.text
+        );
+    }
+}
+
+/// Points of several node sets: each initial value of Peridigm replaces earlier values of the same component,
+/// and leaves the other components.
+#[test]
+fn initial_values_of_peridigm_act_in_order() {
+    let folder = Folder::new("initials");
+    let from = TWO_POINTS.find("    Go Right:").unwrap();
+    let to = TWO_POINTS.find("  Solver:").unwrap();
+    for (given, expected) in [
+        (
+            &[
+                ("Left", "x", 0.5),
+                ("Spare", "x", 3.0),
+                ("Spare", "y", 2.0),
+                ("Left", "y", 7.0),
+            ][..],
+            [[3.0, 7.0, 0.0], [3.0, 2.0, 0.0]],
+        ),
+        (
+            &[("Spare", "x", 3.0), ("Left", "y", 7.0), ("Right", "z", 1.0)],
+            [[3.0, 7.0, 0.0], [3.0, 0.0, 1.0]],
+        ),
+        (
+            &[("Left", "x", 0.5), ("Spare", "z", 3.0)],
+            [[0.5, 0.0, 3.0], [0.0, 0.0, 3.0]],
+        ),
+        (
+            &[("Left", "x", 0.5), ("Right", "y", 3.0)],
+            [[0.5, 0.0, 0.0], [0.0, 3.0, 0.0]],
+        ),
+    ] {
+        let mut conditions = String::new();
+        for (index, (set, component, value)) in given.iter().enumerate() {
+            conditions += &format!(
+                "    Go {index}:\n      Type: Initial Velocity\n      Node Set: {set} Node Set\n      \
+                 Coordinate: {component}\n      Value: {value}\n"
+            );
+        }
+        let text = format!("{}{conditions}{}", &TWO_POINTS[..from], &TWO_POINTS[to..]);
+        let imported = folder.import("two.yaml", &text).unwrap();
+        for index in 0..given.len() {
+            let key = format!("Peridigm > Boundary Conditions > Go {index} > Value");
+            assert_eq!(fate(&imported, &key).0, Fate::Taken, "{given:?}");
+        }
+        let problem = folder.problem(&imported);
+        with::<3, _>(&problem, |simulation| {
+            for point in 0..2 {
+                let [x, ..] = simulation.model.position(point);
+                let velocity = simulation.fields.velocity.each_ref();
+                let velocity = velocity.map(|component| component[point]);
+                assert_eq!(velocity, expected[usize::from(x > 0.0)], "{given:?} {x}");
+            }
+        });
+    }
+}
+
+/// PeriLab applies conditions in no fixed order, and initial values only if the time is 0.
+#[test]
+fn initial_values_of_perilab_are_ambiguous_or_late() {
+    let folder = Folder::strip("ambiguous");
+    let initial = |name: &str, set: &str, value: &str| {
+        format!(
+            "    {name}:\n      Variable: Velocity\n      Node Set: {set}\n      Coordinate: x\n      \
+             Value: {value}\n      Type: Initial\n"
+        )
+    };
+    let both = initial("One", "Left", "1") + &initial("Two", "Ends", "2");
+    let text = STRIP.replacen("    Warm:\n", &(both + "    Warm:\n"), 1);
+    let imported = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&imported);
+    let losses = imported.losses();
+    assert_eq!(losses.unordered_initials.len(), 1, "{losses}");
+    let late = text.replacen("Initial Time: 0.0", "Initial Time: 5.0e-7", 1);
+    let imported = folder.import("strip.yaml", &late).unwrap();
+    folder.problem(&imported);
+    for name in ["One", "Two"] {
+        let key = format!("PeriLab > Boundary Conditions > {name}");
+        let note = "PeriLab sets initial values at the time 0 only";
+        assert_eq!(fate(&imported, &key), (Fate::LeftOut, note));
+    }
+}
+
+/// In PeriLab, `A + B` has the points of both node sets.
+#[test]
+fn sums_of_node_sets_of_perilab_are_one_set() {
+    let folder = Folder::strip("sums");
+    let held = |set: &str| STRIP.replacen("Node Set: \"Left\"", &format!("Node Set: {set}"), 1);
+    let imported = folder.import("strip.yaml", &held("Left + Ends")).unwrap();
+    folder.problem(&imported);
+    for line in [
+        "[set.left_ends]\nids = [0, 1]",
+        "[condition.hold]\nset = \"left_ends\"",
+    ] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+    assert_eq!(
+        fate(&imported, "PeriLab > Discretization > Node Sets > Left").0,
+        Fate::Taken
+    );
+    // A point in both sets has the force once.
+    let pushed = STRIP.replacen(
+        "      Variable: \"Forces\"\n      Node Set: \"Ends\"",
+        "      Variable: \"Forces\"\n      Node Set: \"Ends + Left\"",
+        1,
+    );
+    let imported = folder.import("strip.yaml", &pushed).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("force = [0, \"2*(-3*t)\"]"),
+        "{}",
+        imported.text
+    );
+    let conditions =
+        held("Right + Low").replacen("      Right:", "      Low: y<1\n      Right:", 1);
+    let imported = folder.import("strip.yaml", &conditions).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("where = \"(x > 0.5) || (y < 1)\""),
+        "{}",
+        imported.text
+    );
+    let with_all =
+        held("Left + Whole").replacen("      Right:", "      Whole: All\n      Right:", 1);
+    let imported = folder.import("strip.yaml", &with_all).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("[condition.hold]\nset = \"all\""),
+        "{}",
+        imported.text
+    );
+    let imported = folder.import("strip.yaml", &held("Left + Right")).unwrap();
+    folder.problem(&imported);
+    for line in [
+        "[condition.hold_on_left]\nset = \"left\"",
+        "[condition.hold_on_right]\nset = \"right\"",
+    ] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+    let error = folder.import("strip.yaml", &held("Left + Up")).unwrap_err();
+    assert!(
+        error.contains("the deck defines no node set `Up`"),
+        "{error}"
+    );
+    // Peridigm has no sums of node sets.
+    let text = TWO_POINTS.replacen(
+        "Node Set: Left Node Set",
+        "Node Set: Left Node Set + Right Node Set",
+        1,
+    );
+    let error = Folder::new("sum").import("two.yaml", &text).unwrap_err();
+    let message = "the deck defines no node set `Left Node Set + Right Node Set`";
+    assert!(error.contains(message), "{error}");
+}
+
+/// The last of several body forces acts in Peridigm; loads add up in the new deck.
+#[test]
+fn loads_on_the_same_points_add_up() {
+    let folder = Folder::new("loads");
+    let load = |name: &str, set: &str| {
+        format!(
+            "    {name}:\n      Type: Body Force\n      Node Set: {set}\n      Coordinate: x\n      Value: 2\n"
+        )
+    };
+    for (sets, count) in [
+        (["Left Node Set", "Spare Node Set"], 1),
+        (["Left Node Set", "Left Node Set"], 1),
+        (["Left Node Set", "Right Node Set"], 0),
+    ] {
+        let loads = load("One", sets[0]) + &load("Two", sets[1]);
+        let text = TWO_POINTS.replacen("    Go Right:\n", &(loads + "    Go Right:\n"), 1);
+        let imported = folder.import("two.yaml", &text).unwrap();
+        folder.problem(&imported);
+        assert_eq!(imported.losses().added_loads.len(), count, "{sets:?}");
+    }
+}
+
+/// A solver of Peridigm starts at its own `Initial Time`, which is 0 if it is not given. The increments of a
+/// prescribed displacement add up.
+#[test]
+fn times_of_peridigm_are_shifted() {
+    let folder = Folder::new("shifted");
+    let solvers = |spans: &[&str]| {
+        let mut text = TWO_POINTS.replacen(
+            "    Go Right:\n",
+            "    Pull:\n      Type: Prescribed Displacement\n      Node Set: Left Node Set\n      Coordinate: x\n      \
+             Value: \"0.1*t\"\n    Push:\n      Type: Body Force\n      Node Set: Right Node Set\n      \
+             Coordinate: x\n      Value: \"5*t\"\n    Go Right:\n",
+            1,
+        );
+        let from = text.find("  Solver:").unwrap();
+        let to = text.find("  Output:").unwrap();
+        let mut all = String::new();
+        for (index, span) in spans.iter().enumerate() {
+            all += &format!("  Solver{index}:\n    {span}\n    Verlet:\n      Fixed dt: 0.01\n");
+        }
+        text.replace_range(from..to, &all);
+        let imported = folder.import("two.yaml", &text).unwrap();
+        let problem = folder.problem(&imported);
+        let ends = problem
+            .all_stages()
+            .iter()
+            .map(|stage| stage.time.end)
+            .collect::<Vec<_>>();
+        let value =
+            |line: &&str| line.starts_with("displacement") || line.starts_with("body_force");
+        let lines = imported.text.lines().filter(value).map(str::to_owned);
+        (ends, lines.collect::<Vec<_>>())
+    };
+    for (spans, ends, lines) in [
+        (
+            &["Final Time: 1.0", "Initial Time: 1.0\n    Final Time: 3.0"][..],
+            &[1.0, 3.0][..],
+            &["\"0.1*t\"", "\"5*t\""][..],
+        ),
+        (
+            &["Initial Time: 2.0\n    Final Time: 3.0"],
+            &[1.0],
+            &["\"(0.1*(t + 2.0)) - (0.2)\"", "\"5*(t + 2.0)\""],
+        ),
+        (
+            &["Final Time: 1.0", "Final Time: 2.0"],
+            &[1.0, 3.0],
+            &[
+                "\"0.1*t\"",
+                "\"(0.1*(t - 1.0)) + (0.1)\"",
+                "\"5*t\"",
+                "\"5*(t - 1.0)\"",
+            ],
+        ),
+        (
+            &["Final Time: 1.0", "Initial Time: 1.5\n    Final Time: 2.0"],
+            &[1.0, 1.5],
+            &[
+                "\"0.1*t\"",
+                "\"(0.1*(t + 0.5)) + (0.1) - (0.15",
+                "\"5*t\"",
+                "\"5*(t + 0.5)\"",
+            ],
+        ),
+    ] {
+        let (found, values) = solvers(spans);
+        assert_eq!(found, ends, "{spans:?}");
+        assert_eq!(values.len(), lines.len(), "{spans:?} {values:?}");
+        for (value, line) in values.iter().zip(lines) {
+            assert!(value.contains(line), "{value} {line}");
+        }
+    }
+}
+
+/// A step of PeriLab starts at its `Initial Time`, but not before the end of the step before.
+#[test]
+fn times_of_perilab_are_shifted() {
+    let folder = Folder::strip("gap");
+    let from = STRIP.find("  Solver:").unwrap();
+    let to = STRIP.find("  Outputs:").unwrap();
+    for (initial, end, value) in [
+        ("0.5", 0.3, Some("2*(t + 0.4)")),
+        ("0.1", 0.7, None),
+        ("0.05", 0.7, None),
+    ] {
+        let step = |name: &str, id: u32, initial: &str, last: f64| {
+            format!(
+                "    {name}:\n      Step ID: {id}\n      Initial Time: {initial}\n      Final Time: {last}\n      \
+                 Verlet:\n        Fixed dt: 1.0e-2\n"
+            )
+        };
+        let steps = step("One", 1, "0.0", 0.1) + &step("Two", 2, initial, 0.7);
+        let text = format!(
+            "{}  Multistep Solver:\n{steps}{}",
+            &STRIP[..from],
+            &STRIP[to..]
+        );
+        let text = text.replacen("      Value: 0\n", "      Value: 2*t\n", 1);
+        let imported = folder.import("strip.yaml", &text).unwrap();
+        let problem = folder.problem(&imported);
+        let last = problem.all_stages().last().unwrap().time.end;
+        assert!((last - end).abs() < 1e-12, "{last}");
+        let lines = imported.text.lines();
+        let lines: Vec<&str> = lines
+            .filter(|line| line.starts_with("displacement"))
+            .collect();
+        assert!(lines[0].contains("\"2*t\""), "{lines:?}");
+        assert_eq!(lines.len(), 1 + usize::from(value.is_some()), "{lines:?}");
+        if let Some(value) = value {
+            assert!(lines[1].contains(value), "{lines:?}");
+        }
+    }
+}
+
+/// `Time Steps` of Peridigm: the first number is the start, and `Number of Load Steps` takes precedence.
+#[test]
+fn time_steps_of_peridigm_begin_at_the_first_one() {
+    let folder = Folder::new("time-steps");
+    let text = TWO_POINTS.replacen(
+        "    Verlet:\n      Fixed dt: 2.0e-5\n",
+        "    QuasiStatic:\n      Time Steps: \"1.0 1.5 3.0\"\n",
+        1,
+    );
+    let text = text.replace("Initial Velocity", "Prescribed Displacement");
+    let ends = |text: &str| {
+        let imported = folder.import("two.yaml", text).unwrap();
+        let problem = folder.problem(&imported);
+        let stages = problem.all_stages();
+        stages
+            .iter()
+            .map(|stage| stage.time.end)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(ends(&text), [0.5, 2.0]);
+    let load_steps = text.replacen(
+        "QuasiStatic:\n",
+        "QuasiStatic:\n      Number of Load Steps: 4\n",
+        1,
+    );
+    assert_eq!(ends(&load_steps), [4e-3]);
+}
+
+/// Rotated axes of PeriLab: R = R_x R_y R_z, or its inverse without a stiffness matrix; in plane problems,
+/// `Angle X` is the angle about z.
+#[test]
+fn angles_of_perilab_turn_the_axes() {
+    let folder = Folder::strip("angles");
+    let given = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
+    let with_angles = |constants: &str, angles: &[(&str, f64)], solver: &str| {
+        let angles: String = angles
+            .iter()
+            .map(|(axis, angle)| format!("      Angle {axis}: {angle}\n"))
+            .collect();
+        let text = STRIP
+            .replacen(given, constants, 1)
+            .replacen("Bond-based Elastic", "Correspondence Elastic", 1)
+            .replacen(
+                "      Horizon: 1.2\n",
+                &format!("      Horizon: 1.2\n{angles}"),
+                1,
+            )
+            .replacen("    Verlet:\n", &format!("    {solver}:\n"), 1);
+        let imported = folder.import("strip.yaml", &text).unwrap();
+        folder.problem(&imported);
+        let lines = imported
+            .text
+            .lines()
+            .filter(|line| line.starts_with("angle_"));
+        let lines: Vec<String> = lines.map(str::to_owned).collect();
+        (imported, lines)
+    };
+    let plane = "        C11: 10\n        C12: 3\n        C22: 5\n        C66: 2\n";
+    let (imported, lines) = with_angles(plane, &[("X", 30.0), ("Z", 50.0)], "Verlet");
+    assert_eq!(lines, ["angle_1 = -30.0"]);
+    let key = |axis: &str| format!("PeriLab > Blocks > block_1 > Angle {axis}");
+    assert_eq!(fate(&imported, &key("X")).0, Fate::Approximated);
+    assert_eq!(fate(&imported, &key("Z")).0, Fate::LeftOut);
+    assert_eq!(
+        with_angles(plane, &[("X", 30.0)], "Verlet Matrix Based").1,
+        ["angle_1 = 30.0"]
+    );
+    // An isotropic material has no axes.
+    let (imported, lines) = with_angles(given, &[("X", 30.0)], "Verlet");
+    assert!(lines.is_empty(), "{lines:?}");
+    assert_eq!(fate(&imported, &key("X")).0, Fate::Taken);
+    folder.write(
+        "strip.txt",
+        "header: x y z block_id volume\n0 0 0 1 0.5\n1 0 0 1 0.5\n",
+    );
+    let solid = "        C11: 10\n        C22: 5\n        C33: 5\n        C44: 2\n        C55: 2\n        C66: 2\n";
+    let (_, lines) = with_angles(solid, &[("X", 0.0), ("Y", 0.0), ("Z", 45.0)], "Verlet");
+    assert_eq!(lines, ["angle_1 = -45.0"]);
+    let (_, lines) = with_angles(solid, &[("X", 90.0), ("Y", 20.0), ("Z", 45.0)], "Verlet");
+    assert_eq!(lines.len(), 3, "{lines:?}");
+    // PeriLab reads the other angles only together with `Angle X`.
+    let (imported, lines) = with_angles(solid, &[("Z", 45.0)], "Verlet");
+    assert!(lines.is_empty(), "{lines:?}");
+    assert_eq!(fate(&imported, &key("Z")).0, Fate::LeftOut);
+    // Angles of points are not read.
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume Angles\n0 0 1 0.5 30\n1 0 1 0.5 30\n",
+    );
+    let (imported, _) = with_angles(plane, &[], "Verlet");
+    assert_eq!(imported.losses().columns, [5]);
+}
+
+#[test]
+fn compressed_bonds_of_perilab_break_if_the_law_allows_it() {
+    let folder = Folder::strip("compressed");
+    let with_damage = |damage: &str, law: &str| {
+        let text = STRIP
+            .replacen(
+                "Damage Model: Critical Energy\n",
+                &format!("Damage Model: {damage}\n"),
+                1,
+            )
+            .replacen(
+                "Critical Value: 12.5\n",
+                "Critical Value: 12.5\n        Only Tension: false\n",
+                1,
+            )
+            .replacen("Bond-based Elastic", law, 1);
+        let imported = folder.import("strip.yaml", &text).unwrap();
+        folder.problem(&imported);
+        let breaks = imported.text.contains("tension_only = false");
+        assert_ne!(
+            breaks,
+            imported.losses().intact_compressed == [22],
+            "{}",
+            imported.text
+        );
+        breaks
+    };
+    assert!(!with_damage("Critical Stretch", "Bond-based Elastic"));
+    assert!(!with_damage("Critical Stretch", "PD Solid Elastic"));
+    assert!(with_damage("Critical Stretch", "Correspondence Elastic"));
+    assert!(!with_damage("Critical Energy", "Bond-based Elastic"));
+    assert!(with_damage("Critical Energy", "PD Solid Elastic"));
+}
+
+#[test]
+fn numbers_that_are_too_large_are_named() {
+    let folder = Folder::strip("large");
+    let text = STRIP.replacen("Young's Modulus: 7.0e+4", "Young's Modulus: 1e999", 1);
+    let error = folder.import("strip.yaml", &text).unwrap_err();
+    assert!(
+        error.contains("`Young's Modulus` must be a number, is `1e999`"),
+        "{error}"
+    );
+    for value in ["1e999", "-1e999*t", "1/0"] {
+        let text = STRIP.replacen("Value: -3*t", &format!("Value: {value}"), 1);
+        let imported = folder.import("strip.yaml", &text).unwrap();
+        folder.problem(&imported);
+        assert_eq!(
+            imported.losses().conditions.len(),
+            2,
+            "{}",
+            imported.losses()
         );
     }
 }

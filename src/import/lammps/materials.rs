@@ -198,7 +198,11 @@ fn write_material(
     };
     let damage = DamageModel {
         read: format!("type {kind}"),
-        criterion: Criterion::Stretch(Value::number(stretch), stretch),
+        criterion: Criterion::Stretch {
+            value: Value::number(stretch),
+            stretch,
+            tension_only: true,
+        },
         node: node.clone(),
     };
     let damage = bodies::damage(translation, &damage, &material, horizon);

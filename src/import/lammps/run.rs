@@ -141,7 +141,7 @@ pub(super) fn follow(
         "timestep" => match run.runs.first() {
             Some((_, first)) if variables.step != Some(*first) => translation.log.approximated(
                 node,
-                "[time] end counts the steps behind it with this step; [time] step stays that of the first `run`",
+                "each later `run` adds its number of steps times this step to [time] end; [time] step is that of the first `run`",
             ),
             _ => translation.log.taken(node, "[time] step"),
         },

@@ -51,6 +51,7 @@ pub(super) fn conditions<'n>(
                     &mut conditions,
                     (name, table, kind),
                     (uniform.is_some(), expanding),
+                    stages,
                 )?;
                 continue;
             }
@@ -78,7 +79,7 @@ pub(super) fn conditions<'n>(
                 quantity: quantity.clone(),
                 steps: Vec::new(),
             };
-            conditions.add(translation, sets, &given)?;
+            conditions.add(translation, sets, stages, &given)?;
         }
     }
     conditions.finish(translation);
@@ -87,7 +88,8 @@ pub(super) fn conditions<'n>(
     Ok(conditions.has_temperature)
 }
 
-/// Return the prescribed temperatures at the start of the run, which are the reference for thermal expansion.
+/// Return the prescribed temperatures at the time 0, which are the reference for thermal expansion, even if
+/// the first solver starts later.
 fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
     let tables = root.get("Boundary Conditions").into_iter();
     let tables = tables.flat_map(Node::tables).map(|(_, table)| table);
@@ -96,21 +98,22 @@ fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
         .filter(|table| {
             text(table, "Type").is_some_and(|kind| is_key(&kind, PRESCRIBED_TEMPERATURE))
         })
-        .filter_map(|table| translation.at_start(&text(table, "Value")?).ok())
+        .filter_map(|table| translation.at_time(&text(table, "Value")?, 0.0).ok())
         .collect()
 }
 
 /// Write a prescribed temperature.
 ///
-/// In Peridigm, thermal expansion is relative to the temperature at the start of the run. If `uniform`, this
-/// temperature is the reference temperature of all materials that expand. Otherwise, it is subtracted from
-/// the prescribed temperature.
+/// Thermal expansion is relative to the temperature at the time 0. If `uniform`, this temperature is the
+/// reference temperature of all materials that expand. Otherwise, it is subtracted from the prescribed
+/// temperature.
 fn temperature<'n>(
     translation: &mut Translation,
     sets: &mut Sets<'n>,
     conditions: &mut Conditions,
     (name, table, kind): (&str, &Node, &Node),
     (uniform, expanding): (bool, &[String]),
+    stages: &[solver::Stage],
 ) -> Result<()> {
     if expanding.is_empty() {
         let note = "no material expands, and heat is not conducted";
@@ -118,12 +121,12 @@ fn temperature<'n>(
         return Ok(());
     }
     let value = translation.required(table, "Value", &format!("the condition `{name}`"))?;
-    let start = translation.at_start(translation.text(value, "Value")?);
+    let start = translation.at_time(translation.text(value, "Value")?, 0.0);
     let reference = match (uniform, start) {
         (true, _) | (false, Err(_)) => None,
         (false, Ok(start)) => Some(start),
     };
-    let note = "temperature; the reference is that at the start; heat is not conducted";
+    let note = "temperature; the reference is that at t = 0; heat is not conducted";
     translation.log.taken(kind, note);
     let given = Given {
         name,
@@ -131,5 +134,5 @@ fn temperature<'n>(
         quantity: Quantity::Temperature(reference),
         steps: Vec::new(),
     };
-    conditions.add(translation, sets, &given)
+    conditions.add(translation, sets, stages, &given)
 }

@@ -324,7 +324,11 @@ pub(super) fn damages(translation: &mut Translation, root: &Node) -> Result<Vec<
             }
             damages.push(DamageModel {
                 read: name.to_owned(),
-                criterion: Criterion::Stretch(value, number),
+                criterion: Criterion::Stretch {
+                    value,
+                    stretch: number,
+                    tension_only: true,
+                },
                 node: stretch.clone(),
             });
         } else {

@@ -71,8 +71,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
             outputs.output(translation, node)?;
         }
     }
-    let length = stages.last().map_or(0.0, |stage| stage.end) - translation.start;
-    outputs.finish(translation, length);
+    outputs.finish(translation, solver::duration(&stages));
     sets.finish(translation);
     Ok(())
 }
@@ -117,33 +116,19 @@ fn setting(translation: &mut Translation, materials: &Node) -> Result<&'static s
     Ok(setting)
 }
 
-/// Read the stages of all solvers.
-fn stages(
-    translation: &mut Translation,
-    root: &Node,
-    solvers: &[&Node],
-) -> Result<Vec<solver::Stage>> {
-    let Some(first) = solvers.first() else {
+/// Read the stages of all solvers. The stages of the solvers have the step numbers 1, 2, ….
+fn stages(translation: &Translation, root: &Node, solvers: &[&Node]) -> Result<Vec<solver::Stage>> {
+    if solvers.is_empty() {
         return Err(translation.error(root.line, "the deck has no `Solver`"));
-    };
-    solver::read_start(translation, first)?;
-    let start = translation.start;
+    }
     let mut stages: Vec<solver::Stage> = Vec::new();
-    for (index, node) in solvers.iter().enumerate() {
-        let at = stages.last().map_or(start, |stage| stage.end);
-        if let (Some(initial), true) = (node.get("Initial Time"), index > 0) {
-            let begins = translation.number(initial, "Initial Time")?;
-            if begins == at {
-                translation
-                    .log
-                    .taken(initial, "the end of the stage before")
-            } else {
-                translation
-                    .log
-                    .approximated(initial, "the end of the stage before")
-            }
+    for (step, node) in (1..).zip(solvers) {
+        for stage in solver::stage(translation, node, &stages, true)? {
+            stages.push(solver::Stage {
+                step_id: Some(step),
+                ..stage
+            });
         }
-        stages.extend(solver::stage(translation, node, at, true)?);
     }
     Ok(stages)
 }

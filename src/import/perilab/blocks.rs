@@ -1,5 +1,6 @@
 //! Blocks of PeriLab, which become bodies.
 
+use super::angles::angles;
 use super::materials::{Laws, write_material};
 use super::points::{MeshBlocks, Points};
 use crate::error::{Result, excerpt};
@@ -99,25 +100,7 @@ pub(super) fn read_blocks(
         };
         let density_node = translation.required(table, "Density", &what)?;
         let density = translation.number_value(density_node, "Density")?;
-        let mut angle = None;
-        for key in ["Angle X", "Angle Y", "Angle Z"] {
-            let Some(node) = table.get(key) else {
-                continue;
-            };
-            let value = translation.number(node, key)?;
-            if value == 0.0 {
-                translation.log.taken(node, "the axes are not turned");
-            } else if key == "Angle Z" {
-                translation
-                    .log
-                    .approximated(node, "angle_1 of the material, if it is anisotropic");
-                angle = Some(translation.number_value(node, key)?);
-            } else {
-                translation
-                    .log
-                    .left_out(node, "the order of the rotations is another one");
-            }
-        }
+        let angles = angles(translation, table, model, laws.has_matrix)?;
         let mut expansion = None;
         if let Some(node) = table.get("Thermal Model") {
             let model_name = translation.text(node, "Thermal Model")?;
@@ -134,9 +117,9 @@ pub(super) fn read_blocks(
                     .left_out(node, "this thermal model is left out"),
             }
         }
-        // In the new deck, density, angle and expansion belong to the material, so each combination is a
+        // In the new deck, density, angles and expansion belong to the material, so each combination is a
         // separate material.
-        let variant = format!("{density:?} {angle:?} {expansion:?}");
+        let variant = format!("{density:?} {angles:?} {expansion:?}");
         let known = written
             .iter()
             .find(|(read, of, _)| read == model.name && *of == variant);
@@ -150,7 +133,15 @@ pub(super) fn read_blocks(
                     format!("{} {name}", model.name)
                 };
                 let new = translation.name("material", &read);
-                write_material(translation, model, &new, density, damping, angle, expansion)?;
+                write_material(
+                    translation,
+                    model,
+                    &new,
+                    density,
+                    damping,
+                    angles,
+                    expansion,
+                )?;
                 written.push((model.name.to_owned(), variant, new.clone()));
                 new
             }

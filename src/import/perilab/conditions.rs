@@ -79,67 +79,28 @@ pub(super) fn conditions(
         let mut steps = Vec::new();
         if let Some(node) = table.get("Step ID") {
             steps = step_ids(translation, node)?;
-            if is_initial && steps.iter().any(|step| stages[0].step_id != Some(*step)) {
-                translation
-                    .log
-                    .approximated(node, "initial values are those at the start of the run")
-            } else {
-                translation.log.taken(node, "the stages in which it acts")
-            }
+            translation.log.taken(node, "the stages in which it acts");
         }
-        let acting = acting_steps(stages, &steps, translation.start);
-        let value = table.get("Value").and_then(Node::text).unwrap_or("");
-        if acting.len() > 1 && !is_initial && reads_step_time(value) {
-            // The variable `st` starts again in each step, so each step needs a condition of its own.
-            for (step, start) in acting {
-                translation.step_start = start;
-                let given = Given {
-                    name: &format!("{name} in step {step}"),
-                    node: table,
-                    quantity: quantity.clone(),
-                    steps: vec![step],
-                };
-                conditions.add(translation, sets, &given)?;
-            }
+        // PeriLab sets initial values only if the time is exactly 0.
+        let first = &stages[0];
+        let acts = |step| steps.is_empty() || steps.contains(&step);
+        if is_initial && (first.start != 0.0 || !first.step_id.is_none_or(acts)) {
+            let note = "PeriLab sets initial values at the time 0 only";
+            translation.leave_out_load(table, "initial", name, note);
             continue;
         }
-        translation.step_start = acting.first().map_or(0.0, |(_, start)| *start);
         let given = Given {
             name,
             node: table,
             quantity,
             steps,
         };
-        conditions.add(translation, sets, &given)?;
+        conditions.add(translation, sets, stages, &given)?;
     }
     conditions.finish(translation);
     let has_contact = root.get("Contact").is_some();
     solver::write(translation, stages, &conditions.written, has_contact);
     Ok(conditions.has_temperature)
-}
-
-/// Return the step number and the start time of each step in which a condition acts. The start time is
-/// measured from the start of the run. `steps` are the step numbers that the condition gives. If `steps` is
-/// empty, the condition acts in all steps.
-fn acting_steps(stages: &[solver::Stage], steps: &[u64], run_start: f64) -> Vec<(u64, f64)> {
-    let mut acting: Vec<(u64, f64)> = Vec::new();
-    let mut start = 0.0;
-    for stage in stages {
-        if let Some(step) = stage.step_id
-            && (steps.is_empty() || steps.contains(&step))
-            && acting.iter().all(|(known, _)| *known != step)
-        {
-            acting.push((step, start));
-        }
-        start = stage.end - run_start;
-    }
-    acting
-}
-
-/// Test whether an expression contains the variable `st`, the time since the start of a step.
-fn reads_step_time(expression: &str) -> bool {
-    let mut words = expression.split(|c: char| !c.is_alphanumeric() && c != '_');
-    words.any(|word| word == "st")
 }
 
 /// Read the step numbers, which are separated by commas.

@@ -69,11 +69,28 @@ pub(super) struct Model<'n> {
     pub(super) constants: Constants,
 }
 
+impl Model<'_> {
+    /// Test whether the new material is anisotropic, so that its axes have a direction.
+    pub(super) fn has_axes(&self) -> bool {
+        let is_hooke = |name: &str| {
+            let digits = name.trim().strip_prefix(['C', 'c']);
+            digits.is_some_and(|digits| digits.parse().is_ok_and(|digits: u8| digits < 70))
+        };
+        let mut names = self.node.entries().iter().map(|(name, _)| name);
+        self.law.contains("correspondence")
+            && names.any(|name| {
+                is_hooke(name) || ORTHOTROPIC.iter().any(|(known, ..)| is_key(name, known))
+            })
+    }
+}
+
 /// Models to which the blocks refer.
 pub(super) struct Laws<'n> {
     pub(super) models: Vec<Model<'n>>,
     pub(super) damages: Vec<DamageModel>,
     pub(super) expansions: Vec<Expansion>,
+    /// Whether a solver of the deck uses a stiffness matrix.
+    pub(super) has_matrix: bool,
 }
 
 pub(super) fn read_materials<'n>(
@@ -140,7 +157,7 @@ pub(super) fn write_material(
     written: &str,
     density: Value,
     damping: Option<f64>,
-    angle: Option<Value>,
+    angles: [f64; 3],
     expansion: Option<&Expansion>,
 ) -> Result<()> {
     let mut section = Section::new(format!("material.{written}.{}", model.law));
@@ -166,8 +183,12 @@ pub(super) fn write_material(
     if let Some(damping) = damping {
         section.set("damping", Value::number(damping));
     }
-    if let (Some(angle), true) = (angle, anisotropic) {
-        section.set("angle_1", angle);
+    if anisotropic {
+        for (key, angle) in ["angle_1", "angle_2", "angle_3"].into_iter().zip(angles) {
+            if angle != 0.0 {
+                section.set(key, Value::number(angle));
+            }
+        }
     }
     if let Some(expansion) = expansion {
         section.set("thermal_expansion", expansion.coefficient.clone());
@@ -396,13 +417,10 @@ pub(super) fn damages(
         let tension = table.get("Only Tension");
         let tension_only = tension.is_none_or(|node| translation.is_true(node));
         if let Some(node) = tension {
-            if is_stretch && !tension_only {
-                translation
-                    .log
-                    .left_out(node, "bonds break in tension only")
-            } else {
-                translation.log.taken(node, "tension_only of the damage")
-            }
+            translation.log.taken(
+                node,
+                "whether compressed bonds break; see the critical value",
+            );
         }
         if let Some(node) = table.get("Interblock Damage") {
             translation.log.left_out(
@@ -421,7 +439,11 @@ pub(super) fn damages(
         damages.push(DamageModel {
             read: name.to_owned(),
             criterion: if is_stretch {
-                Criterion::Stretch(value, number)
+                Criterion::Stretch {
+                    value,
+                    stretch: number,
+                    tension_only,
+                }
             } else {
                 Criterion::Energy {
                     energy: value,

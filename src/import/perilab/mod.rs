@@ -1,5 +1,6 @@
 //! Decks of PeriLab, in YAML.
 
+mod angles;
 mod blocks;
 mod conditions;
 mod contact;
@@ -57,11 +58,16 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
         })
     });
     let expansions = expansions(translation, models, is_thermal_enabled)?;
+    let has_matrix = solvers(translation, root)?.iter().any(|solver| {
+        let mut tables = solver.tables();
+        tables.any(|(name, _)| name.to_lowercase().contains("matrix based"))
+    });
     let damping = stages.iter().find_map(|stage| stage.damping);
     let laws = Laws {
         models: read,
         damages,
         expansions,
+        has_matrix,
     };
     let bodies = read_blocks(translation, blocks, &points, &laws, damping)?;
     if let (Some(models), true) = (models.get("Damage Models"), is_damage_enabled) {
@@ -109,8 +115,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     for (_, output) in root.get("Outputs").into_iter().flat_map(Node::tables) {
         outputs.output(translation, output)?;
     }
-    let length = stages.last().map_or(0.0, |stage| stage.end) - translation.start;
-    outputs.finish(translation, length);
+    outputs.finish(translation, solver::duration(&stages));
     sets.finish(translation);
     for name in ["FEM", "Surface Correction"] {
         if let Some(node) = root.get(name).or(discretization.get(name)) {
@@ -181,15 +186,13 @@ fn solvers<'n>(translation: &Translation, root: &'n Node) -> Result<Vec<&'n Node
 }
 
 /// Read the stages of all solvers.
-fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stage>> {
+fn stages(translation: &Translation, root: &Node) -> Result<Vec<solver::Stage>> {
     let solvers = solvers(translation, root)?;
-    let Some(first) = solvers.first() else {
+    if solvers.is_empty() {
         return Err(translation.error(root.line, "the deck has no `Solver`"));
-    };
-    solver::read_start(translation, first)?;
+    }
     let mut stages: Vec<solver::Stage> = Vec::new();
     for node in &solvers {
-        let at = stages.last().map_or(translation.start, |stage| stage.end);
         for key in ["Material Models", "Pre Calculation Models"] {
             if let Some(models) = node.get(key) {
                 if translation.is_true(models) {
@@ -210,7 +213,7 @@ fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stag
                     .taken(field, "fields are computed where the output has them");
             }
         }
-        stages.extend(solver::stage(translation, node, at, false)?);
+        stages.extend(solver::stage(translation, node, &stages, false)?);
     }
     let damping_differs = stages
         .iter()

@@ -95,6 +95,10 @@ const POINTWISE_CONSTANTS: [&str; 5] = [
     "Critical_Value",
 ];
 
+/// Start of the names of the columns with the angles of the material axes: `Angles` in plane problems,
+/// `Anglesx` or `Angles_x` in 3-D.
+const ANGLES: &str = "Angles";
+
 /// Largest number of ids that the import writes for a node set; longer lists would make the new deck
 /// unreadable.
 const MOST_IDS: usize = 1_000_000;
@@ -189,7 +193,9 @@ pub(super) fn points(
         translation.log.taken(file, note);
         let names = known.as_ref().and_then(|file| file.names.clone());
         let mut constants = names.unwrap_or_default();
-        constants.retain(|name| POINTWISE_CONSTANTS.contains(&name.as_str()));
+        constants.retain(|name| {
+            POINTWISE_CONSTANTS.contains(&name.as_str()) || name.starts_with(ANGLES)
+        });
         if !constants.is_empty() {
             let note = format!("{UNUSED_COLUMNS}: {}", constants.join(", "));
             translation.log.approximated(file, note);

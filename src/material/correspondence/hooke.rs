@@ -249,7 +249,8 @@ fn indefinite(
     fault_at(
         first,
         format!(
-            "Hooke's matrix must be positive definite, but its eigenvalue for the strain {strain} is {eigenvalue:.4e} Pa"
+            "Hooke's matrix must be positive definite, but its smallest eigenvalue is {eigenvalue:.4e} Pa (relative \
+             components of the eigenvector: {strain})"
         ),
     )
 }
@@ -267,7 +268,7 @@ fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
     let parts = used.iter().zip(strain.iter());
     let parts = parts.filter(|(_, part)| part.abs() > 0.01 * largest.abs());
     let parts: Vec<String> = parts
-        .map(|(component, part)| format!("{:.2} {}", part / largest, name(*component)))
+        .map(|(component, part)| format!("{} {:.2}", name(*component), part / largest))
         .collect();
     (all.eigenvalues[softest], parts.join(", "))
 }

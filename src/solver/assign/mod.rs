@@ -2,6 +2,8 @@
 
 mod possible;
 
+use std::fmt;
+
 use crate::damage::{
     BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StressLimit, StressMeasure,
     StressRule, StretchConversion, ToughnessByDirection, WorkRule,
@@ -68,6 +70,16 @@ enum Breaks {
     Stretch,
     Work,
     Stress(StressMeasure),
+}
+
+impl fmt::Display for Breaks {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Stretch => "stretch",
+            Self::Work => "work",
+            Self::Stress(measure) => measure.name(),
+        })
+    }
 }
 
 /// Return the quantity that this damage law compares with a threshold to break the bonds of a body. In a

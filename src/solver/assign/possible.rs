@@ -178,19 +178,20 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         interface.between(body, other) != InterfaceRule::None
             && *interface.damage_between(body, other) == InterfaceDamage::OfBodies
     };
-    let of_other_kind = problem.bodies.iter().find(|other| {
-        let of_other = match &other.damage {
-            Some(damage) => breaks(other, damage),
-            None if other.material.law.declaration.breaks_by_itself() => Breaks::Stretch,
-            None => return false,
-        };
-        of_other != own && meets(other)
+    let of_other = |other: &Body| match &other.damage {
+        Some(damage) => Some(breaks(other, damage)),
+        None if other.material.law.declaration.breaks_by_itself() => Some(Breaks::Stretch),
+        None => None,
+    };
+    let mut others = problem.bodies.iter();
+    let of_other_kind = others.find_map(|other| {
+        let quantity = of_other(other).filter(|quantity| *quantity != own && meets(other))?;
+        Some((other, quantity))
     });
-    if let Some(other) = of_other_kind {
+    if let Some((other, quantity)) = of_other_kind {
         return error(format!(
-            "bonds may join this body and body `{}`, but the bonds of the two bodies break by different quantities \
-             (stretch, work or a measure of stress; with `energy`, bonds break by stretch if their law is bond-based, \
-             otherwise by work); give both bodies damage by the same quantity, or set `[interface] rule = \"none\"`",
+            "the bonds of this body break by their {own}, the bonds of body `{}` by their {quantity}, and bonds may join the two \
+             bodies; give both bodies damage by the same quantity, or set `[interface] rule = \"none\"`",
             other.name
         ));
     }

@@ -122,8 +122,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
             return Ok(());
         };
         let message = format!(
-            "{key}: the thermal stretch is {} at t = {} s at point {id}, and must be above -1; `thermal_expansion` is \
-             per unit of temperature, such as 1e-5",
+            "{key}: the thermal stretch must be above -1, is {} at t = {} s at point {id}; check `thermal_expansion`, \
+             which is per unit of temperature, such as 1e-5",
             format_number(stretch),
             format_number(self.time),
         );

@@ -26,7 +26,8 @@ impl Front {
         let course = Course::new(simulation, rule.line, (rule.length, rule.radius), owned);
         if course.is_empty(simulation.comm) {
             let message = format!(
-                "[history.front.{}]: no point lies within {} m of the line, between its ends",
+                "[history.front.{}]: no point lies within `radius`, {} m, of the line; points beyond the ends of the line do \
+                 not count",
                 rule.name, rule.radius
             );
             return Err(Error::input(message).at(&rule.span));

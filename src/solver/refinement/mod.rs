@@ -87,8 +87,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// If refinement can add points during the run, and bonds have a history; the error is the same on all
     /// ranks.
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
-        let message = "[refinement.trigger]: bonds of this law have a history, which new bonds would lack; use \
-                       `[refinement.region]`, which refines from the start";
+        let message = "[refinement.trigger]: is not available for laws whose bonds have history variables, because new bonds \
+                       would have no history; use [refinement.region], which refines from the start";
         let trigger = self.trigger().filter(|_| self.forces.has_history());
         trigger.map_or(Ok(()), |trigger| {
             Err(Error::input(message).at(&trigger.span))
