@@ -1,6 +1,6 @@
 //! Parts of messages: numbers in short form, and suggestions for misspelled names.
 
-/// Longest name that [`nearest`] compares with other names, bytes.
+/// Maximum length of the names that [`nearest`] compares, bytes.
 const LONGEST_NAME: usize = 64;
 
 /// Format a number for a message. Very large and very small numbers have an exponent.

@@ -105,8 +105,8 @@ pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
     share.ok_or_else(|| format!("must be a number, 0 to {MOST_TOUCHING}"))
 }
 
-/// Return the number of cracks normal to x. With this number, about the requested fraction of all points is
-/// on the faces of the cracks.
+/// Return the number of cracks normal to x. The number is chosen such that about the requested fraction of
+/// all points lies on crack faces.
 fn cracks(arguments: &BenchArguments) -> u64 {
     let share = arguments.contact.unwrap_or(0.0);
     (0.5 * share * arguments.points[0] as f64).round() as u64

@@ -24,7 +24,7 @@ pub struct Phase {
 pub struct Limited {
     /// Triad bandwidth, bytes/s.
     pub bandwidth: f64,
-    /// Minimum memory traffic of the loop, bytes/s.
+    /// Minimum number of bytes that the time loop must move, divided by the measured time, bytes/s.
     pub moved: f64,
     /// Operation rate of multiply-adds, operations/s; a multiply-add counts as two operations.
     pub arithmetic: f64,

@@ -39,7 +39,8 @@ pub struct CompareArguments {
     second: PathBuf,
 
     /// Allowed difference, as a fraction of the largest absolute value of the field or column in A.
-    /// NAME=VALUE applies to the field or column NAME. May be repeated [default: 0, bit-identical].
+    /// NAME=VALUE applies to the field or column NAME. May be repeated. With a tolerance of 0, values must be
+    /// bit-identical [default: 0].
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }

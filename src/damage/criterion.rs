@@ -68,8 +68,8 @@ pub type HorizonRatios = [[f64; 2]; 2];
 /// reaches Σ ½ k_e m_e² |ξ|. The critical stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
-    /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. r_ek is 1 if
-    /// t_k holds for any horizon, and ∞ if t_k does not limit m_e.
+    /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. There are two
+    /// exceptions. If t_k holds for any horizon, r_ek is 1. If t_k does not limit m_e, r_ek is ∞.
     pub ratios: HorizonRatios,
     /// Stiffnesses k_e, in any unit.
     pub stiffness: [f64; 2],

@@ -67,8 +67,8 @@ pub struct StressRule {
 }
 
 impl StressRule {
-    /// Return the rule for the bonds between two blocks, from the rules of both blocks. Both rules have the
-    /// same measure. Compressed bonds break only if both rules allow it.
+    /// Return the rule for the bonds between two blocks, from the rules of both blocks. Both rules must have
+    /// the same measure. Compressed bonds break only if both rules allow it.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             breakable: self.breakable.of_both(other.breakable),

@@ -56,7 +56,7 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Deck {
     source: Source,
     grammar: grammar::Deck,
-    /// Copy of `grammar` with numbers in place of horizons that depend on the mean spacing of points; `None`
+    /// Copy of `grammar` in which numbers replace horizons that depend on the mean spacing of points; `None`
     /// if the deck has no such horizons. The copy is made only once, because making it can require reading
     /// meshes and point files.
     with_horizons: OnceLock<Option<grammar::Deck>>,

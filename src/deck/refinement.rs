@@ -21,8 +21,8 @@ const RISE: f64 = 1.0;
 /// Validate the refinement. Return `None` for a deck without `[refinement]`.
 ///
 /// # Errors
-/// If no body is given as a shape, or a body has Gauss points. On invalid levels, ratios m, factors, regions
-/// or triggers.
+/// If no body is given as a shape, or a body has Gauss points. If a level, ratio m, factor, region or trigger
+/// is invalid.
 pub fn refinement(
     scope: &Scope,
     deck: &Deck,

@@ -13,9 +13,9 @@ impl Table {
     ///
     /// # Errors
     /// If there are fewer than two rows, the counts differ, or the times do not increase. The error holds
-    /// a row index, from 0, and a message. If the times do not increase, the index belongs to the first row
-    /// whose time is not larger than the time of the row before it. For the other two errors, it belongs to
-    /// the last row.
+    /// a message and the index of a row, counted from 0. If the times do not increase, the index belongs to
+    /// the first row whose time is not larger than the time of the row before it. For the other two errors,
+    /// it belongs to the last row.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
         if times.len() < 2 || times.len() != values.len() {
             let message = format!("needs two rows or more, has {}", times.len());

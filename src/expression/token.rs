@@ -60,7 +60,8 @@ impl Token {
     }
 }
 
-/// All symbols; a symbol comes before its own prefixes, so the longest match is found first.
+/// All symbols, in the order of the search. A symbol comes before every shorter symbol with which it begins:
+/// `<=` comes before `<`. Therefore the longest match is found first.
 const SYMBOLS: &[(&str, Kind)] = &[
     (
         "<=",

@@ -236,7 +236,7 @@ impl BondLattice {
         }
     }
 
-    /// Return the bits of the intact bonds of the lane group with index `vector`.
+    /// Return the bits that mark the intact bonds of the lane group with index `vector`: one byte per offset.
     fn intact(&self, vector: usize) -> &[u8] {
         let count = self.offsets.len();
         &self.store.intact[vector * count..(vector + 1) * count]

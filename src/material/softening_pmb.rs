@@ -71,7 +71,7 @@ const RESIDUAL: f64 = 0.01;
 /// Ratio (sc − s0)/a = ln(1/r), with the decay stretch a.
 const DECAYS: f64 = 4.605_170_185_988_092;
 
-/// β and γ of a straight line.
+/// β and γ of the bilinear curve: between s0 and sc, F is one straight line.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
 
 /// β and γ of concrete (Petersson 1981). Let f_t be the tensile strength and G_F the fracture energy. The

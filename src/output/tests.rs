@@ -148,7 +148,7 @@ fn a_replaced_file_stays_readable_where_it_is_open() -> Result<()> {
 
 /// Create a result with the deck text `one` and with allocated space for two steps. Write these two steps.
 /// Resume the result after its first step, with the deck text `deck`. Write three more steps. Return true if
-/// the file was continued in place.
+/// the file was continued in place, and false if a copy replaced it.
 fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
 

@@ -3,7 +3,7 @@
 use delaunator::{Point, triangulate};
 use rustc_hash::FxHashMap;
 
-/// Maximum length of a triangle's edge, divided by the mean cell edge of the two points that this edge joins.
+/// Maximum ratio of the length of a triangle's edge to the mean cell edge of the two points at its ends.
 /// Values are interpolated only in triangles whose edges are within this limit. In a square lattice, this
 /// ratio is at most 1.41. Edges longer than the limit lie across holes, notches and open cracks.
 const LONGEST_EDGE: f64 = 2.2;

@@ -42,8 +42,8 @@ fn finest_first([body, level, x, y, z]: &NodeKey) -> NodeKey {
 }
 
 impl<'a> Grids<'a> {
-    /// Create unrefined grids. A problem without refinement has no grids. `coarsest` is the number of level-0
-    /// points of all ranks.
+    /// Create unrefined grids. If the problem has no refinement settings, no grids are created. `coarsest` is
+    /// the number of level-0 points of all ranks.
     ///
     /// # Errors
     /// If the cells of a body are too far from the origin to be numbered.

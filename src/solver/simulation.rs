@@ -539,8 +539,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// # Errors
     /// - If a value is not finite. The message names a condition or initial value that is not finite, or a
     ///   temperature that causes a thermal stretch of −1 or less. If all conditions and initial values are
-    ///   valid, the message names the first point whose values are not finite. If there are several such
-    ///   points at the same step, the message names the point with the smallest id.
+    ///   valid, the message names a point from the first step at which values are not finite. If there are
+    ///   several such points at this step, the message names the point with the smallest id.
     /// - If the motion of a rigid body is not finite. The message names this body.
     /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
     ///   is one.

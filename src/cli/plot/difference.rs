@@ -60,7 +60,8 @@ impl Subtrahend {
     /// time.
     ///
     /// # Errors
-    /// If the subtrahend has no output at this time, or has another number of points.
+    /// If the subtrahend has no output at this time, or if this output and the output of `minuend` have
+    /// different numbers of points.
     pub fn find(&self, minuend: &ResultReader, index: usize) -> Result<usize> {
         let (_, own) = self.outputs[index];
         let own = own.ok_or_else(|| self.wrong("has no output", index))?;

@@ -254,7 +254,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Test whether the slice shows the point at a position (m). If the view is not a slice, the result is
-    /// true. `size` is the edge of the cell of the point, m.
+    /// true. `size` is the edge length of the point's cell, m.
     pub(super) fn is_in_view(&self, position: [f64; 3], size: f64) -> bool {
         match self.view {
             View::Slice { axis, position: at } => is_in_slice(axis, at, position, size),
@@ -393,9 +393,9 @@ impl<'a> Painter<'a> {
         Ok(bodies.iter().map(is_scattered).collect())
     }
 
-    /// Return the limits of the drawn values; `None` without usable values. For damage, the automatic range
-    /// covers all values, because the few points with damage are not outliers. For a difference, the middle
-    /// of the colour bar is 0.
+    /// Return the limits of the drawn values; `None` if there are no values, or if no value is above 0 on a
+    /// logarithmic scale. For damage, the automatic range covers all values, because the few points with
+    /// damage are not outliers. For a difference, the middle of the colour bar is 0.
     fn limits(&self, values: Vec<f64>) -> Option<Limits> {
         let limits = match self.range {
             range if self.arguments.log => Limits::logarithmic(values, range),

@@ -120,7 +120,7 @@ fn quick_grid(translation: &mut Translation, node: &Node) -> Result<Points> {
 
 /// The influence function of a deck.
 pub(super) struct Influence {
-    /// Node of the key.
+    /// Node of the key `Influence Function` in the source deck.
     pub(super) node: Node,
     /// Name of Fissure's influence function; `None` if there is no counterpart.
     pub(super) known: Option<&'static str>,

@@ -16,7 +16,7 @@ use super::measures::wanted;
 /// - the point's part of the overshoot energy of these bonds, J;
 /// - their forces, N/m³.
 ///
-/// Few bonds break, so all laws share this kernel and its loops.
+/// This kernel and its loops are not compiled separately for each law, because few bonds break.
 #[derive(Clone, Copy)]
 pub struct BreakingBonds {
     /// Laws of points i and j.

@@ -192,8 +192,8 @@ impl<const D: usize> Kernel<D> for Stiffness {
     }
 }
 
-/// Kernel that sums the Kirchhoff stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz. T is
-/// the force state of point i, and Y = ξ + η.
+/// Kernel that computes the Kirchhoff stress Σ T⊗Y Ṽ, Pa. The sum is over the intact bonds. The components
+/// are in the order xx, yy, zz, xy, yz, xz. T is the force state of point i, and Y = ξ + η.
 ///
 /// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ. Its
 /// product with Fᵀ is the Kirchhoff stress Σ T⊗Y Ṽ, which is symmetric and rotates with the body. Linear laws

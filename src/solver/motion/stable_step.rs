@@ -3,7 +3,7 @@
 //! A bond with the stiffness C (N/m⁷) and the direction n has the energy ½ C (n·(u_j − u_i))² V_i V_j. This
 //! energy is at most C ((n·u_i)² + (n·u_j)²) V_i V_j. So the energy of all bonds is at most Σ_i V_i u_i·(D_i
 //! u_i) with D_i = Σ_j V_j C n⊗n, and every frequency obeys ω² ≤ 2 λ_max(D)/ρ. Verlet is stable for Δt ≤ 2/ω,
-//! hence Δt = min √(2ρ/λ_max(D)).
+//! hence Δt = min √(2ρ/λ_max(D)), with the minimum over all points.
 //!
 //! The usual step √(2ρ/Σ_j V_j C) (Silling & Askari 2005) uses the trace of D instead of λ_max(D). If the
 //! eigenvalues of D are equal, the usual step is shorter by a factor of √3 in 3-D, and √2 in 2-D.
