@@ -108,7 +108,7 @@ impl Dimension {
         }
     }
 
-    /// Return the description of the condition perpendicular to a bar; `None` in 2-D and 3-D.
+    /// Describe what is 0 in the directions across a bar: the stress or the strain. `None` in 2-D and 3-D.
     pub fn constraint(self) -> Option<&'static str> {
         match self {
             Self::Line { constraint, .. } => Some(match constraint {

@@ -26,8 +26,8 @@ pub struct ImportArguments {
     /// Deck to translate: YAML, XML, or an input script of LAMMPS.
     deck: PathBuf,
 
-    /// Path of the new deck [default: the path of the source deck: .toml replaces the ending .yaml, .yml,
-    /// .xml or .peridigm, and is appended to other names].
+    /// Path of the new deck [default: the path of the source deck with the ending .toml instead of .yaml,
+    /// .yml, .xml or .peridigm; .toml is appended to paths with another ending].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 

@@ -505,8 +505,8 @@ struct Overlap {
 
 /// Compare the initial values of the source deck with those of the new deck, which has one table per set.
 ///
-/// In the source code, each initial value replaces earlier values of the same component. In the new deck,
-/// the last table replaces all components. Return the points at which both differ. Log the initial values
+/// In the source code, each initial value replaces earlier values of the same component. In the new deck, a
+/// point gets all components from the last table whose set contains it. Return the points at which both differ. Log the initial values
 /// that may differ at points that are not known.
 fn overlaps(translation: &Translation, initials: &[Initial]) -> Vec<Overlap> {
     let mut overlaps = Vec::new();

@@ -174,8 +174,8 @@ impl<'n> Sets<'n> {
     }
 
     /// Return the name that a sum of node sets has in the new deck. Write the sum at its first use. Return
-    /// `None` if the new deck cannot express the sum as one set: the points of some of the node sets are not
-    /// known, and not all of them are conditions.
+    /// `None` if the new deck cannot express the sum as one set. This is so if the points of at least one node
+    /// set are not known, and at least one node set is not given by a condition.
     pub fn find_sum(
         &mut self,
         translation: &mut Translation,

@@ -17,8 +17,8 @@ const MAX_LINE: usize = 100;
 /// Maximum number of differences in a message.
 const MAX_DIFFERENCES: usize = 5;
 
-/// Describe the physics of a run. `deck` is the deck with all defaults. Return this deck if it is given.
-/// Otherwise, return a listing of the problem.
+/// Describe the physics of a run: the deck of the run with all defaults filled in, if it is given as `deck`,
+/// or else a listing of the problem.
 pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     if let Some(deck) = deck {
         return deck.to_owned();

@@ -74,11 +74,11 @@ fn a_high_modulus_is_no_scatter() {
 /// then break at 1/√2 of the stretch without correction, however strong its points are.
 #[test]
 fn surface_corrections_scale_the_strength_of_each_point() {
-    let stretch_at_break = |grid: &str, seed: u32| {
+    let stretch_at_break = |correction: &str, seed: u32| {
         let deck = format!(
             "dimension = '1d'
-            grid = {{ spacing = 1, horizon = 1.5, volume_correction = 'none', {grid} }}
-            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            grid = {{ spacing = 1, horizon = 1.5, volume_correction = 'none' }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5, surface_correction = '{correction}' }}
             damage.brittle.critical_stretch = {{ fracture_energy = 1e-4, weibull_modulus = 2, seed = {seed} }}
             body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [2] }} }}
             condition.pull = {{ set = 'all', displacement = ['1e-6*t*x'] }}
@@ -98,8 +98,8 @@ fn surface_corrections_scale_the_strength_of_each_point() {
         })
     };
     for seed in 1..=5 {
-        let plain = stretch_at_break("surface_correction = 'none'", seed);
-        let corrected = stretch_at_break("surface_correction = 'energy'", seed);
+        let plain = stretch_at_break("none", seed);
+        let corrected = stretch_at_break("energy", seed);
         let expected = plain * std::f64::consts::FRAC_1_SQRT_2;
         assert!(
             (corrected - expected).abs() < 2e-6,

@@ -61,9 +61,9 @@ fn a_collision_that_is_too_fast_for_contact_is_told_once() {
             "
         )
     };
-    let alone = warnings(1, &deck(0.3));
+    let alone = warnings(1, &deck(0.45));
     assert_eq!(alone.len(), 1, "{alone:?}");
-    assert_eq!(warnings(2, &deck(0.3)), alone);
+    assert_eq!(warnings(2, &deck(0.45)), alone);
     assert_eq!(warnings(1, &deck(0.1)), [""; 0]);
 }
 

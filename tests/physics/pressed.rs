@@ -271,22 +271,31 @@ fn a_closed_crack_carries_load_in_equilibrium() {
 /// refinement. Cells may also have different edges.
 #[test]
 fn a_closed_crack_carries_load_on_any_grid() {
-    let force = |grid: &str, contact: &str| {
-        let deck = cracked_block(contact).replace("spacing = 1, horizon = 3.015", grid);
+    let force = |grid: &str, more: &str| {
+        let deck = cracked_block(more).replace("spacing = 1, horizon = 3.015", grid);
         load_steps::<2>(&deck, &["force_top"]).last().unwrap()[0]
     };
-    let refined =
-        "contact = {}\nrefinement = { levels = 1, region.middle.where = 'abs(y - 10) < 4' }";
-    let [plain, oblong] = [
-        "spacing = 1, horizon = 3.015",
-        "spacing = [0.5, 1], horizon = 3.015",
-    ];
-    let expected = force(plain, "contact = {}");
-    for (grid, contact) in [(plain, refined), (oblong, "contact = {}")] {
-        let found = force(grid, contact);
+    let refinement = "refinement = { levels = 1, region.middle.where = 'abs(y - 10) < 4' }";
+    for (grid, more) in [
+        ("spacing = 1, horizon = 3.015", refinement),
+        ("spacing = [0.5, 1], horizon = 3.015", ""),
+        ("spacing = [1, 0.5], horizon = 3.015", ""),
+    ] {
+        let closed = force(grid, &format!("contact = {{}}\n{more}"));
+        // A crack outside of the body leaves the block whole.
+        let whole =
+            cracked_block(more).replace("[-1, 10], to = [11, 10]", "[-2, 10], to = [-1, 10]");
+        let whole = whole.replace("spacing = 1, horizon = 3.015", grid);
+        let whole = load_steps::<2>(&whole, &["force_top"]).last().unwrap()[0];
+        // The contact layer is as thick as the horizon, which is half as large on the refined grid.
+        let expected = if more.is_empty() {
+            0.77..0.88
+        } else {
+            0.88..1.0
+        };
         assert!(
-            (0.9..1.1).contains(&(found / expected)),
-            "{grid} {contact}: {found} of {expected}"
+            expected.contains(&(closed / whole)),
+            "{grid} {more}: {closed} of {whole}"
         );
     }
 }
@@ -311,7 +320,7 @@ fn a_contact_that_is_stiffer_than_the_bonds_comes_to_rest() {
         ";
     let rows = load_steps::<2>(deck, &["reaction_bottom_y"]);
     for (row, load) in rows.iter().zip([0.015, 0.03]) {
-        assert!((row[0] / load - 1.0).abs() < 1e-5, "{row:?} {load}");
+        assert!((row[0] / load - 1.0).abs() < 1e-4, "{row:?} {load}");
     }
     assert_eq!(rows.len(), 2);
 }

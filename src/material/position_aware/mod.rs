@@ -1,7 +1,9 @@
 //! Position-aware linear solid: an ordinary state-based solid with influence functions fitted to each point's
 //! own family.
 //!
-//! Mitchell, Silling & Littlewood 2015 (PALS). With the extension e = |Y| − |ξ|,
+//! Mitchell, Silling & Littlewood 2015 (PALS). The law has two influence functions per bond: ω for the
+//! dilatation θ, and σ for the deviatoric extension ε. With the extension e = |Y| − |ξ|, the corrected volume Ṽ
+//! of the neighbour and the strain energy density W,
 //!
 //! θ = Σ ω|ξ| e Ṽ, ε = e − θ|ξ|/d, W = ½ k′θ² + ½ Σ σ ε² Ṽ,
 //!
@@ -457,8 +459,8 @@ mod tests {
     }
 
     /// A point without bonds within its own horizon contributes nothing to a bond from a point with a larger
-    /// horizon. The critical stretch of this bond is therefore only √2 times that of a bond to which both
-    /// ends contribute.
+    /// horizon: its σ is 0. The critical stretch s_c √(2σ_w/(σ_i + σ_j)) of this bond is therefore √2 times
+    /// that of a bond with the same σ at both ends.
     #[test]
     fn points_without_bonds_have_no_share() {
         for functions in [

@@ -90,7 +90,7 @@ impl<const D: usize> GridValues<D> {
         self.numbers.splice(0..0, columns);
     }
 
-    /// Remove the first `count` columns of the point numbers.
+    /// Remove the first `count` columns of the numbers that laws compute for each point.
     pub fn remove_numbers(&mut self, count: usize) {
         self.numbers.drain(..count);
     }

@@ -689,8 +689,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Reset the count of newly broken bonds of a further result to 0. `further` is the index of this result
-    /// among the further results with such a count.
+    /// Reset the counts of bonds that have broken since the last output of a further result. `further` is the
+    /// index of this result among the further results with such counts.
     pub fn forget_newly_broken_of(&mut self, further: usize) {
         if let Some(new) = self.newly_broken_of_further.get_mut(further) {
             new.fill(0.0);
