@@ -180,7 +180,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// repeat their motion of the last load step if the step length has not changed.
     pub(super) fn begin_load_step(&mut self, extrapolates: bool) {
         self.walk(|part, mut conditions| {
-            conditions.before_moving(part);
+            conditions.before_moving(part, Work::Trapezoid);
             true
         });
         self.note_equilibrium(extrapolates && !self.clock.is_new_size());
