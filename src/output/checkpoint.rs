@@ -26,7 +26,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Version of the file layout.
-const VERSION: i64 = 10;
+const VERSION: i64 = 11;
 
 /// Test whether a path exists. A link to a missing file counts as existing, and so does a path that cannot be
 /// examined.

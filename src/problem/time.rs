@@ -76,7 +76,7 @@ pub struct Static {
     /// Number of load steps.
     pub load_steps: u64,
     /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
-    /// reactions.
+    /// reactions, or by the norm at the start of the load step if loads and reactions vanish.
     pub tolerance: f64,
     /// Largest number of iterations of a load step. The count restarts when bonds break.
     pub max_iterations: u64,
@@ -120,7 +120,7 @@ pub struct Relaxation {
     /// Number of load steps.
     pub load_steps: u64,
     /// Largest allowed residual: norm of the unbalanced forces, divided by the sum of the norms of loads and
-    /// reactions.
+    /// reactions, or by the norm at the start of the load step if loads and reactions vanish.
     pub tolerance: f64,
     /// Largest number of iterations of a load step. The count restarts when bonds break.
     pub iterations: u64,

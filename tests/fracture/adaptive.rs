@@ -83,6 +83,57 @@ fn steps_that_are_long_for_bonds_that_break_are_told() {
     assert!(!warned("safety = 0.8", &["--quiet"]));
 }
 
+/// The work of a support is that of the present step length, also if its motion jumps between two steps.
+#[test]
+fn a_kink_of_a_support_does_not_spoil_the_energy_balance() {
+    // The step is 0.1 s before t = 2 s, and 0.2 s after it.
+    let adaptive = "step = 0.1, adaptive = { steps = 20, raise = 2, largest = 0.2, most_broken = 2, stable_broken = 1 }";
+    let error = |motion: &str, time: &str| {
+        let deck = format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5, damping = 0.01 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [30] }} }}
+            set.left.where = 'x < 3'
+            condition.move = {{ set = 'left', {motion} }}
+            time = {{ end = 6, {time} }}
+            "
+        );
+        simulate(&deck, |mut simulation: Simulation<1>| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let rows = rows_to_the_end(&mut observer, &mut simulation);
+            let names = ["energy_error", "external_work"];
+            let [error, work] = names.map(|name| {
+                let column = column(&observer, name);
+                rows.iter()
+                    .fold(0.0_f64, |most, row| most.max(row[column].abs()))
+            });
+            error / work
+        })
+    };
+    for motion in [
+        "displacement = ['0.01*max(t - 2, 0)']",
+        "displacement = ['0.01*max(t - 1.95, 0)']",
+        "displacement = ['0.01*max(t - 2.15, 0)']",
+        "velocity = ['0.01*step(t - 2.05)']",
+        "displacement = ['1e-3*min(t, 2)^2 + 4e-3*max(t - 2, 0)']",
+    ] {
+        let [fixed, adaptive] = ["step = 0.2", adaptive].map(|time| error(motion, time));
+        assert!(
+            adaptive < 1.1 * fixed,
+            "{motion}: {adaptive:e}, fixed {fixed:e}"
+        );
+    }
+    // Halved steps give a quarter of the error.
+    let smooth = "displacement = ['0.01*(1 - cos(t))']";
+    let finer = adaptive
+        .replace("0.1", "0.05")
+        .replace("20", "40")
+        .replace("0.2", "0.1");
+    let ratio = error(smooth, adaptive) / error(smooth, &finer);
+    assert!((3.5..4.5).contains(&ratio), "{ratio}");
+}
+
 #[test]
 fn ranks_do_not_change_a_bit() {
     let deck = torn(&format!("safety = 0.8, {RULE}"));

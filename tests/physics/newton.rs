@@ -376,6 +376,103 @@ fn a_free_body_that_is_heated_expands_without_stress() {
     }
 }
 
+/// Return the deck of a heated plate on a pin and a roller. `more` has further conditions.
+fn heated_on_supports(law: &str, method: &str, more: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.sheet.{law} = {{ density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, thermal_expansion = 1e-5 }}
+        body.plate = {{ material = 'sheet', shape.box = {{ lower = [0, 0], upper = [20, 10] }} }}
+        set.pin.where = 'x < 1 && y < 1'
+        set.roller.where = 'x > 19 && y < 1'
+        set.right.where = 'x > 19'
+        condition.pin = {{ set = 'pin', displacement = [0, 0] }}
+        condition.roller = {{ set = 'roller', displacement = ['free', 0] }}
+        condition.heat = {{ set = 'all', temperature = '100*t' }}
+        {more}
+        history.reactions = ['pin']
+        time = {{ end = 1, method = '{method}', {method} = {{ load_steps = 2 }} }}
+        "
+    )
+}
+
+/// The reactions vanish in equilibrium, so the tolerance is relative to the forces at the start.
+#[test]
+fn a_heated_body_on_a_pin_and_a_roller_expands_without_stress() {
+    for (law, method, most) in [
+        ("correspondence", "static", 40.0),
+        ("correspondence", "relaxation", 700.0),
+        ("ordinary", "static", 40.0),
+        ("ordinary", "relaxation", 400.0),
+    ] {
+        let deck = heated_on_supports(law, method, "");
+        simulate::<2, _>(&deck, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let mut evaluations = 0;
+            while !simulation.is_over() {
+                simulation.advance();
+                simulation.check().unwrap_or_else(|error| panic!("{error}"));
+                evaluations = simulation.times.evaluations;
+            }
+            assert!((evaluations as f64) < most, "{law} {method}: {evaluations}");
+            for d in 0..2 {
+                let [x, u] = [&simulation.model.reference, &simulation.fields.displacement];
+                for (x, u) in x[d].iter().zip(&u[d]) {
+                    // The bound is a small multiple of the largest displacement times the tolerance, 1e-6.
+                    let error = u - 1e-3 * (x - 0.5);
+                    assert!(error.abs() < 1e-7, "{law} {method} {x}: {error:e}");
+                }
+            }
+            // Held in place, the plate would exert 1e-3 E b h/(1 − ν) = 1.4e7 N.
+            let values = row(&mut observer, &mut simulation).values;
+            let reaction = values[column(&observer, "reaction_pin_x")];
+            assert!(
+                reaction.abs() < 1e-6 * 1.4e7,
+                "{law} {method}: {reaction:e}"
+            );
+        });
+    }
+}
+
+/// Its load is a hundred thousandth of the forces at the start, and is balanced to the tolerance.
+#[test]
+fn a_small_load_on_a_heated_body_has_its_reaction() {
+    for method in ["static", "relaxation"] {
+        let pull = "condition.pull = { set = 'right', force = ['100*t', 0] }";
+        let deck = heated_on_supports("ordinary", method, pull);
+        simulate::<2, _>(&deck, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            to_the_end(&mut simulation);
+            let values = row(&mut observer, &mut simulation).values;
+            let reaction = values[column(&observer, "reaction_pin_x")];
+            assert!(
+                (reaction + 100.0).abs() < 100.0 * 1e-4,
+                "{method}: {reaction}"
+            );
+        });
+    }
+}
+
+#[test]
+fn a_heated_body_without_an_equilibrium_names_the_forces_at_the_start() {
+    let deck = heated_on_supports("correspondence", "static", "");
+    let deck = deck.replace(
+        "load_steps = 2",
+        "load_steps = 1, tolerance = 1e-15, max_iterations = 1, max_halvings = 0",
+    );
+    simulate::<2, _>(&deck, |mut simulation| {
+        let message = loop {
+            simulation.advance();
+            if let Err(error) = simulation.check() {
+                break error.message;
+            }
+            assert!(!simulation.is_over());
+        };
+        let wanted = " of the forces at the start of the load step, most of them ";
+        assert!(message.contains(wanted), "{message}");
+    });
+}
+
 #[test]
 fn a_torn_plate_breaks_as_in_a_relaxation() {
     let run = |deck: &str| {

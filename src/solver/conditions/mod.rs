@@ -63,6 +63,13 @@ pub enum Work {
     FirstEquilibrium,
     /// At the last of several equilibria: for supports, 0; for loads, f₁·(u₂ − u₀) V.
     LastEquilibrium,
+    /// For loads, as [`Self::Trapezoid`]. For supports, the change of the kinetic energy minus the work of the
+    /// other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
+    ///
+    /// A reaction that was computed for one step length does not give the prescribed motion in a step of
+    /// another length. Its trapezoidal rule is therefore wrong by ½ ρ w² (Δt₂/Δt₁ − 1) if the velocity jumps
+    /// from 0 to w between steps of Δt₁ and Δt₂.
+    KineticEnergy,
 }
 
 /// The conditions that act on a [`Part`] of the points.
@@ -497,12 +504,18 @@ impl<'a, const D: usize> PartConditions<'a, D> {
         self.on.loads.is_empty() && self.on.supports.is_empty()
     }
 
-    /// Store force densities and displacements before the points move, for the work of the next step.
-    pub fn before_moving(&mut self, part: &Part<'_, D>) {
+    /// Store force densities and displacements before the points move, for the work of the next step. `work`
+    /// is the formula for this work.
+    pub fn before_moving(&mut self, part: &Part<'_, D>, work: Work) {
         let displacement = part.displacement.each_ref().map(|column| &**column);
         let reaction = part.reaction.as_ref();
         let reaction = reaction.map(|reaction| reaction.each_ref().map(|column| &**column));
         self.record_for_work(displacement, reaction);
+        if work == Work::KineticEnergy {
+            for support in &mut self.on.supports {
+                support.record_motion(self.stage.supports, part);
+            }
+        }
     }
 
     /// Store force densities and displacements for the work of the next step. The arguments are the

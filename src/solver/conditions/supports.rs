@@ -55,6 +55,9 @@ pub struct Supported {
     before: Vec<f64>,
     /// Displacement before the step, m.
     moved_from: Vec<f64>,
+    /// Velocity (m/s) before the step, and sum of the other force densities on the point (N/m³). Empty if no
+    /// step has used [`Work::KineticEnergy`].
+    motion: Vec<[f64; 2]>,
 }
 
 impl Support {
@@ -136,6 +139,7 @@ impl Supported {
             support,
             before: vec![0.0; points.len()],
             moved_from: vec![0.0; points.len()],
+            motion: Vec::new(),
             points,
             positions,
         }
@@ -161,6 +165,19 @@ impl Supported {
             self.moved_from[k] = displacement[component][point];
             self.before[k] = reaction.map_or(0.0, |field| field[component][point]);
         }
+    }
+
+    /// Store velocities and the forces of all other causes, for [`Work::KineticEnergy`] of the next step.
+    pub fn record_motion<const D: usize>(&mut self, supports: &[Support], part: &Part<'_, D>) {
+        let component = supports[self.support].component;
+        self.motion.clear();
+        let points = self.points.iter().map(|point| usize::from(*point));
+        self.motion.extend(points.map(|point| {
+            [
+                part.velocity[component][point],
+                part.force_without_reaction(component, point),
+            ]
+        }));
     }
 
     /// Set the displacements of the points, and their mean velocities in the last step. Called after the
@@ -262,14 +279,24 @@ impl Supported {
             return;
         }
         let component = supports[self.support].component;
-        let (Some(reaction), Some([work])) = (&part.reaction, &mut part.external_work) else {
-            return;
-        };
+        let model = part.model;
         for (k, point) in self.points.iter().enumerate() {
             let point = usize::from(*point);
             let moved = part.displacement[component][point] - self.moved_from[k];
-            let force = 0.5 * (self.before[k] + reaction[component][point]);
-            work[point] += force * moved * part.model.volume[part.first + point];
+            let density = if work == Work::KineticEnergy {
+                let [velocity, force] = self.motion[k];
+                let now = part.velocity[component][point];
+                let others = 0.5 * (force + part.force_without_reaction(component, point));
+                let kinetic = 0.5 * model.density_of(part.first + point) * (now - velocity);
+                kinetic * (now + velocity) - others * moved
+            } else {
+                let reaction = part.reaction.as_ref();
+                let reaction = reaction.expect("a run with supports has reactions");
+                0.5 * (self.before[k] + reaction[component][point]) * moved
+            };
+            if let Some([work]) = &mut part.external_work {
+                work[point] += density * model.volume[part.first + point];
+            }
         }
     }
 }

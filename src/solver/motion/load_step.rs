@@ -10,10 +10,21 @@
 //! positions. The history is stored at equilibrium.
 //!
 //! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖), with the total forces f on the
-//! points. If a free body only moves rigidly, f, the loads and the reactions are 0 apart from round-off.
-//! Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is also accepted as equilibrium. V is the volume, ρ the fictitious
-//! density (N/m⁴) and u the displacement of a point. ρ is an upper bound of the stiffness of a point.
-//! So ε ‖V ρ u‖, with the machine precision ε, bounds the forces that come from rounding u.
+//! points. Two further states are accepted as equilibrium, because loads and reactions can vanish:
+//!
+//! ```text
+//! ‖f‖ + ‖loads‖ + ‖reactions‖ ≤ tolerance · ‖f at the start‖
+//! ‖f‖ ≤ ROUND_OFF · ‖V ρ u‖
+//! ```
+//!
+//! The first one is for a body that is heated or begins deformed, and whose supports, if any, only prevent
+//! rigid motion. Loads and reactions are on the left side. Otherwise a large force at the start would permit
+//! errors as large as small loads or reactions.
+//!
+//! The second one is for a body that only moves rigidly. f, the loads and the reactions are then round-off. V
+//! is the volume, ρ the fictitious density (N/m⁴) and u the displacement of a point. ρ is an upper bound of
+//! the stiffness of a point. So ε ‖V ρ u‖, with the machine precision ε, bounds the forces that come from
+//! rounding u.
 
 use rayon::prelude::*;
 
@@ -46,16 +57,21 @@ pub struct LoadStep {
     /// Number of iterations in this load step since bonds last broke. If no bonds have broken in this load
     /// step, the number of all its iterations.
     pub since_breaking: u64,
-    /// ‖f‖ divided by ‖loads‖ + ‖reactions‖, or by `scale` if `scale` is larger; f is the total force on a
-    /// point. The residual is 0 if f is round-off, and NaN before the first load step.
+    /// The smaller of two ratios, where f is the total force on a point: ‖f‖ divided by ‖loads‖ + ‖reactions‖
+    /// (at least `scale`), and ‖f‖ + ‖loads‖ + ‖reactions‖ divided by `start`. The residual is 0 if f is
+    /// round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation, see [`super::relaxation`]; NaN if all points are at rest.
     pub(super) damping: f64,
-    /// The larger of two values, N. The first is the largest ‖loads‖ + ‖reactions‖ of the equilibria so far.
-    /// The second is the largest ‖f‖ at the start of a load step without loads and reactions. The tolerance
-    /// is relative to at least the larger value, so the allowed ‖f‖ does not shrink when a body is unloaded
-    /// or breaks.
+    /// Largest ‖loads‖ + ‖reactions‖ of the equilibria so far, N. The tolerance is relative to at least this
+    /// norm, so the allowed ‖f‖ does not shrink when a body is unloaded or breaks.
     pub(super) scale: f64,
+    /// Largest ‖f‖ at the start of a load step so far, N. Supports do not contribute: this is ‖f‖ before the
+    /// supports move, under the new temperatures. In runs without temperatures, only load steps that start
+    /// without loads and reactions count.
+    pub(super) start: f64,
+    /// Whether the residual is the ratio to `start`.
+    pub(super) is_relative_to_start: bool,
     /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,
     /// Whether the equilibrium has been found, and no more bonds break. True before the first load step.
@@ -73,6 +89,8 @@ impl Default for LoadStep {
             residual: f64::NAN,
             damping: f64::NAN,
             scale: 0.0,
+            start: 0.0,
+            is_relative_to_start: false,
             has_broken: false,
             is_settled: true,
             has_failed: false,
@@ -91,46 +109,75 @@ impl LoadStep {
     /// over all points.
     pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
-        // A free body without loads, for example under a temperature, has only this force to compare with.
-        if loads + reactions == 0.0 && self.iterations <= 1 {
-            self.scale = self.scale.max(free);
+        let exerted = loads + reactions;
+        // A free body that begins deformed has only this force to compare with.
+        if exerted == 0.0 && self.iterations <= 1 {
+            self.start = self.start.max(free);
         }
-        let scale = (loads + reactions).max(self.scale);
-        let is_round_off = free <= ROUND_OFF * stiffness;
-        self.residual = if is_round_off { 0.0 } else { free / scale };
+        let to_exerted = free / exerted.max(self.scale);
+        let to_start = (free + exerted) / self.start;
+        // False if a ratio is NaN. The residual is then NaN, and the load step fails.
+        self.is_relative_to_start = to_start < to_exerted;
+        self.residual = if free <= ROUND_OFF * stiffness {
+            0.0
+        } else if self.is_relative_to_start {
+            to_start
+        } else {
+            to_exerted
+        };
+    }
+
+    /// Return the forces to which the residual is relative, for error messages.
+    fn reference(&self) -> &'static str {
+        if self.is_relative_to_start {
+            "the forces at the start of the load step"
+        } else {
+            "loads and reactions"
+        }
     }
 
     /// Encode the state for a checkpoint.
-    pub fn words(&self) -> [u64; 8] {
-        let [residual, damping, scale] =
-            [self.residual, self.damping, self.scale].map(f64::to_bits);
-        let [broken, settled, failed] =
-            [self.has_broken, self.is_settled, self.has_failed].map(u64::from);
-        let counts = [self.iterations, self.since_breaking];
+    pub fn words(&self) -> [u64; 10] {
+        let [residual, damping, scale, start] =
+            [self.residual, self.damping, self.scale, self.start].map(f64::to_bits);
         [
-            counts[0], counts[1], residual, damping, scale, broken, settled, failed,
+            self.iterations,
+            self.since_breaking,
+            residual,
+            damping,
+            scale,
+            start,
+            u64::from(self.is_relative_to_start),
+            u64::from(self.has_broken),
+            u64::from(self.is_settled),
+            u64::from(self.has_failed),
         ]
     }
 
     /// Decode the state from [`Self::words`].
-    pub fn of_words(words: [u64; 8]) -> Self {
+    pub fn of_words(words: [u64; 10]) -> Self {
         let [
             iterations,
             since_breaking,
             residual,
             damping,
             scale,
+            start,
+            relative_to_start,
             broken,
             settled,
             failed,
         ] = words;
-        let [residual, damping, scale] = [residual, damping, scale].map(f64::from_bits);
+        let [residual, damping, scale, start] =
+            [residual, damping, scale, start].map(f64::from_bits);
         Self {
             iterations,
             since_breaking,
             residual,
             damping,
             scale,
+            start,
+            is_relative_to_start: relative_to_start == 1,
             has_broken: broken == 1,
             is_settled: settled == 1,
             has_failed: failed == 1,
@@ -183,11 +230,16 @@ impl<const D: usize> Simulation<'_, D> {
     /// repeat their motion of the last load step if the step length has not changed.
     pub(super) fn begin_load_step(&mut self, extrapolates: bool) {
         self.walk(|part, mut conditions| {
-            conditions.before_moving(part);
+            conditions.before_moving(part, Work::Trapezoid);
             true
         });
-        self.note_equilibrium(extrapolates && !self.clock.is_new_size());
+        self.note_reaction();
+        let repeats = extrapolates && !self.clock.is_new_size();
         self.clock.advance();
+        if self.problem.has_temperature() {
+            self.raise_start();
+        }
+        self.note_displacement(repeats);
         let (time, step) = (self.clock.time(), self.clock.step());
         self.apply_displacements(time, step);
         self.progress.load_factors.begin_load_step();
@@ -197,14 +249,14 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.progress.load_step = LoadStep {
             scale: self.progress.load_step.scale,
+            start: self.progress.load_step.start,
             is_settled: false,
             ..LoadStep::default()
         };
     }
 
-    /// Record the present displacements and reactions as the last equilibrium. If `again` is true, the points
-    /// then repeat their motion of the last load step.
-    fn note_equilibrium(&mut self, again: bool) {
+    /// Record the displacements of the last equilibrium. With `again`, repeat the motion of the last load step.
+    fn note_displacement(&mut self, again: bool) {
         let owned = self.model.owned();
         let fields = &mut self.fields;
         if let Some(equilibrium) = &mut fields.equilibrium_displacement {
@@ -220,11 +272,30 @@ impl<const D: usize> Simulation<'_, D> {
                 });
             }
         }
+    }
+
+    /// Record the reactions of the last equilibrium.
+    fn note_reaction(&mut self) {
+        let fields = &mut self.fields;
         if let (Some(equilibrium), Some(reaction)) =
             (&mut fields.equilibrium_reaction, &fields.reaction)
         {
             equilibrium.clone_from(reaction);
         }
+    }
+
+    /// Raise `start` to the norm of the total forces at the present displacements under the temperatures of
+    /// the present time, if this norm is larger. Collective.
+    fn raise_start(&mut self) {
+        self.evaluate(BondUpdate::None);
+        self.apply_velocities();
+        let (model, fields) = (&self.model, &self.fields);
+        let [square, ..] = sums(model, fields, &|point, density| {
+            balance(model, fields, point, density)
+        });
+        let force = reduce(self.comm, &mut [square])[0].sqrt();
+        let load_step = &mut self.progress.load_step;
+        load_step.start = load_step.start.max(force);
     }
 
     /// Evaluate forces and reactions at the present positions, with the history that the bonds would have if
@@ -339,8 +410,9 @@ impl<const D: usize> Simulation<'_, D> {
         let remedy = self.time_rule().method.remedy();
         let cause = if residual.is_finite() {
             format!(
-                "the unbalanced forces are still {residual:.1e} of loads and reactions{}. If the body can carry \
-                 the loads, {remedy} or a larger `tolerance`",
+                "the unbalanced forces are still {residual:.1e} of {}{}. If the body can carry the loads, \
+                 {remedy} or a larger `tolerance`",
+                self.progress.load_step.reference(),
                 self.worst_point()
             )
         } else {
@@ -448,4 +520,54 @@ pub(super) fn sums<const D: usize, const N: usize>(
                 a
             },
         )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Return the residual for norms of the total forces, loads and reactions (N), after `iterations`.
+    fn residual(load_step: &mut LoadStep, iterations: u64, norms: [f64; 3]) -> f64 {
+        load_step.iterations = iterations;
+        let [free, loads, reactions] = norms.map(|norm| norm * norm);
+        load_step.set_residual([free, loads, reactions, 1e-18]);
+        load_step.residual
+    }
+
+    #[test]
+    fn forces_at_the_start_replace_loads_and_reactions_that_vanish() {
+        let mut heated = LoadStep {
+            start: 100.0,
+            ..LoadStep::default()
+        };
+        // Reactions that are as small as the unbalanced force do not count.
+        assert_eq!(residual(&mut heated, 9, [0.5, 0.0, 0.5]), 0.01);
+        assert_eq!(
+            heated.reference(),
+            "the forces at the start of the load step"
+        );
+        // Reactions or loads that remain give the smaller allowed force.
+        assert_eq!(residual(&mut heated, 9, [0.5, 0.0, 10.0]), 0.05);
+        assert_eq!(residual(&mut heated, 9, [0.5, 10.0, 0.0]), 0.05);
+        assert_eq!(heated.reference(), "loads and reactions");
+        assert_eq!(LoadStep::of_words(heated.words()).start, 100.0);
+    }
+
+    #[test]
+    fn a_free_body_compares_with_its_first_forces() {
+        let mut free = LoadStep::default();
+        assert_eq!(residual(&mut free, 0, [8.0, 0.0, 0.0]), 1.0);
+        assert_eq!(residual(&mut free, 5, [2.0, 0.0, 0.0]), 0.25);
+        // A later load is balanced as accurately as in a body without a history.
+        assert_eq!(residual(&mut free, 5, [2.0, 4.0, 0.0]), 0.5);
+        assert!(residual(&mut free, 5, [f64::NAN, 4.0, 0.0]).is_nan());
+        assert!(residual(&mut free, 5, [f64::INFINITY, f64::INFINITY, 0.0]).is_nan());
+    }
+
+    #[test]
+    fn a_load_step_that_starts_in_equilibrium_has_only_round_off() {
+        let mut still = LoadStep::default();
+        assert_eq!(residual(&mut still, 0, [0.0; 3]), 0.0);
+        assert_eq!(residual(&mut still, 2, [1e-25, 0.0, 0.0]), 0.0);
+    }
 }

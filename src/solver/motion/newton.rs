@@ -46,7 +46,7 @@ use crate::solver::Simulation;
 
 use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
-use super::load_step::{CHUNK, sums};
+use super::load_step::{CHUNK, LoadStep, sums};
 
 /// Largest component of the displacement ε v in a finite difference, divided by the shortest horizon.
 const SHIFT: f64 = 1e-6;
@@ -256,8 +256,8 @@ impl<const D: usize> Vectors<D> {
         self.note_force(simulation);
         self.multiply(simulation);
         add(&mut self.residual, -1.0, &self.product);
-        let scale = simulation.progress.load_step.scale;
-        let linear = self.solve(simulation, rule.tolerance * scale);
+        let LoadStep { scale, start, .. } = simulation.progress.load_step;
+        let linear = self.solve(simulation, rule.tolerance * scale.max(start));
         move_from(simulation, &self.base, 1.0, &self.correction);
         let (time, step) = (simulation.clock.time(), simulation.clock.step());
         simulation.apply_displacements(time, step);

@@ -113,6 +113,16 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
+    /// Component d of all force densities on a point except the reaction, N/m³. Viscous damping is included.
+    pub fn force_without_reaction(&self, d: usize, point: usize) -> f64 {
+        let force = Exerted {
+            internal: &*self.internal_force[d],
+            external: self.external_force.as_ref().map(|force| &*force[d]),
+        };
+        let velocity = self.velocity[d][point];
+        (self.model).with_damping(self.first + point, force.at(point), velocity)
+    }
+
     /// Compute the power of viscous damping at the present velocities. Add the energy that damping has
     /// dissipated in a time step of length `step` (s), by the trapezoidal rule.
     pub fn add_damped_energy(&mut self, step: f64) {
