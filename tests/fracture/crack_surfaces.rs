@@ -55,6 +55,24 @@ fn surface(cells: usize, cuts: &str) -> Surface {
     surface
 }
 
+/// The horizon of the grid may be that of another body.
+#[test]
+fn a_crack_is_measured_with_the_horizon_of_its_body() {
+    let area = |grid: &str| {
+        let deck = cube(12, &disc([0.0, 0.0, 1.0], 0.25))
+            .replace("spacing = 'dx', horizon = '3*dx'", grid)
+            .replace(
+                "material = 'glass', shape",
+                "material = 'glass', spacing = 'dx', horizon = '3*dx', shape",
+            );
+        simulate::<3, _>(&deck, |mut simulation| crack(&mut simulation).area)
+    };
+    assert_eq!(
+        area("spacing = 'dx/4', horizon = '0.75*dx'"),
+        area("spacing = 'dx', horizon = '3*dx'")
+    );
+}
+
 #[test]
 fn a_plane_across_a_block_has_its_area_in_each_direction_and_no_front() {
     // Normals of planes through the centre of the cube, and the areas of these sections. The section across

@@ -9,7 +9,7 @@ use crate::problem;
 use crate::solver::Simulation;
 
 use super::centre_line::{Branch, Damaged, Reach, branches};
-use super::crack_points::{link, points_of, spacings};
+use super::crack_points::{horizon_of, link, points_of, spacings};
 
 /// Lower limit of the connection distance, in spacings. Two damaged points are connected if they are at most
 /// the connection distance apart. With this limit, diagonal neighbours are connected for any horizon.
@@ -40,13 +40,13 @@ impl CrackPath {
         simulation: &Simulation<'_, D>,
         rule: &problem::CrackPath,
     ) -> Result<Self> {
-        let problem = simulation.problem;
         let points = points_of(simulation, rule)?;
+        let horizon = horizon_of(simulation, &points);
         let [_, largest] = spacings(simulation);
-        let link = link(problem, DIAGONAL * largest);
+        let link = link(horizon, DIAGONAL * largest);
         let reach = Reach {
             link,
-            section_length: problem.horizon.max(link),
+            section_length: horizon.max(link),
         };
         Ok(Self {
             rule: rule.clone(),

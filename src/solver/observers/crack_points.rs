@@ -1,7 +1,7 @@
 //! Points that are searched for a crack, in 2-D and 3-D.
 
 use crate::error::Result;
-use crate::problem::{CrackPath, Problem};
+use crate::problem::CrackPath;
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
@@ -36,7 +36,20 @@ pub fn spacings<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; 2] {
     [-smallest, largest].map(|volume| simulation.problem.dimension.edge(volume))
 }
 
+/// Largest horizon of the bodies to which the owned points `points` of the ranks belong, m. For refined bodies,
+/// this is the horizon of level 0. Collective.
+pub fn horizon_of<const D: usize>(simulation: &Simulation<'_, D>, points: &[u32]) -> f64 {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let horizons = points.iter().map(|point| {
+        let block = usize::from(model.block[*point as usize]);
+        problem.bodies[problem.body_of(block)].horizon
+    });
+    let mut largest = [horizons.fold(0.0, f64::max)];
+    simulation.comm.max(&mut largest);
+    largest[0]
+}
+
 /// Return the distance up to which damaged points are connected, m; this distance is at least `least` (m).
-pub fn link(problem: &Problem, least: f64) -> f64 {
-    (LINK * problem.horizon).max(least)
+pub fn link(horizon: f64, least: f64) -> f64 {
+    (LINK * horizon).max(least)
 }

@@ -25,7 +25,7 @@ use crate::solver::assign::cutoffs;
 use crate::solver::connected::Pieces;
 
 use super::crack_edge::Edge;
-use super::crack_points::{link, points_of, spacings};
+use super::crack_points::{horizon_of, link, points_of, spacings};
 use super::snapshot::Snapshot;
 
 type Vector = Vector3<f64>;
@@ -90,14 +90,15 @@ impl CrackSurface {
         let problem = simulation.problem;
         let points = points_of(simulation, rule)?;
         let [smallest, largest] = spacings(simulation);
-        let link = link(problem, DIAGONAL * largest);
+        let horizon = horizon_of(simulation, &points);
+        let link = link(horizon, DIAGONAL * largest);
         // A rank has all points within the length of the longest bond from its owned points.
         let known = cutoffs(problem).into_iter().fold(0.0, f64::max);
         Ok(Self {
             rule: rule.clone(),
             points,
             link: (link * (1.0 + TOLERANCE)).min(known),
-            radius: (problem.horizon * (1.0 + TOLERANCE)).min(known),
+            radius: (horizon * (1.0 + TOLERANCE)).min(known),
             front_spacing: 0.5 * smallest,
         })
     }
