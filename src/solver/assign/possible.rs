@@ -146,9 +146,9 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         return Ok(());
     }
     let message = format!(
-        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: the inelastic strain would depend \
-         on the thermal stress perpendicular to the {}, which the law does not compute; use plane stress, \
-         uniaxial stress or 3-D, or an elastic law",
+        "[body.{}] material: `{}` with these keys cannot have `thermal_expansion` in {}, because the law does \
+         not compute the thermal stress perpendicular to the {}; use plane stress, uniaxial stress or 3-D, or \
+         an elastic law (not `stress = \"willberg2022\"`)",
         body.name,
         law.declaration.name,
         dimension.name(),
