@@ -117,8 +117,8 @@ fn cracks(arguments: &BenchArguments) -> u64 {
 /// written for the bond loops.
 const MOTION_BYTES: u64 = 170;
 /// Estimated minimum memory traffic of a 3-D pass over the bonds, bytes per point. The stored bonds are not
-/// included. Reference position, displacement and volume are read, and the sums of the pass are read
-/// and written. The estimate assumes four sums per point.
+/// included. Reference position, displacement and volume are read, and the sums of the pass are read and
+/// written. The estimate assumes four sums per point.
 const PASS_BYTES: u64 = 120;
 
 /// Parse `N` or `X,Y,Z` into the numbers of points along the edges of a block.
@@ -136,8 +136,8 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// Return the deck of the benchmark. Some processors compute faster with zeros. The deck therefore contains
-/// a small initial displacement.
+/// Return the deck of the benchmark. Some processors compute faster with zeros. Therefore a small initial
+/// displacement avoids zeros.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
     let breaking = arguments.law.damage();

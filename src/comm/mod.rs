@@ -36,8 +36,7 @@ pub struct PeerBuffers {
 /// Work that overlaps with an exchange; see [`Communicator::exchange`].
 pub type During<'a> = dyn FnMut(&mut dyn FnMut() -> bool) + 'a;
 
-/// A group of ranks. All methods except [`Self::rank`], [`Self::size`] and [`Self::raw`] are
-/// collective.
+/// A group of ranks. All methods except [`Self::rank`], [`Self::size`] and [`Self::raw`] are collective.
 pub trait Communicator {
     /// This rank's number, from 0.
     fn rank(&self) -> usize;

@@ -378,10 +378,10 @@ impl Criterion {
 
     /// Return the overshoot energy of each broken bond, as a fraction of the energy of the bond. The
     /// overshoot energy is the part of the energy above the threshold. The fraction is 1 − (s_c/s)²,
-    /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0. s, w and σ are the stretch, work and stress of
-    /// the bond, and s_c, w_c and σ_c are their thresholds. Bonds exceed the threshold because the criterion
-    /// is checked only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`. `scale`
-    /// is the factor [`Law::toughness_scale`] on critical stretches; `None` for laws that do not scale them.
+    /// 1 − w_c/w or 1 − (σ_c/σ)², at least 0. s, w and σ are the stretch, work and stress of the bond, and
+    /// s_c, w_c and σ_c are their thresholds. Bonds exceed the threshold because the criterion is checked
+    /// only once per step. Criteria of stretch read [`Bond::stretch`] and `scale`. `scale` is the factor
+    /// [`Law::toughness_scale`] on stretch thresholds; `None` for laws that do not scale them.
     #[inline(always)]
     pub fn overshoot<S: Simd, const D: usize>(
         &self,

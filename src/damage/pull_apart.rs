@@ -4,12 +4,12 @@
 //! The plane divides the body into two halves. The halves move apart by a distance Δ along the normal of the
 //! plane. A bond at the angle φ to the normal has the extension Δ cos φ, and breaks when this extension is
 //! s0|ξ|. When a bond breaks, each end dissipates the bond energy ½ (A/m) ω|ξ|²s0². The dilatation energy of
-//! each end decreases by κ θ (d/m) ω|ξ|² s0, and this amount is dissipated too. The dilatation θ is a sum over
-//! the bonds that are still intact. The sum of these energies over all bonds across a unit area is
-//! G0 = δ s0² (A b + κ τ). The numbers b and τ depend only on the dimension and the influence function. The symbols d, m, ω, κ and A are those of `ordinary.rs`, see
-//! [`crate::material::Ordinary`]. For the Poisson ratio of bond-based laws, κ is 0. With ω = 1/|ξ|, s0
-//! then equals the critical stretch of the bond-based law (Silling & Askari 2005; Dipasquale et al. 2014,
-//! eq. 5).
+//! each end decreases by κ θ (d/m) ω|ξ|² s0, and this amount is dissipated too. The dilatation θ is a sum
+//! over the bonds that are still intact. The sum of these energies over all bonds across a unit area is
+//! G0 = δ s0² (A b + κ τ). The numbers b and τ depend only on the dimension and the influence function. The
+//! symbols d, m, ω, κ and A are those of `ordinary.rs`, see [`crate::material::Ordinary`]. For the Poisson
+//! ratio of bond-based laws, κ is 0. With ω = 1/|ξ|, s0 then equals the critical stretch of the bond-based
+//! law (Silling & Askari 2005; Dipasquale et al. 2014, eq. 5).
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;

@@ -188,9 +188,8 @@ const WHOLE: f64 = 1e-6;
 
 /// Return the origin of a grid along `axis`, m. The cells of this grid, with the edge `edge` (m), fill the
 /// shape exactly along this axis. If a grid with the origin 0 fills the shape exactly, the origin is 0.
-/// Otherwise, the origin is the coordinate of the lower face of the shape.
-/// `None` if the shape does not have two flat faces, or if the distance between the faces is not a whole
-/// number of cells.
+/// Otherwise, the origin is the coordinate of the lower face of the shape. `None` if the shape does not have
+/// two flat faces, or if the distance between the faces is not a whole number of cells.
 fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {

@@ -138,8 +138,8 @@ impl Deck {
 
     /// Validate the deck in a single process. Return the [`Problem`], including the warnings about the deck.
     ///
-    /// If a horizon depends on the mean spacing of points, the process reads the meshes and point files
-    /// that contain these points. [`Self::problem_on`] shares this work between ranks.
+    /// If a horizon depends on the mean spacing of points, the process reads the meshes and point files that
+    /// contain these points. [`Self::problem_on`] shares this work between ranks.
     ///
     /// # Errors
     /// If a value is invalid; the message is as in [`read`].

@@ -1,9 +1,9 @@
 //! Families: the bonds between points.
 //!
 //! Bonds are stored per ordered pair of blocks. Therefore each [`BlockBonds`] has one law for all points i
-//! and one law for all points j. In lists, the bonds of a point are sorted by the global id of the
-//! neighbour; in lattices, they are sorted by offset. Therefore the sum over the bonds of a point has the
-//! same order of operations on any number of ranks.
+//! and one law for all points j. In lists, the bonds of a point are sorted by the global id of the neighbour;
+//! in lattices, they are sorted by offset. Therefore the sum over the bonds of a point has the same order of
+//! operations on any number of ranks.
 
 mod arrange;
 mod fault;

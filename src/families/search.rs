@@ -39,8 +39,8 @@ struct Order {
     /// For each block, the position of its first point in this order. The last entry is the number of points.
     first: Vec<u32>,
     /// Bins of the points of each block. In the bins of a block, index k means the point k places after the
-    /// first point of the block in this order. Each block has separate bins. Therefore, the neighbour search of
-    /// a point skips the blocks that form no bonds with the block of the point.
+    /// first point of the block in this order. Each block has separate bins. Therefore, the neighbour search
+    /// of a point skips the blocks that form no bonds with the block of the point.
     bins: Vec<Bins>,
 }
 

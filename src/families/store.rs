@@ -72,8 +72,8 @@ impl Store {
         }
     }
 
-    /// Copy the intact bits and the history to `saved`, for [`Self::undo`]. A step changes no
-    /// other part of the store.
+    /// Copy the intact bits and the history to `saved`, for [`Self::undo`]. A step changes no other part of
+    /// the store.
     pub fn keep(&self, saved: &mut (Vec<u8>, Vec<Lanes>)) {
         saved.0.clone_from(&self.intact);
         saved.1.clone_from(&self.history);

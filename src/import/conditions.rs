@@ -132,7 +132,13 @@ fn is_zero(value: &Value) -> bool {
     let Ok(expression) = Expression::of(&value.plain()) else {
         return false;
     };
-    let samples = [-1e3, -1.0, -1e-3, 0.0, 1e-3, 1.0, 1e3];
+    let magnitudes = (-4..=4).flat_map(|exponent| {
+        [1.0, 1.5, 3.0, 6.0].map(|factor: f64| factor * 10_f64.powi(exponent))
+    });
+    let samples: Vec<f64> = magnitudes
+        .flat_map(|magnitude| [-magnitude, magnitude])
+        .chain([0.0])
+        .collect();
     let is_zero_at = |x: f64, y: f64, z: f64| expression.evaluate([x, y, z], 0.0) == 0.0;
     let pairs = || {
         samples
@@ -298,7 +304,13 @@ impl Conditions {
         let zero = Value::Number("0".to_owned());
         let free = Value::text("free");
         let expression = expression.clone();
-        if matches!(given.quantity, Quantity::BodyForce | Quantity::ForceOfPoint) {
+        let adds_load = match given.quantity {
+            Quantity::BodyForce => true,
+            // A force on each point of other sets is left out.
+            Quantity::ForceOfPoint => matches!(members, Some(Members::Ids(_))),
+            _ => false,
+        };
+        if adds_load {
             self.loads.push(Load {
                 quantity: given.quantity.clone(),
                 set: set.clone(),
@@ -423,7 +435,7 @@ impl Conditions {
     }
 
     /// Log the loads on points with another load of the same kind: one of these loads acts in the source
-    /// code, all of them act in the new deck.
+    /// code, but all of them act in the new deck.
     fn note_added_loads(&self, translation: &Translation) {
         for (index, load) in self.loads.iter().enumerate() {
             let others = self.loads[..index].iter().filter(|other| {
@@ -506,8 +518,9 @@ struct Overlap {
 /// Compare the initial values of the source deck with those of the new deck, which has one table per set.
 ///
 /// In the source code, each initial value replaces earlier values of the same component. In the new deck, a
-/// point gets all components from the last table whose set contains it. Return the points at which both differ. Log the initial values
-/// that may differ at points that are not known.
+/// point gets all components from the last table whose set contains it. Return the points at which the
+/// initial values of the two decks differ. Log the initial values that may differ at points that are not
+/// known.
 fn overlaps(translation: &Translation, initials: &[Initial]) -> Vec<Overlap> {
     let mut overlaps = Vec::new();
     // The tables are in the order in which their sets first occur.

@@ -90,7 +90,7 @@ pub(super) const UNORDERED_INITIALS: &str = "PeriLab applies initial values in n
 pub(super) const INTACT_COMPRESSED: &str =
     "compressed bonds break in PeriLab, but not in the new deck";
 
-/// Log note for the first `run` of a script in which no fix integrates the motion of atoms.
+/// Log note for the first `run` of a script, if no fix integrates the motion of atoms in this run.
 pub(super) const NO_INTEGRATION: &str =
     "no `fix nve` acts in the first run, so no atom moves in LAMMPS; points of the new deck move";
 

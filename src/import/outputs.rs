@@ -183,9 +183,9 @@ impl Outputs {
         }
     }
 
-    /// Read a table of computed quantities. The name of a quantity is the value of its key
-    /// `Output Label`. Without this key, the quantity has the name of its table. Each pair in `bodies`
-    /// is the name of a block and the name of its body.
+    /// Read a table of computed quantities. The name of a quantity is the value of its key `Output Label`.
+    /// Without this key, the quantity has the name of its table. Each pair in `bodies` is the name of a block
+    /// and the name of its body.
     ///
     /// # Errors
     /// If a position is missing or not a number, or a set is unknown.

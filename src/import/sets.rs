@@ -93,8 +93,8 @@ impl<'n> Sets<'n> {
     }
 
     /// Add a node set of the source deck. `is_declared` says whether Peridigm or PeriLab treats the entry as
-    /// a node set because of its name or position. Any other entry is a node set only if
-    /// another entry of the source deck uses it as one.
+    /// a node set because of its name or position. Any other entry is a node set only if another entry of the
+    /// source deck uses it as one.
     pub fn define(&mut self, name: &str, node: &'n Node, is_declared: bool) {
         self.defined.push(Defined {
             name: name.to_owned(),
@@ -174,8 +174,9 @@ impl<'n> Sets<'n> {
     }
 
     /// Return the name that a sum of node sets has in the new deck. Write the sum at its first use. Return
-    /// `None` if the new deck cannot express the sum as one set. This is so if the points of at least one node
-    /// set are not known, and at least one node set is not given by a condition.
+    /// `None` if the sum has no points, or if the new deck cannot express the sum as one set. The latter is
+    /// so if the points of at least one node set are not known, and at least one node set is not given by a
+    /// condition.
     pub fn find_sum(
         &mut self,
         translation: &mut Translation,
@@ -188,7 +189,9 @@ impl<'n> Sets<'n> {
         }
         let value = match self.members(translation, names) {
             Some(Members::All) => None,
-            Some(Members::Ids(ids)) if ids.is_empty() => return None,
+            Some(Members::Ids(ids)) if ids.is_empty() || ids.len() as u64 > MOST_NUMBERS => {
+                return None;
+            }
             Some(Members::Ids(ids)) => Some(("ids", Value::Ids(ids))),
             None => {
                 let conditions = names.iter().map(|name| self.condition(translation, name));
@@ -277,8 +280,8 @@ impl<'n> Sets<'n> {
         self.last_number.is_none_or(|last| number <= last)
     }
 
-    /// Log the declared node sets that nothing uses. An unused entry that is not declared as a
-    /// node set is not logged, because such an entry is a node set only if something uses it.
+    /// Log the declared node sets that nothing uses. An unused entry that is not declared as a node set is
+    /// not logged, because such an entry is a node set only if something uses it.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
             if set.written.is_none() && set.is_declared && !set.is_in_sum {
@@ -307,7 +310,7 @@ fn listed_numbers(translation: &Translation, node: &Node) -> Option<Vec<u64>> {
     numbers(&text).or_else(|| numbers_of_file(translation, &text))
 }
 
-/// Read the numbers of points in a file; `None` if the file cannot be read.
+/// Read the point numbers that a file lists; `None` if the file cannot be read.
 fn numbers_of_file(translation: &Translation, file: &str) -> Option<Vec<u64>> {
     let mut ids = crate::points::id_file::read(&translation.path(file), 1).ok()?;
     for id in &mut ids {
@@ -316,8 +319,8 @@ fn numbers_of_file(translation: &Translation, file: &str) -> Option<Vec<u64>> {
     Some(ids)
 }
 
-/// Write the definition of a node set; return its name. If `last` is given, drop the
-/// point numbers above `last`.
+/// Write the definition of a node set; return its name. If `last` is given, drop the point numbers above
+/// `last`.
 fn define(
     translation: &mut Translation,
     name: &str,

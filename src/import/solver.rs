@@ -9,6 +9,9 @@ use crate::error::{Result, excerpt};
 /// Number of load steps if the deck gives none.
 const LOAD_STEPS: u64 = 1;
 
+/// Relative tolerance for the comparison of times.
+const ROUND_OFF: f64 = 1e-9;
+
 /// Quasi-static solvers.
 const STATIC: [&str; 4] = [
     "QuasiStatic",
@@ -83,8 +86,7 @@ fn start(translation: &Translation, node: &Node, previous: Option<f64>) -> Resul
         .transpose()?;
     let end_before = previous.unwrap_or(0.0);
     let start = match translation.dialect {
-        // A step of PeriLab never starts before the end of the step before.
-        Dialect::PeriLab => given.map_or(end_before, |given| given.max(end_before)),
+        Dialect::PeriLab => end_before,
         _ => given.unwrap_or(0.0),
     };
     let Some(initial) = initial else {
@@ -142,7 +144,21 @@ fn time_steps(translation: &Translation, node: &Node, solver: &Node) -> Result<O
     Ok(Some(times))
 }
 
-/// Read a solver that follows the given stages, and return its stages. `damage_by_default` says whether
+/// Test whether PeriLab skips a step. It runs a step only if the end of the step before is not before the
+/// `Initial Time` of the step and is before its `Final Time`. The first step is compared with the time 0.
+fn is_skipped(translation: &Translation, node: &Node, before: &[Stage]) -> Result<bool> {
+    let now = before.last().map_or(0.0, |stage| stage.end);
+    let given = |key: &str| -> Result<Option<f64>> {
+        let node = node.get(key);
+        node.map(|node| translation.number(node, key)).transpose()
+    };
+    let is_early = given("Initial Time")?.is_some_and(|initial| now < initial * (1.0 - ROUND_OFF));
+    let is_late = given("Final Time")?.is_some_and(|end| now >= end);
+    Ok(is_early || is_late)
+}
+
+/// Read a solver that follows the given stages, and return its stages; none if the source code skips the
+/// solver. `damage_by_default` says whether
 /// damage models are active if the deck does not switch damage models on or off.
 ///
 /// # Errors
@@ -164,6 +180,13 @@ pub fn stage(
             Some(translation.count(id, "Step ID")?)
         }
     };
+    if translation.dialect == Dialect::PeriLab && is_skipped(translation, node, before)? {
+        log.left_out(
+            node,
+            "PeriLab skips this step: it does not contain the end of the step before",
+        );
+        return Ok(Vec::new());
+    }
     let damage_models = node.get("Damage Models");
     let is_damage_enabled = damage_models.map_or(damage_by_default, |damage_models| {
         log.taken(damage_models, "whether bodies have damage");

@@ -186,9 +186,9 @@ impl<'a> Translation<'a> {
     }
 
     /// Return a name for a new table of a section of the new deck. The name differs from the names of all
-    /// earlier tables of this section, even if an earlier table had the same name in the source deck.
-    /// For a body, pass `set` as the section: a body is also a set, so a body and a set must not have the
-    /// same name.
+    /// earlier tables of this section, even if an earlier table had the same name in the source deck. For a
+    /// body, pass `set` as the section: a body is also a set, so a body and a set must not have the same
+    /// name.
     pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
         let plain = slug(name);
         let taken = |written: &str| {

@@ -14,11 +14,11 @@ const LINE: usize = 8;
 
 /// One of several columns of numbers that loops read at the same index.
 ///
-/// The allocator requests each large array separately from the system. In the `fissure` command, an
-/// array is large if it has 1 MB or more. All large arrays start at the same offset within a page. If every
-/// column began at the start of its array, entries with the same index would lie in the same set of the
-/// cache. A set holds only eight or twelve lines. Therefore, each column begins after a different number of
-/// unused cache lines at the start of its array.
+/// The allocator requests each large array separately from the system. In the `fissure` command, an array is
+/// large if it has 1 MB or more. All large arrays start at the same offset within a page. If every column
+/// began at the start of its array, entries with the same index would lie in the same set of the cache. A set
+/// holds only eight or twelve lines. Therefore, each column begins after a different number of unused cache
+/// lines at the start of its array.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,

@@ -7,10 +7,10 @@
 //! g(n) = (Σ n_a²/g_a²)^(−½), the radius of the ellipsoid with the semi-axes g_a.
 //!
 //! In the cited works, a bond has one ellipsoid. Each semi-axis is the mean of the values g_a of the points
-//! at both ends. Here each end has its own ellipsoid, because the force state of a point depends on
-//! the numbers of this point only. In bond-based laws, the factor of a bond is then the mean of the radii at
-//! both ends. If the semi-axes at the two ends differ, this mean differs from the factor of the cited works.
-//! The deviation is of second order in the difference of the semi-axes.
+//! at both ends. Here each end has its own ellipsoid, because the force state of a point depends on the
+//! numbers of this point only. In bond-based laws, the factor of a bond is then the mean of the radii at both
+//! ends. If the semi-axes at the two ends differ, this mean differs from the factor of the cited works. The
+//! deviation is of second order in the difference of the semi-axes.
 //!
 //! The factors depend on the coordinate axes, so they are not exact for extensions along other directions.
 

@@ -142,8 +142,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Sums over the initial family, computed once.
     type ReferenceSum: LaneTuple;
 
-    /// Sums of a pass over the intact bonds. If a pass needs fewer sums than this type contains,
-    /// it sets the other sums to 0.
+    /// Sums of a pass over the intact bonds. If a pass needs fewer sums than this type contains, it sets the
+    /// other sums to 0.
     type Sum: LaneTuple;
 
     /// Type of the force state.

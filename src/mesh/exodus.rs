@@ -279,11 +279,11 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
     Ok(())
 }
 
-/// Return the number (from 1), id and name of each block or set. The ids are in the variable
-/// `PREFIX_prop1`, and the names in `PREFIX_names`, where `PREFIX` is `prefix`, such as `eb`. If the file has
-/// no ids, there is one block or set for each variable whose name is `variable` and a number from 1, such as
-/// `connect1` and `connect2`. The id of each block or set is then its number. A missing name is replaced by
-/// `default`, an underscore and the id, such as `block_3`.
+/// Return the number (from 1), id and name of each block or set. The ids are in the variable `PREFIX_prop1`,
+/// and the names in `PREFIX_names`, where `PREFIX` is `prefix`, such as `eb`. If the file has no ids, there
+/// is one block or set for each variable whose name is `variable` and a number from 1, such as `connect1` and
+/// `connect2`. The id of each block or set is then its number. A missing name is replaced by `default`, an
+/// underscore and the id, such as `block_3`.
 fn entities(
     file: &Netcdf,
     prefix: &str,

@@ -101,8 +101,8 @@ impl Kind {
         }
     }
 
-    /// For each node that is not a corner, return the corners between which this node lies. In the order
-    /// of the nodes, they follow the corners.
+    /// For each node that is not a corner, return the corners between which this node lies. These nodes
+    /// follow the corners in the order of the nodes.
     pub fn between(self) -> &'static [Between] {
         let all: &[Between] = match self.form {
             Point => &[],

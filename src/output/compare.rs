@@ -1,8 +1,8 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
-//! Outputs and history rows are matched by time, points by id. Values at points are read for at most `BLOCK`
-//! points at a time. The history is read as a whole. If the lists of ids of two outputs differ and at least
-//! one list does not ascend, both lists are also read as a whole. This case occurs on refined grids.
+//! Outputs and history rows are matched by time, points by id. Values at points are compared for at most
+//! `BLOCK` points at a time. The history is read as a whole. If the lists of ids of two outputs differ and at
+//! least one list does not ascend, both lists are also read as a whole. This case occurs on refined grids.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};

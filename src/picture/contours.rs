@@ -20,8 +20,8 @@ pub struct Sample {
 }
 
 /// Return the samples that are not covered. A sample is covered if its distance to a later, uncovered sample
-/// is less than half the cell edge of that later sample. Covered samples occur because a slice
-/// between two layers of points shows both layers. Later samples are nearer to the plane of the slice.
+/// is less than half the cell edge of that later sample. Covered samples occur because a slice between two
+/// layers of points shows both layers. Later samples are nearer to the plane of the slice.
 pub fn uncovered(samples: &[Sample]) -> Vec<Sample> {
     let largest = samples
         .iter()

@@ -274,8 +274,8 @@ pub enum DamageRule {
         /// Rule for the work of a bond, in laws that are not bond-based.
         work: WorkRule,
     },
-    /// The mean of the stress measures of the bond's ends. An end counts only if its force state acts
-    /// on the bond and its point carries stress.
+    /// The mean of the stress measures of the bond's ends. An end counts only if its force state acts on the
+    /// bond and its point carries stress.
     Stress(StressRule),
 }
 

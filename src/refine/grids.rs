@@ -391,7 +391,8 @@ impl<'a> Grids<'a> {
         self.problem.block_number(body, node.level, kind)
     }
 
-    /// The level-0 cells of a body whose points may differ from those of the unrefined grid. `None` if the body is not on a lattice, or if the problem has no refinement.
+    /// The level-0 cells of a body in which the points may differ from those of the unrefined grid. `None` if
+    /// the body is not on a lattice, or if the problem has no refinement.
     pub fn changed(&self, body: usize) -> Option<GridIndexSet> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.pattern.changed())

@@ -68,8 +68,8 @@ impl<'a> NearCoarser<'a> {
     }
 
     /// Test whether a coarser node lies within the given distance from the node at `index`. The result is
-    /// true if no node of the level exists at some index within this distance, although a node is possible
-    /// at this index (see [`Pattern::is_possible`]).
+    /// true if, at an index within this distance, a node of the level is possible (see
+    /// [`Pattern::is_possible`]) but does not exist.
     ///
     /// `body` tests whether a level-0 cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {

@@ -1,8 +1,8 @@
 //! Checks of the energy balance, which detect unstable time steps and lost energy.
 //!
 //! The energy gain is the change of [`Energies::error`](crate::solver::observers::Energies::error) since the
-//! last load step. In a run without an earlier load step, it is the change since the start of the run.
-//! If breaking bonds have added energy, the fracture energy is negative. The energy gain does not include a
+//! last load step. In a run without an earlier load step, it is the change since the start of the run. If
+//! breaking bonds have added energy, the fracture energy is negative. The energy gain does not include a
 //! negative fracture energy. The checks compare the energy gain with the energy input, see
 //! `EnergyWatch::input`.
 
@@ -24,16 +24,15 @@ const WARNING_GAIN: f64 = 1.0;
 /// or the last row of the run, exceed this ratio.
 const FATAL_GAIN: f64 = 100.0;
 
-/// Ratio of energy gain to energy input. The run ends with an error as soon as one row of the history
-/// exceeds this ratio.
+/// Ratio of energy gain to energy input. The run ends with an error as soon as one row of the history exceeds
+/// this ratio.
 const CERTAIN_GAIN: f64 = 1e9;
 
 /// Largest energy that breaking bonds can add without a warning, as a fraction of the energy input.
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
 /// If the error of the energy balance at the end of a run exceeds this fraction of the largest energy, a
-/// warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on
-/// coarse grids.
+/// warning is printed. In the explicit runs of `inputs/`, this error is below 0.01, also on coarse grids.
 const MAX_FINAL_ERROR: f64 = 0.2;
 
 /// Strain below which strain energy may be round-off.

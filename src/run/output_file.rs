@@ -42,9 +42,9 @@ pub struct OutputFile<'a> {
 pub type RetainedRows = Vec<Vec<f64>>;
 
 impl<'a> OutputFile<'a> {
-    /// Create or resume the file at a path. `history` is the description of the history, and the
-    /// number of rows after which a resumed history continues; `None` for further results. Also return the
-    /// history rows that a resumed file retains. Collective.
+    /// Create or resume the file at a path. `history` is the description of the history, and the number of
+    /// rows after which a resumed history continues; `None` for further results. Also return the history rows
+    /// that a resumed file retains. Collective.
     ///
     /// # Errors
     /// If the file cannot be created, resumed or written, or the set of the output is empty.

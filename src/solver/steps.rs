@@ -150,8 +150,7 @@ fn damping(problem: &Problem) -> f64 {
     rates.fold(0.0, f64::max)
 }
 
-/// Return the largest automatic step of a stage, s. `stable` is the stable step (s) without density
-/// scaling.
+/// Return the largest automatic step of a stage, s. `stable` is the stable step (s) without density scaling.
 pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) -> f64 {
     let damped = DAMPED / damping(problem);
     safety * (stable * time.density_scale.sqrt()).min(damped)

@@ -2284,9 +2284,9 @@ fn initial_values_of_peridigm_act_in_order() {
     }
 }
 
-/// PeriLab applies conditions in no fixed order, and initial values only if the time is 0.
+/// PeriLab applies conditions in no fixed order.
 #[test]
-fn initial_values_of_perilab_are_ambiguous_or_late() {
+fn initial_values_of_perilab_are_ambiguous() {
     let folder = Folder::strip("ambiguous");
     let initial = |name: &str, set: &str, value: &str| {
         format!(
@@ -2301,13 +2301,9 @@ fn initial_values_of_perilab_are_ambiguous_or_late() {
     let losses = imported.losses();
     assert_eq!(losses.unordered_initials.len(), 1, "{losses}");
     let late = text.replacen("Initial Time: 0.0", "Initial Time: 5.0e-7", 1);
-    let imported = folder.import("strip.yaml", &late).unwrap();
-    folder.problem(&imported);
-    for name in ["One", "Two"] {
-        let key = format!("PeriLab > Boundary Conditions > {name}");
-        let note = "PeriLab sets initial values at the time 0 only";
-        assert_eq!(fate(&imported, &key), (Fate::LeftOut, note));
-    }
+    // PeriLab runs no step that starts after the time 0, if none is before it.
+    let error = folder.import("strip.yaml", &late).unwrap_err();
+    assert!(error.contains("PeriLab runs no step"), "{error}");
 }
 
 /// In PeriLab, `A + B` has the points of both node sets.
@@ -2477,16 +2473,17 @@ fn times_of_peridigm_are_shifted() {
     }
 }
 
-/// A step of PeriLab starts at its `Initial Time`, but not before the end of the step before.
+/// PeriLab skips a step that does not contain the end of the step before. Other steps start at this end.
 #[test]
-fn times_of_perilab_are_shifted() {
+fn steps_of_perilab_that_do_not_follow_are_skipped() {
     let folder = Folder::strip("gap");
     let from = STRIP.find("  Solver:").unwrap();
     let to = STRIP.find("  Outputs:").unwrap();
-    for (initial, end, value) in [
-        ("0.5", 0.3, Some("2*(t + 0.4)")),
-        ("0.1", 0.7, None),
-        ("0.05", 0.7, None),
+    for (initial, second_end, end) in [
+        ("0.5", 0.7, 0.1),
+        ("0.0", 0.1, 0.1),
+        ("0.1", 0.7, 0.7),
+        ("0.05", 0.7, 0.7),
     ] {
         let step = |name: &str, id: u32, initial: &str, last: f64| {
             format!(
@@ -2494,7 +2491,7 @@ fn times_of_perilab_are_shifted() {
                  Verlet:\n        Fixed dt: 1.0e-2\n"
             )
         };
-        let steps = step("One", 1, "0.0", 0.1) + &step("Two", 2, initial, 0.7);
+        let steps = step("One", 1, "0.0", 0.1) + &step("Two", 2, initial, second_end);
         let text = format!(
             "{}  Multistep Solver:\n{steps}{}",
             &STRIP[..from],
@@ -2510,10 +2507,9 @@ fn times_of_perilab_are_shifted() {
             .filter(|line| line.starts_with("displacement"))
             .collect();
         assert!(lines[0].contains("\"2*t\""), "{lines:?}");
-        assert_eq!(lines.len(), 1 + usize::from(value.is_some()), "{lines:?}");
-        if let Some(value) = value {
-            assert!(lines[1].contains(value), "{lines:?}");
-        }
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        let is_skipped = imported.text.contains("PeriLab skips this step");
+        assert_eq!(is_skipped, end == 0.1, "{}", imported.text);
     }
 }
 

@@ -70,8 +70,8 @@ fn a_high_modulus_is_no_scatter() {
     }
 }
 
-/// In a bar of two points, `surface_correction = "energy"` doubles the stiffness of the bond. The bond must
-/// then break at 1/√2 of the stretch without correction, however strong its points are.
+/// In a bar of two points, `surface_correction = "energy"` multiplies the stiffness of the bond by (δ/dx)², which
+/// is 9/4. The bond must then break at 2/3 of the stretch without correction, however strong its points are.
 #[test]
 fn surface_corrections_scale_the_strength_of_each_point() {
     let stretch_at_break = |correction: &str, seed: u32| {
@@ -100,7 +100,7 @@ fn surface_corrections_scale_the_strength_of_each_point() {
     for seed in 1..=5 {
         let plain = stretch_at_break("none", seed);
         let corrected = stretch_at_break("energy", seed);
-        let expected = plain * std::f64::consts::FRAC_1_SQRT_2;
+        let expected = plain * 2.0 / 3.0;
         assert!(
             (corrected - expected).abs() < 2e-6,
             "{seed}: {corrected}, {expected}"

@@ -71,8 +71,8 @@ impl Subtrahend {
         Ok(own)
     }
 
-    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the
-    /// values of `quantity` at `points` in output `index` of `minuend`.
+    /// Subtract the values of the subtrahend from `values`. Before the call, `values` contains the values of
+    /// `quantity` at `points` in output `index` of `minuend`.
     ///
     /// # Errors
     /// If the subtrahend has no output at the time of output `index` of `minuend`, if the two outputs have

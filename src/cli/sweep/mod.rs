@@ -145,8 +145,7 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
 }
 
 /// Run the combinations that `--rows` selects, or all combinations if `--rows` is not given. Without
-/// `--overwrite`, skip complete runs.
-/// Write the table and pictures of all combinations.
+/// `--overwrite`, skip complete runs. Write the table and pictures of all combinations.
 ///
 /// # Errors
 /// - If the deck or an argument is wrong.

@@ -155,9 +155,9 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// Execute the runs with the indices `due`, as many at a time as `--jobs` allows. When a run
-    /// is complete or has failed, call `ended` with its index, its state and its run time (s). Return true if
-    /// a signal or a time limit stopped a run.
+    /// Execute the runs with the indices `due`, as many at a time as `--jobs` allows. When a run is complete
+    /// or has failed, call `ended` with its index, its state and its run time (s). Return true if a signal or
+    /// a time limit stopped a run.
     ///
     /// The first SIGINT, SIGTERM or SIGUSR1 makes all runs write checkpoints and stop. Another of these
     /// signals kills the runs if it arrives more than 1 s after the first. SIGUSR2 makes all runs write

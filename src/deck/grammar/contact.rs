@@ -21,14 +21,14 @@ pub struct Contact {
     /// With `"penalty"`, two points repel one another as if a layer of material lay between them; `stiffness`
     /// is Young's modulus of this layer in Pa. The default is 2E₁E₂/(E₁ + E₂), where E₁ and E₂ are Young's
     /// moduli of the two materials. This is the modulus of two equally thick layers of these materials in
-    /// series. With `"short-range"`, the spring constant in Pa. The default is 15 times the
-    /// smaller bulk modulus of the two materials.
+    /// series. With `"short-range"`, the spring constant in Pa. The default is 15 times the smaller bulk
+    /// modulus of the two materials.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Distance in m between two points at which contact begins. The default is the mean edge of the cells of
-    /// the two points, or 1.35 times this edge with `"short-range"`. Contact never begins at more than the
-    /// initial distance of the two points, even if `radius` is larger. With `"short-range"`, this limit is
-    /// 0.9 times the initial distance.
+    /// Distance in m between two points at which contact begins. The default is the mean of the lengths that
+    /// the two points cover, or 1.35 times this mean with `"short-range"`. Most points cover the edge of
+    /// their cell. Contact never begins at more than the initial distance of the two points, even if `radius`
+    /// is larger. With `"short-range"`, this limit is 0.9 times the initial distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.

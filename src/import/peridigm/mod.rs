@@ -116,7 +116,8 @@ fn setting(translation: &mut Translation, materials: &Node) -> Result<&'static s
     Ok(setting)
 }
 
-/// Read the stages of all solvers. The stages of the solvers have the step numbers 1, 2, ….
+/// Read the stages of all solvers. All stages of the first solver have the step number 1, all stages of the
+/// second solver have the step number 2, and so on.
 fn stages(translation: &Translation, root: &Node, solvers: &[&Node]) -> Result<Vec<solver::Stage>> {
     if solvers.is_empty() {
         return Err(translation.error(root.line, "the deck has no `Solver`"));

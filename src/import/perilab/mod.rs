@@ -60,7 +60,9 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let expansions = expansions(translation, models, is_thermal_enabled)?;
     let has_matrix = solvers(translation, root)?.iter().any(|solver| {
         let mut tables = solver.tables();
-        tables.any(|(name, _)| name.to_lowercase().contains("matrix based"))
+        tables.any(|(name, _)| {
+            is_key(name, "Newmark") || name.to_lowercase().contains("matrix based")
+        })
     });
     let damping = stages.iter().find_map(|stage| stage.damping);
     let laws = Laws {
@@ -214,6 +216,11 @@ fn stages(translation: &Translation, root: &Node) -> Result<Vec<solver::Stage>> 
             }
         }
         stages.extend(solver::stage(translation, node, &stages, false)?);
+    }
+    if stages.is_empty() {
+        let message = "PeriLab runs no step: the first step must contain the time 0, and each other step the \
+                       end of the step before";
+        return Err(translation.error(root.line, message));
     }
     let damping_differs = stages
         .iter()

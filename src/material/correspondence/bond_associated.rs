@@ -17,8 +17,8 @@
 //!
 //! Because F_ξ ξ = Y, W is 0 only for motions that keep the length of every bond.
 //! F is the deformation gradient of the point's own family. It is not the mean of the deformation gradients
-//! at both ends of the bond. Therefore the force state depends on the point's own family only,
-//! and Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point.
+//! at both ends of the bond. Therefore the force state depends on the point's own family only, and
+//! Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point.
 //! The gradients of Chen 2018 sum over the neighbours that points i and j share. Such gradients would need
 //! enough shared neighbours and a shape tensor per bond, so they are not used.
 //!

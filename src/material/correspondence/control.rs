@@ -115,8 +115,8 @@ impl Control {
     }
 
     /// Return the constant that [`Self::matrix`] needs for a point, N/m⁷. `weight` is ω₀ (m³) of the initial
-    /// family of the point. For `none` and `wan2019`, which do not use the constant, the constant is
-    /// 0. For `silling2017`, the constant is 0 if ω₀ = 0.
+    /// family of the point. For `none` and `wan2019`, which do not use the constant, the constant is 0. For
+    /// `silling2017`, the constant is 0 if ω₀ = 0.
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,

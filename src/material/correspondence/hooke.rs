@@ -326,8 +326,8 @@ fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
 }
 
 /// Average the stiffness of an anisotropic solid over all directions (Voigt); in 2-D, over all directions in
-/// the plane. Return the isotropic elastic constants of the average; `None` if no
-/// anisotropic constants are given.
+/// the plane. Return the isotropic elastic constants of the average; `None` if no anisotropic constants are
+/// given.
 pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
     let c = unturned(values, dimension)?;
     if matches!(dimension, Dimension::Space) {

@@ -13,9 +13,9 @@
 //! Σ ω z⊗ξ Ṽ = 0.
 //!
 //! If a body yields ([`Plastic`]), P depends on F and on the plastic state of the point. B is then multiplied
-//! by a factor s, which decreases as plastic flow proceeds ([`Plastic::control_left`]). Without this
-//! factor, the control would stay elastic and carry load that the yielding solid cannot carry. When s changes
-//! by Δs, the control dissipates the energy −Δs · ½ Σ ω z·B z Ṽ. In this energy, B is the matrix before the
+//! by a factor s, which decreases as plastic flow proceeds ([`Plastic::control_left`]). Without this factor,
+//! the control would stay elastic and carry load that the yielding solid cannot carry. When s changes by Δs,
+//! the control dissipates the energy −Δs · ½ Σ ω z·B z Ṽ. In this energy, B is the matrix before the
 //! multiplication by s.
 
 mod bond_associated;
@@ -200,8 +200,8 @@ const OWN_OF_ELASTIC: usize = 2;
 /// matrix B.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
-/// Return A ξ + B η, N/m⁶. There is no loop over the rows. The compiler would not unroll such a
-/// loop, and would keep its data in memory instead of registers.
+/// Return A ξ + B η, N/m⁶. There is no loop over the rows. The compiler would not unroll such a loop, and
+/// would keep its data in memory instead of registers.
 #[inline(always)]
 fn times_bond<S: Simd, const D: usize>(
     simd: S,

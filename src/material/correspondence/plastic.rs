@@ -328,8 +328,8 @@ impl Plastic {
     /// The plastic strain increases by ΔE_p = x S_d. Here x is a scalar (1/Pa), and S_d is the deviator of
     /// the final stress S. Let Π be the projection to the deviator, so that S_d = Π S. With the stiffness C
     /// in plane stress, the final stress is S = S_trial − x C Π S. C and Π have the same eigenvectors. Each
-    /// eigencomponent of the trial stress is therefore multiplied by 1/(1 + x c), with the
-    /// eigenvalue c of C Π.
+    /// eigencomponent of the trial stress is therefore multiplied by 1/(1 + x c), with the eigenvalue c of
+    /// C Π.
     fn modes_of_sheet(&self, trial: &Matrix3<f64>) -> Modes {
         let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
         Modes {

@@ -2,8 +2,8 @@
 //! own family.
 //!
 //! Mitchell, Silling & Littlewood 2015 (PALS). The law has two influence functions per bond: ω for the
-//! dilatation θ, and σ for the deviatoric extension ε. With the extension e = |Y| − |ξ|, the corrected volume Ṽ
-//! of the neighbour and the strain energy density W,
+//! dilatation θ, and σ for the deviatoric extension ε. With the extension e = |Y| − |ξ|, the corrected volume
+//! Ṽ of the neighbour and the strain energy density W,
 //!
 //! θ = Σ ω|ξ| e Ṽ, ε = e − θ|ξ|/d, W = ½ k′θ² + ½ Σ σ ε² Ṽ,
 //!
@@ -161,11 +161,11 @@ type Functions<const D: usize> = (Symmetric<D>, Symmetric<D>);
 ///
 /// Let ⟨a, b⟩ = Σ σ a b Ṽ be a scalar product. Then θ = ⟨r, e⟩ with r = ω|ξ|/σ, and ε = e − (θ/d)|ξ|. The
 /// inputs are R ≥ ⟨r, r⟩, Q ≥ ⟨|ξ|, |ξ|⟩ and τ ≤ ⟨r, |ξ|⟩ = Σ ω|ξ|² Ṽ. Let e₁ be the component of e along r.
-/// Let e₂ be the component of e normal to r, in the plane of r and |ξ|. Let R, Q and τ
-/// equal the three scalar products. Then ε has the component (1 − τ/d) e₁ along r and the component
-/// e₂ − g e₁ normal to r, with g² = (RQ − τ²)/d². In this case, λ is the larger eigenvalue of
-/// [[k′R + (1 − τ/d)² + g², −g], [−g, 1]]. Because λ ≥ 1, this eigenvalue grows with R and Q and decreases
-/// with τ. It is therefore an upper bound if the inputs are bounds.
+/// Let e₂ be the component of e normal to r, in the plane of r and |ξ|. Let R, Q and τ equal the three scalar
+/// products. Then ε has the component (1 − τ/d) e₁ along r and the component e₂ − g e₁ normal to r, with
+/// g² = (RQ − τ²)/d². In this case, λ is the larger eigenvalue of [[k′R + (1 − τ/d)² + g², −g], [−g, 1]].
+/// Because λ ≥ 1, this eigenvalue grows with R and Q and decreases with τ. It is therefore an upper bound if
+/// the inputs are bounds.
 fn largest_ratio(bulk_modulus: f64, d: f64, [r, q, tau]: [f64; 3]) -> f64 {
     let across = (r * q - tau * tau).max(0.0) / (d * d);
     let determinant = bulk_modulus * r + (1.0 - tau / d).powi(2);

@@ -15,9 +15,8 @@
 //!
 //! While all bonds are intact, ε_d equals the ε of [`PositionAware`] at the elastic extensions. If bonds are
 //! broken, ε = ε_d + c|ξ|, where c has one value per point. The energy, as a function of 1 − r, then has its
-//! minimum at
-//! 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, with ε and ε_d before the flow. A larger 1 − r would add energy, so
-//! 1 − r is limited to this value.
+//! minimum at 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, with ε and ε_d before the flow. A larger 1 − r would add
+//! energy, so 1 − r is limited to this value.
 
 use super::directional::Directional;
 use super::nearest::Nearest;

@@ -310,8 +310,8 @@ impl Reader {
         }
     }
 
-    /// Return the members of the surface that a union of surfaces lists as `name`. `own` is the index in `placed` of the
-    /// instance or model that contains the union.
+    /// Return the members of the surface that a union of surfaces lists as `name`. `own` is the index in
+    /// `placed` of the instance or model that contains the union.
     fn find_surface(&self, of: MemberKind, name: &str, union: &Set, own: usize) -> Option<&Runs> {
         let own = &self.placed[own].name;
         let name = qualified(union.instance.as_ref().unwrap_or(own), name);

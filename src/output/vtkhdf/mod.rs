@@ -41,7 +41,8 @@ pub(super) const VTK_VERTEX: u8 = 1;
 pub(super) const STEPS: &str = "/VTKHDF/Steps";
 
 /// Tables with one row per step. Each entry contains the name of the table, its number of columns, the value
-/// for the first step, and the quantity that the values of later steps count. A table without a number of columns is one-dimensional.
+/// for the first step, and the quantity that the values of later steps count. A table without a number of
+/// columns is one-dimensional.
 const STEP_TABLES: [(&str, Option<usize>, i64, Counted); 5] = [
     ("PartOffsets", None, 0, Counted::Steps),
     ("NumberOfParts", None, 1, Counted::Nothing),

@@ -105,8 +105,8 @@ pub struct BrokenSums {
 /// Number of sums of [`BreakingBonds`] in three dimensions.
 pub const MAX_BROKEN_SUMS: usize = 6;
 
-/// The breaking bonds of one row or lane group. Each group of eight bonds that contains breaking bonds
-/// has one entry: the index of the group, and one bit per bond. The bit is 1 if the bond breaks.
+/// The breaking bonds of one row or lane group. Each group of eight bonds that contains breaking bonds has
+/// one entry: the index of the group, and one bit per bond. The bit is 1 if the bond breaks.
 pub type BreakingBits = Vec<(usize, u8)>;
 
 /// Note the breaking bonds of a group. Out of line to save registers.

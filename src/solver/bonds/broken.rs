@@ -1,9 +1,9 @@
 //! Consequences of broken bonds.
 //!
 //! A bond that meets its criterion breaks in the pass that sums the forces. Both ends evaluate the criterion
-//! with the same operations, so they get the same result. The force sums exclude the bonds that
-//! break. Then point numbers and the forces that depend on them are recomputed, but only at the points that a
-//! broken bond affects.
+//! with the same operations, so they get the same result. The force sums exclude the bonds that break. Then
+//! point numbers and the forces that depend on them are recomputed, but only at the points that a broken bond
+//! affects.
 
 use std::ops::Range;
 use std::time::Instant;

@@ -1,5 +1,5 @@
-//! Data of the points of a grid, for kernels. The data are ordered by slot, so that a kernel loads
-//! the data of eight adjacent points at once.
+//! Data of the points of a grid, for kernels. The data are ordered by slot, so that a kernel loads the data
+//! of eight adjacent points at once.
 
 use std::marker::PhantomData;
 use std::sync::Arc;

@@ -170,8 +170,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     const BREAKS: bool = false;
 
     /// Operation that combines the sum of a quantity at a point with the entry of this point in the column of
-    /// the quantity. If the lanes of a sum belong to one point, the
-    /// operation first combines these lanes.
+    /// the quantity. If the lanes of a sum belong to one point, the operation first combines these lanes.
     const COMBINE: Combine = Combine::Add;
 
     /// Instruction sets for which the kernel's loops are compiled. The default, one version, is enough for

@@ -261,8 +261,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
 }
 
 /// Load the history of the bonds of a group for point i and for point j. If [`LaneTuple::PADDED`] is false,
-/// `H::COUNT` must equal the number of values that are stored per end. If it differs, the history of point j
-/// is not valid.
+/// the history of point j is valid only if `H::COUNT` equals the number of values that are stored per end.
 #[inline(always)]
 pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 2] {
     if H::COUNT == 0 {

@@ -140,9 +140,8 @@ fn add_tensor<S: Simd, const D: usize>(
 
 /// Kernel that sums the tensor D = Σ V_j C n⊗n (N/m⁴) over the intact bonds in the reference configuration.
 /// The sums are xx, yy, zz, xy, yz, xz. n is ξ/|ξ|. C is a sum over both ends: each end contributes its
-/// [`Law::stiffness`] times its weight. If the law of an end
-/// [resists displacements across](Law::resists_across) the bonds, the contribution of this end to C is
-/// multiplied by the identity I instead of n⊗n.
+/// [`Law::stiffness`] times its weight. The contribution of an end to C is multiplied by the identity I
+/// instead of n⊗n if the law of the end [resists displacements across](Law::resists_across) the bonds.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.

@@ -49,10 +49,10 @@ pub struct OnPart<const D: usize> {
 ///
 /// f is the force density of a load or a reaction, u is the displacement, and V is the volume of a point. In
 /// a load step in which bonds break, state 1 is the first equilibrium, and state 2 is the last equilibrium.
-/// From 0 to 1, the work is ½ (f₀ + f₁)·(u₁ − u₀) V.
-/// From 1 to 2, supports do not move, and the force density of loads remains f₁. The displacement u₁ is not
-/// stored for equilibrium 2. Therefore the work that loads do from 0 to 2 is the sum of two terms. The first
-/// term is added at equilibrium 1, and the second term at equilibrium 2:
+/// From 0 to 1, the work is ½ (f₀ + f₁)·(u₁ − u₀) V. From 1 to 2, supports do not move, and the force
+/// density of loads remains f₁. The displacement u₁ is not stored for equilibrium 2. Therefore the work that
+/// loads do from 0 to 2 is the sum of two terms. The first term is added at equilibrium 1, and the second
+/// term at equilibrium 2:
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
@@ -63,8 +63,8 @@ pub enum Work {
     FirstEquilibrium,
     /// At the last of several equilibria: for supports, 0; for loads, f₁·(u₂ − u₀) V.
     LastEquilibrium,
-    /// For loads, as [`Self::Trapezoid`]. For supports, the change of the kinetic energy minus the work of the
-    /// other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
+    /// For loads, as [`Self::Trapezoid`]. For supports, the change of the kinetic energy minus the work of
+    /// the other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
     ///
     /// A reaction that was computed for one step length does not give the prescribed motion in a step of
     /// another length. Its trapezoidal rule is therefore wrong by ½ ρ w² (Δt₂/Δt₁ − 1) if the velocity jumps

@@ -89,8 +89,8 @@ impl Temperatures {
 }
 
 impl Heated {
-    /// Create the entry for a temperature condition. `temperature` is the index of the condition, and `points`
-    /// are the indices of its points within the part.
+    /// Create the entry for a temperature condition. `temperature` is the index of the condition, and
+    /// `points` are the indices of its points within the part.
     pub fn new(temperature: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
         Self {
             temperature,

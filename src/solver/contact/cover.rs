@@ -5,13 +5,13 @@ use rustc_hash::FxHashSet;
 use crate::problem::{Block, PointSource, Problem, Quadrature};
 use crate::solver::model::Model;
 
-/// Return the length (m) that each owned point covers: two points with the covers a and b touch at the distance
-/// (a + b)/2, and a point touches the surface of a rigid body at the distance a/2. `edges` are the edges of
-/// line segments, squares or cubes with the volumes of the points, m.
+/// Return the length (m) that each owned point covers: two points with the covers a and b touch at the
+/// distance (a + b)/2, and a point touches the surface of a rigid body at the distance a/2. `edges` are the
+/// edges of line segments, squares or cubes with the volumes of the points, m.
 ///
-/// Most points cover this edge. In a refined grid, the points next to the faces of a body are half a spacing of
-/// level 0 away from the faces, at all levels. Such points cover this spacing. If the cells of a lattice have
-/// different edges, its points cover the longest edge.
+/// Most points cover this edge. In a refined grid, the points next to the faces of a body are half a spacing
+/// of level 0 away from the faces, at all levels. Such points cover this spacing. If the cells of a lattice
+/// have different edges, its points cover the longest edge.
 pub(super) fn covers<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -47,8 +47,8 @@ fn longest_edge<const D: usize>(block: &Block<'_>) -> Option<f64> {
     edges.iter().any(|edge| *edge != longest).then_some(longest)
 }
 
-/// Return the edges of the cells of level 0 and the corner of a cell, m; `None` if the points do not lie at the
-/// centres of cells.
+/// Return the edges of the cells of level 0 and the corner of a cell, m; `None` if the points do not lie at
+/// the centres of cells.
 fn lattice<const D: usize>(block: &Block<'_>) -> Option<[[f64; D]; 2]> {
     match block.body.points {
         PointSource::Lattice {

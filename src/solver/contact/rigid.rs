@@ -336,9 +336,9 @@ impl RigidBody {
 
     /// Contribution of a point to the step limits. The result is `None` unless the point touches the body, or
     /// will touch the body within `time` (s) at the present approach speed. At any velocity, the result is
-    /// also `None` if the gap exceeds the cover of the point. The gap is
-    /// d − (1 + a) c/2. Here d is the distance of the point from the surface, c is the cover of the point,
-    /// and a is the thermal stretch of the point.
+    /// also `None` if the gap exceeds the cover of the point. The gap is d − (1 + a) c/2. Here d is the
+    /// distance of the point from the surface, c is the cover of the point, and a is the thermal stretch of
+    /// the point.
     pub fn demand<const D: usize>(
         &self,
         block: usize,

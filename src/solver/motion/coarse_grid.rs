@@ -4,10 +4,10 @@
 //! axis with a single cell. Displacements are defined at the nodes and are linear along each axis within a
 //! cell. The cells have the stiffness of a classical elastic solid. The elastic constants of a cell are
 //! volume-weighted averages over its points. Each point contributes its constants times its fraction of
-//! intact bonds. If a support prescribes a component of a point's motion, a spring resists this component
-//! of the displacement at the position of the point.
-//! Forces on points are distributed to the nodes of their cells (restriction). Displacements of nodes are
-//! interpolated to the points (prolongation) with the same weights, so the preconditioner is symmetric.
+//! intact bonds. If a support prescribes a component of a point's motion, a spring resists this component of
+//! the displacement at the position of the point. Forces on points are distributed to the nodes of their
+//! cells (restriction). Displacements of nodes are interpolated to the points (prolongation) with the same
+//! weights, so the preconditioner is symmetric.
 //!
 //! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. The
 //! terms of sums over points are [rounded](crate::comm::rounded_sum::Unit) to multiples of a unit, so the

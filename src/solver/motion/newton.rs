@@ -25,8 +25,7 @@
 //! A load step begins with a prediction of the displacements. If the last load step had the same size as the
 //! new one, and no bond broke in the last one, each point repeats its motion of the last load step.
 //! Otherwise, and in the first load step of a stage, the prediction is the solution of the problem that is
-//! linearized about the last equilibrium.
-//! The change of the prescribed displacements is then part of x.
+//! linearized about the last equilibrium. The change of the prescribed displacements is then part of x.
 //!
 //! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. The
 //! smaller load steps continue up to the end of the original load step. A load step in which bonds have
@@ -46,7 +45,7 @@ use crate::solver::Simulation;
 
 use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
-use super::load_step::{CHUNK, LoadStep, sums};
+use super::load_step::{CHUNK, sums};
 
 /// Largest component of the displacement ε v in a finite difference, divided by the shortest horizon.
 const SHIFT: f64 = 1e-6;
@@ -82,7 +81,7 @@ pub struct NewtonState {
     /// Relative tolerance η for the next solution of the linear problem K x = f.
     forcing: f64,
     /// Mean of the diagonal of K, divided by the mean of ρ φ; NaN until it is computed. Here ρ is the
-    /// fictitious density, and φ the fraction of intact bonds of a point (not the damage).
+    /// fictitious density, and φ the intact fraction of a point's family, see `LEAST_INTACT`.
     diagonal: f64,
     /// Number of times that the present load step has been halved.
     pub halvings: u64,
@@ -256,8 +255,10 @@ impl<const D: usize> Vectors<D> {
         self.note_force(simulation);
         self.multiply(simulation);
         add(&mut self.residual, -1.0, &self.product);
-        let LoadStep { scale, start, .. } = simulation.progress.load_step;
-        let linear = self.solve(simulation, rule.tolerance * scale.max(start));
+        let linear = self.solve(
+            simulation,
+            rule.tolerance * simulation.progress.load_step.scale,
+        );
         move_from(simulation, &self.base, 1.0, &self.correction);
         let (time, step) = (simulation.clock.time(), simulation.clock.step());
         simulation.apply_displacements(time, step);

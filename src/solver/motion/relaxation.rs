@@ -20,8 +20,8 @@
 //!
 //! Contact is part of the equilibrium. The repulsion has a potential; neither friction nor contact damping
 //! acts. ρ includes the largest contact stiffness of the point since the motion started from rest. If ρ fell
-//! when points separate, stiff contacts would bounce forever. Rigid bodies with a prescribed
-//! motion move with time, as supports do. The forces of rigid bodies on the points count as reactions.
+//! when points separate, stiff contacts would bounce forever. Rigid bodies with a prescribed motion move with
+//! time, as supports do. The forces of rigid bodies on the points count as reactions.
 
 use std::time::Instant;
 

@@ -235,8 +235,7 @@ fn drop_stubs(parts: &mut [Part]) {
 }
 
 /// Assign the numbers 0, 1, … to the sets of connected points. For each reached point, return the number of
-/// its set.
-/// Points that are not reached have the number `usize::MAX`.
+/// its set. Points that are not reached have the number `usize::MAX`.
 fn connected_sets(places: &[[f64; 3]], bins: &Bins, paths: &ShortestPaths) -> Vec<usize> {
     let mut set_of = vec![usize::MAX; places.len()];
     let mut sets = 0;

@@ -5,9 +5,9 @@
 //!
 //! If the bounding boxes of two bodies overlap or nearly touch, a third box is computed. It contains all
 //! points of each body that are near the other body. The points in this box are distributed to the ranks by
-//! spatial cells. Each rank then compares the points of its cells. Points of
-//! the first body that are too near to a point of the second body may lie in several cells. The point of the
-//! second body is sent to the ranks of all these cells.
+//! spatial cells. Each rank then compares the points of its cells. Points of the first body that are too near
+//! to a point of the second body may lie in several cells. The point of the second body is sent to the ranks
+//! of all these cells.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;

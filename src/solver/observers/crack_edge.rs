@@ -31,9 +31,9 @@ impl Edge {
     /// Return the edge of the damaged region at a damaged point. `None` if the point is inside the region, if
     /// the point is at an edge of the body, or if no other damaged points are around it.
     ///
-    /// `bonds` are the vectors (m) from the point to the damaged points around it. For a point,
-    /// let g be the result of [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `normals` is the
-    /// sum of g ⊗ g over the point and the damaged points around it, 1/m². `mean` is the result of
+    /// `bonds` are the vectors (m) from the point to the damaged points around it. For a point, let g be the
+    /// result of [`Moments::gradient`](crate::solver::bonds::Moments::gradient). `normals` is the sum of
+    /// g ⊗ g over the point and the damaged points around it, 1/m². `mean` is the result of
     /// [`Moments::mean`](crate::solver::bonds::Moments::mean) for the point, m. `radius` is the radius of the
     /// family, m.
     ///

@@ -36,8 +36,8 @@ pub fn spacings<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; 2] {
     [-smallest, largest].map(|volume| simulation.problem.dimension.edge(volume))
 }
 
-/// Largest horizon of the bodies to which the owned points `points` of the ranks belong, m. For refined bodies,
-/// this is the horizon of level 0. Collective.
+/// Largest horizon of the bodies to which the owned points `points` of the ranks belong, m. For refined
+/// bodies, this is the horizon of level 0. Collective.
 pub fn horizon_of<const D: usize>(simulation: &Simulation<'_, D>, points: &[u32]) -> f64 {
     let (problem, model) = (simulation.problem, &simulation.model);
     let horizons = points.iter().map(|point| {

@@ -24,8 +24,8 @@ use crate::solver::Simulation;
 use super::j_weight::{Weight, edges, front_length, weights};
 use super::snapshot::Snapshot;
 
-/// Tolerance for round-off. A component of the direction of growth counts as 0 up to this value. The
-/// bodies must reach at least one horizon beyond the box, less this fraction of the horizon.
+/// Tolerance for round-off. A component of the direction of growth counts as 0 up to this value. The bodies
+/// must reach at least one horizon beyond the box, less this fraction of the horizon.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The J integrals of a run.

@@ -106,8 +106,8 @@ struct Facet {
 }
 
 impl Facet {
-    /// Whether the line segment between two positions (m) crosses the facet. Facets are enlarged by
-    /// the factor `OVERLAP`, so no segment passes between adjacent facets.
+    /// Whether the line segment between two positions (m) crosses the facet. Facets are enlarged by the
+    /// factor `OVERLAP`, so no segment passes between adjacent facets.
     fn is_crossed(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let axis = self.axis as usize;
         let [before, after] = [from, to].map(|place| place[axis] - self.centre[axis]);
