@@ -1,6 +1,7 @@
 //! The communicator of MPI runs: `MPI_COMM_WORLD`.
 //!
-//! Only the thread that created the [`World`] may use it (`MPI_THREAD_FUNNELED`).
+//! Only the thread that created the [`World`] may use it (`MPI_THREAD_FUNNELED`). The only exception is
+//! [`abort_on_panic`]: the thread that panics aborts the job.
 
 use std::cell::{RefCell, RefMut};
 use std::ffi::c_void;

@@ -144,7 +144,8 @@ impl<'t> Node<'t> {
                 } else if let Ok(number) = u64::from_str_radix(digits, radix) {
                     visitor.visit_u64(number)
                 } else {
-                    Err(Mismatch::custom("the integer is too large"))
+                    // Larger integers have the value of a float, where numbers are allowed.
+                    visitor.visit_f64(digits.parse().unwrap_or(f64::INFINITY))
                 }
             }
             Content::Value(DeValue::Float(digits)) => match digits.as_str().parse::<f64>() {

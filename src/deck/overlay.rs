@@ -32,7 +32,7 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
 
 /// Parse a deck or an overlay into a document that keeps comments and white space.
 fn document(source: &Source) -> Result<DocumentMut> {
-    // Errors of this parser have the same text as for decks without overlays.
+    // Syntax errors of this parser have the same text as for decks without overlays.
     if let Err(error) = DeTable::parse(&source.text) {
         return Err(syntax_error(source, &error));
     }

@@ -267,39 +267,6 @@ fn a_closed_crack_carries_load_in_equilibrium() {
     );
 }
 
-/// The points next to the faces of a refined grid are as far from the faces as those of the grid without
-/// refinement. Cells may also have different edges.
-#[test]
-fn a_closed_crack_carries_load_on_any_grid() {
-    let force = |grid: &str, more: &str| {
-        let deck = cracked_block(more).replace("spacing = 1, horizon = 3.015", grid);
-        load_steps::<2>(&deck, &["force_top"]).last().unwrap()[0]
-    };
-    let refinement = "refinement = { levels = 1, region.middle.where = 'abs(y - 10) < 4' }";
-    for (grid, more) in [
-        ("spacing = 1, horizon = 3.015", refinement),
-        ("spacing = [0.5, 1], horizon = 3.015", ""),
-        ("spacing = [1, 0.5], horizon = 3.015", ""),
-    ] {
-        let closed = force(grid, &format!("contact = {{}}\n{more}"));
-        // A crack outside of the body leaves the block whole.
-        let whole =
-            cracked_block(more).replace("[-1, 10], to = [11, 10]", "[-2, 10], to = [-1, 10]");
-        let whole = whole.replace("spacing = 1, horizon = 3.015", grid);
-        let whole = load_steps::<2>(&whole, &["force_top"]).last().unwrap()[0];
-        // The contact layer is as thick as the horizon, which is half as large on the refined grid.
-        let expected = if more.is_empty() {
-            0.77..0.88
-        } else {
-            0.88..1.0
-        };
-        assert!(
-            expected.contains(&(closed / whole)),
-            "{grid} {more}: {closed} of {whole}"
-        );
-    }
-}
-
 /// The fine body has many contacts that are stiffer than its bonds. If points lost their additional
 /// fictitious density whenever they separate, they would bounce forever.
 #[test]

@@ -15,7 +15,6 @@ use crate::dimension::Dimension;
 use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
-use super::pair::Lengths;
 
 /// Edge of a cell divided by the search radius. With larger cells, home ranks receive fewer messages, but
 /// more points are sent between ranks.
@@ -33,8 +32,6 @@ pub(super) struct Ghost {
     pub block: u64,
     /// Volume, m³.
     pub volume: f64,
-    /// [`Lengths::cover`], m.
-    pub cover: f64,
     /// Reference position, m.
     pub reference: [f64; 3],
     /// Present position, m.
@@ -46,8 +43,8 @@ pub(super) struct Ghost {
 pub(super) struct Ghosts<const D: usize> {
     /// The points, sorted by owner and then by id.
     pub points: Vec<Ghost>,
-    /// Lengths of each point.
-    pub lengths: Vec<Lengths>,
+    /// For each point, the edge of the line segment, square or cube that represents the point, m.
+    pub edges: Vec<f64>,
     /// Displacements by component, m.
     pub displacement: Vec<Vec<f64>>,
     /// Velocities by component, m/s.
@@ -71,12 +68,9 @@ impl<const D: usize> Ghosts<D> {
         let width = 2 * D + usize::from(is_thermal);
         let (points, halo) = find(comm, own, reach, D, width);
         let columns = || vec![vec![0.0; points.len()]; D];
-        let lengths = points.iter().map(|point| Lengths {
-            edge: dimension.edge(point.volume),
-            cover: point.cover,
-        });
+        let edges = points.iter().map(|point| dimension.edge(point.volume));
         Self {
-            lengths: lengths.collect(),
+            edges: edges.collect(),
             displacement: columns(),
             velocity: columns(),
             thermal_stretch: is_thermal.then(|| vec![0.0; points.len()]),

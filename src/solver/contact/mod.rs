@@ -18,7 +18,6 @@
 
 mod by_pair;
 mod cells;
-mod cover;
 mod ghosts;
 mod pair;
 mod rigid;
@@ -40,9 +39,8 @@ use super::bonds::Forces;
 use super::model::Model;
 use super::motion::Fields;
 use super::motion::load_step::stable_density;
-use cover::covers;
 use ghosts::Ghosts;
-use pair::{ContactPoint, Demand, Lengths, PairRule, Touch};
+use pair::{ContactPoint, Demand, PairRule, Touch};
 use rigid::{RigidBody, WrenchSums};
 use rows::Rows;
 use start::check_outside;
@@ -70,8 +68,8 @@ pub struct Contact<const D: usize> {
     blocks: usize,
     /// Largest contact distance of any two points, m. The change by thermal stretches is not included.
     largest: f64,
-    /// Lengths of each owned point.
-    lengths: Vec<Lengths>,
+    /// Edge of a line segment, square or cube with the volume of the point, for each owned point, m.
+    edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
     /// The owned points that touched a rigid body or were going to touch one within the look-ahead. The first
@@ -178,21 +176,16 @@ impl<const D: usize> Contact<D> {
         let edges: Vec<f64> = (0..model.owned())
             .map(|point| dimension.edge(model.volume[point]))
             .collect();
-        let lengths: Vec<Lengths> = edges
-            .iter()
-            .zip(covers(problem, model, &edges))
-            .map(|(edge, cover)| Lengths { edge: *edge, cover })
-            .collect();
-        let mut largest_covers = vec![0.0_f64; blocks.len()];
-        for (block, lengths) in model.block.iter().zip(&lengths) {
-            let largest = &mut largest_covers[usize::from(*block)];
-            *largest = largest.max(lengths.cover);
+        let mut largest_edges = vec![0.0_f64; blocks.len()];
+        for (block, edge) in model.block.iter().zip(&edges) {
+            let largest = &mut largest_edges[usize::from(*block)];
+            *largest = largest.max(*edge);
         }
-        comm.max(&mut largest_covers);
+        comm.max(&mut largest_edges);
         let largest = |here: usize, there: usize| {
-            let cover = 0.5 * (largest_covers[here] + largest_covers[there]);
+            let edge = 0.5 * (largest_edges[here] + largest_edges[there]);
             let rule = rules[here * blocks.len() + there].as_ref();
-            rule.map_or(0.0, |rule| rule.largest_distance(cover))
+            rule.map_or(0.0, |rule| rule.largest_distance(edge))
         };
         let all =
             (0..blocks.len()).flat_map(|here| (0..blocks.len()).map(move |there| (here, there)));
@@ -211,7 +204,7 @@ impl<const D: usize> Contact<D> {
             blocks: blocks.len(),
             rules,
             largest,
-            lengths,
+            edges,
             deepest: 0.0,
             ghosts: Ghosts::default(),
             rows: Rows::default(),
@@ -431,7 +424,7 @@ impl<const D: usize> Contact<D> {
                         velocity: std::array::from_fn(|d| fields.velocity[d][index]),
                         thermal_stretch: stretch_of(fields.thermal_stretch.as_ref(), index),
                         volume,
-                        lengths: self.lengths[index],
+                        edge: self.edges[index],
                         mass: model.density[block] * volume,
                     },
                 )
@@ -448,7 +441,7 @@ impl<const D: usize> Contact<D> {
                         velocity: std::array::from_fn(|d| ghosts.velocity[d][index]),
                         thermal_stretch: stretch_of(ghosts.thermal_stretch.as_ref(), index),
                         volume: point.volume,
-                        lengths: ghosts.lengths[index],
+                        edge: ghosts.edges[index],
                         mass: model.density[block] * point.volume,
                     },
                 )

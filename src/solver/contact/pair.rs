@@ -6,7 +6,7 @@ use crate::dimension::Dimension;
 use crate::material::Pmb;
 use crate::problem::{Block, ContactModel, ContactRule};
 
-/// Contact distance of short-range forces, as a fraction of the mean of the covers of both points
+/// Contact distance of short-range forces, as a fraction of the mean of the edges of both points
 /// (Silling & Askari 2005, §5).
 const SHORT_RANGE: f64 = 1.35;
 
@@ -23,10 +23,10 @@ const STICKING: f64 = 0.5;
 /// Contact rule for the points of two blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PairRule {
-    /// Contact distance, m. If `None`, the contact distance is `cover_share` times the mean of the covers of
+    /// Contact distance, m. If `None`, the contact distance is `edge_share` times the mean of the edges of
     /// both points.
     radius: Option<f64>,
-    cover_share: f64,
+    edge_share: f64,
     /// Upper limit of the contact distance, as a fraction of the reference distance. With this limit, no
     /// force acts in the reference positions or after free thermal expansion.
     reference_share: f64,
@@ -66,19 +66,10 @@ pub(super) struct ContactPoint<const D: usize> {
     pub thermal_stretch: f64,
     /// Volume, m³.
     pub volume: f64,
-    /// Lengths.
-    pub lengths: Lengths,
+    /// Edge of the line segment, square or cube that represents the volume of the point, m.
+    pub edge: f64,
     /// Mass, kg.
     pub mass: f64,
-}
-
-/// Lengths of a point, m.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lengths {
-    /// Edge of the line segment, square or cube with the volume of the point. It sets the stiffness.
-    pub edge: f64,
-    /// The length that the point covers, see [`covers`](super::cover::covers). It sets the contact distance.
-    pub cover: f64,
 }
 
 impl<const D: usize> ContactPoint<D> {
@@ -128,7 +119,7 @@ impl PairRule {
     pub fn new(dimension: Dimension, rule: &ContactRule, blocks: [&Block<'_>; 2]) -> Self {
         let elastic = blocks.map(|block| block.body.material.elastic);
         let horizon = blocks[0].horizon.min(blocks[1].horizon);
-        let (cover_share, reference_share, stiffness) = match rule.model {
+        let (edge_share, reference_share, stiffness) = match rule.model {
             ContactModel::Penalty => {
                 // The materials act in series. The layer of each material is half a horizon thick.
                 let [first, second] = elastic.map(|elastic| elastic.youngs_modulus);
@@ -148,22 +139,22 @@ impl PairRule {
         };
         Self {
             radius: rule.radius,
-            cover_share,
+            edge_share,
             reference_share,
             stiffness,
             response: Response::new(rule),
         }
     }
 
-    /// Largest contact distance (m) of points with covers of at most `cover` (m), without thermal stretch.
-    pub fn largest_distance(&self, cover: f64) -> f64 {
-        self.radius.unwrap_or(self.cover_share * cover)
+    /// Largest contact distance (m) of points with edges of at most `edge` (m), without thermal stretch.
+    pub fn largest_distance(&self, edge: f64) -> f64 {
+        self.radius.unwrap_or(self.edge_share * edge)
     }
 
-    /// Contact distance (m) of points with these covers (m) and the reference distance `reference` (m),
+    /// Contact distance (m) of points with these edges (m) and the reference distance `reference` (m),
     /// without thermal stretch.
-    pub fn distance(&self, covers: [f64; 2], reference: f64) -> f64 {
-        let distance = self.largest_distance(0.5 * (covers[0] + covers[1]));
+    pub fn distance(&self, edges: [f64; 2], reference: f64) -> f64 {
+        let distance = self.largest_distance(0.5 * (edges[0] + edges[1]));
         distance.min(self.reference_share * reference)
     }
 
@@ -181,7 +172,7 @@ impl PairRule {
         });
         let apart = norm(vector);
         let thermal_stretch = 0.5 * (first.thermal_stretch + second.thermal_stretch);
-        let distance = self.distance([first.lengths.cover, second.lengths.cover], norm(reference));
+        let distance = self.distance([first.edge, second.edge], norm(reference));
         (distance * (1.0 + thermal_stretch) - apart, apart, vector)
     }
 
@@ -189,7 +180,7 @@ impl PairRule {
     fn stiffness<const D: usize>(&self, first: &ContactPoint<D>, second: &ContactPoint<D>) -> f64 {
         match self.stiffness {
             Stiffness::OfLayer(layer) => {
-                let edge = 0.5 * (first.lengths.edge + second.lengths.edge);
+                let edge = 0.5 * (first.edge + second.edge);
                 layer * edge.powi(D as i32 - 1)
             }
             Stiffness::OfVolumes(constant) => constant * (first.volume * second.volume),

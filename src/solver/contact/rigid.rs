@@ -267,12 +267,12 @@ impl RigidBody {
 
     /// Return the overlap of a point and the surface (m), and the outward normal of the surface at the point.
     /// The overlap is the contact distance minus the present distance of the point from the surface. The
-    /// contact distance is (1 + a) times the smaller of two lengths: half the cover of the point, and the
+    /// contact distance is (1 + a) times the smaller of two lengths: half the edge of the point, and the
     /// distance of the point from the surface at the start. Here a is the thermal stretch of the point. The
-    /// overlap is set to 0 if the point is farther from the surface than (1 + a) times half the cover.
+    /// overlap is set to 0 if the point is farther from the surface than (1 + a) times half the edge.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.position());
-        let (half, expansion) = (0.5 * point.lengths.cover, 1.0 + point.thermal_stretch);
+        let (half, expansion) = (0.5 * point.edge, 1.0 + point.thermal_stretch);
         if apart >= half * expansion {
             return (0.0, normal);
         }
@@ -336,8 +336,8 @@ impl RigidBody {
 
     /// Contribution of a point to the step limits. The result is `None` unless the point touches the body, or
     /// will touch the body within `time` (s) at the present approach speed. At any velocity, the result is
-    /// also `None` if the gap exceeds the cover of the point. The gap is d − (1 + a) c/2. Here d is the
-    /// distance of the point from the surface, c is the cover of the point, and a is the thermal stretch of
+    /// also `None` if the gap exceeds the edge of the point. The gap is d − (1 + a) ℓ/2. Here d is the
+    /// distance of the point from the surface, ℓ is the edge of the point, and a is the thermal stretch of
     /// the point.
     pub fn demand<const D: usize>(
         &self,
@@ -346,8 +346,8 @@ impl RigidBody {
         time: f64,
     ) -> Option<Demand> {
         let (apart, normal) = self.surface(point.position());
-        let gap = apart - 0.5 * point.lengths.cover * (1.0 + point.thermal_stretch);
-        if gap > point.lengths.cover {
+        let gap = apart - 0.5 * point.edge * (1.0 + point.thermal_stretch);
+        if gap > point.edge {
             return None;
         }
         let arm = Vector3::from(point.position()) - Vector3::from(self.state.position);
@@ -361,7 +361,7 @@ impl RigidBody {
     }
 
     fn point_stiffness<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> f64 {
-        self.layers[block] * point.lengths.edge.powi(D as i32 - 1)
+        self.layers[block] * point.edge.powi(D as i32 - 1)
     }
 
     /// Reduced mass of the body and a point, kg.

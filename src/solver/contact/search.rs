@@ -113,7 +113,6 @@ impl<const D: usize> Contact<D> {
                     index: point as u64,
                     block: model.block[point].into(),
                     volume: model.volume[point],
-                    cover: self.lengths[point].cover,
                     reference,
                     position,
                 }
@@ -124,9 +123,9 @@ impl<const D: usize> Contact<D> {
         all.extend_from_slice(&self.ghosts.points);
         let positions: Vec<[f64; 3]> = all.iter().map(|point| point.position).collect();
         let cells = Cells::new(&positions, reach, D);
-        let cover = |index: usize| match index.checked_sub(model.owned()) {
-            None => self.lengths[index].cover,
-            Some(ghost) => self.ghosts.lengths[ghost].cover,
+        let edge = |index: usize| match index.checked_sub(model.owned()) {
+            None => self.edges[index],
+            Some(ghost) => self.ghosts.edges[ghost],
         };
         let mut rows = Rows::new(model.owned(), |point, row| {
             let here = &all[point];
@@ -140,7 +139,7 @@ impl<const D: usize> Contact<D> {
                     (0..D).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
                 };
                 let reference = apart(&here.reference, &there.reference);
-                let distance = rule.distance([cover(point), cover(index)], reference);
+                let distance = rule.distance([edge(point), edge(index)], reference);
                 if apart(&here.position, &there.position) <= distance * expansion + skin {
                     row.push(FoundPair {
                         id: there.id,

@@ -36,17 +36,20 @@ pub fn spacings<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; 2] {
     [-smallest, largest].map(|volume| simulation.problem.dimension.edge(volume))
 }
 
-/// Largest horizon of the bodies to which the owned points `points` of the ranks belong, m. For refined
-/// bodies, this is the horizon of level 0. Collective.
+/// Largest horizon of the bodies with a damage law to which the owned points `points` of the ranks belong, m; of
+/// all their bodies, if none has a damage law. For refined bodies, this is the horizon of level 0. Collective.
 pub fn horizon_of<const D: usize>(simulation: &Simulation<'_, D>, points: &[u32]) -> f64 {
     let (problem, model) = (simulation.problem, &simulation.model);
-    let horizons = points.iter().map(|point| {
+    let mut largest = [0.0_f64; 2];
+    for point in points {
         let block = usize::from(model.block[*point as usize]);
-        problem.bodies[problem.body_of(block)].horizon
-    });
-    let mut largest = [horizons.fold(0.0, f64::max)];
+        let body = &problem.bodies[problem.body_of(block)];
+        let kind = usize::from(body.damage.is_none());
+        largest[kind] = largest[kind].max(body.horizon);
+    }
     simulation.comm.max(&mut largest);
-    largest[0]
+    let [damaged, other] = largest;
+    if damaged > 0.0 { damaged } else { other }
 }
 
 /// Return the distance up to which damaged points are connected, m; this distance is at least `least` (m).
