@@ -18,7 +18,7 @@ pub struct Spanned<T> {
 }
 
 /// Name by which [`from_toml`](super::from_toml) recognises a [`Spanned`].
-pub const SPANNED: &str = "Spanned";
+pub(super) const SPANNED: &str = "Spanned";
 
 impl<T> Spanned<T> {
     /// Create a value with this byte range.
