@@ -347,11 +347,11 @@ mod tests {
 
     use super::*;
 
-    /// Environment variable that makes [`panics_abort_all_ranks`] the child that panics.
+    /// Environment variable that is set in the child process of [`a_panic_on_any_thread_ends_the_process`].
     const CHILD: &str = "FISSURE_TEST_PANIC";
 
     #[test]
-    fn panics_abort_all_ranks() {
+    fn a_panic_on_any_thread_ends_the_process() {
         if std::env::var_os(CHILD).is_some() {
             let _world = World::start().unwrap();
             abort_on_panic();

@@ -2,20 +2,17 @@
 
 use std::borrow::{Borrow, Cow};
 use std::fmt;
-use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
 use std::ops::Range;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{Error as _, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
-/// A value and its byte range in the deck. Comparison and hash use the value only.
-#[derive(Debug, Clone)]
-pub struct Spanned<T> {
-    span: Range<usize>,
-    value: T,
-}
+/// A value and its byte range in the deck. Comparison, hash and serialization use the value only.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize)]
+#[serde(transparent)]
+pub struct Spanned<T>(toml::Spanned<T>);
 
 /// Name by which [`from_toml`](super::from_toml) recognises a [`Spanned`].
 pub(super) const SPANNED: &str = "Spanned";
@@ -23,43 +20,22 @@ pub(super) const SPANNED: &str = "Spanned";
 impl<T> Spanned<T> {
     /// Create a value with this byte range.
     pub fn new(span: Range<usize>, value: T) -> Self {
-        Self { span, value }
+        Self(toml::Spanned::new(span, value))
     }
 
     /// Return the byte range.
     pub fn span(&self) -> Range<usize> {
-        self.span.clone()
+        self.0.span()
     }
 
     /// Return a reference to the value.
     pub fn get_ref(&self) -> &T {
-        &self.value
+        self.0.get_ref()
     }
 
     /// Return a mutable reference to the value.
     pub fn get_mut(&mut self) -> &mut T {
-        &mut self.value
-    }
-}
-
-impl<T: PartialEq> PartialEq for Spanned<T> {
-    fn eq(&self, other: &Self) -> bool {
-        self.value == other.value
-    }
-}
-
-impl<T: Eq> Eq for Spanned<T> {}
-
-impl<T: Hash> Hash for Spanned<T> {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        self.value.hash(state);
-    }
-}
-
-/// The value alone.
-impl<T: Serialize> Serialize for Spanned<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.value.serialize(serializer)
+        self.0.get_mut()
     }
 }
 

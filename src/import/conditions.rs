@@ -475,17 +475,14 @@ fn targets(translation: &mut Translation, sets: &mut Sets, node: &Node) -> Resul
         Dialect::PeriLab => text.split('+').map(str::trim).collect(),
         _ => vec![text.trim()],
     };
-    if let [name] = names[..] {
+    let whole = if let [name] = names[..] {
         let set = sets.find(translation, node, name)?;
         translation.log.taken(node, format!("the set `{set}`"));
-        let members = sets.members(translation, &names);
-        return Ok(vec![Target {
-            set,
-            members,
-            part: None,
-        }]);
-    }
-    if let Some(set) = sets.find_sum(translation, node, &names) {
+        Some(set)
+    } else {
+        sets.find_sum(translation, node, &names)
+    };
+    if let Some(set) = whole {
         let members = sets.members(translation, &names);
         return Ok(vec![Target {
             set,

@@ -209,9 +209,10 @@ pub fn stage(
         return Err(translation.error(node.line, message));
     };
     let is = |names: &[&str]| names.iter().any(|known| is_key(name, known));
-    let times = match is(&STATIC) {
-        true => time_steps(translation, node, solver)?,
-        false => None,
+    let times = if is(&STATIC) {
+        time_steps(translation, node, solver)?
+    } else {
+        None
     };
     let end_before = before.last().map(|stage| stage.end);
     let start = match &times {

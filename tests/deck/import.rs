@@ -9,6 +9,7 @@ use fissure::points::{generate, set};
 use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::survey::dry_run;
+use nalgebra::{Rotation3, Vector3};
 
 use super::meshes::exodus_of_first_cube;
 use crate::support::{command, displace, force};
@@ -2591,8 +2592,25 @@ fn angles_of_perilab_turn_the_axes() {
     let solid = "        C11: 10\n        C22: 5\n        C33: 5\n        C44: 2\n        C55: 2\n        C66: 2\n";
     let (_, lines) = with_angles(solid, &[("X", 0.0), ("Y", 0.0), ("Z", 45.0)], "Verlet");
     assert_eq!(lines, ["angle_1 = -45.0"]);
-    let (_, lines) = with_angles(solid, &[("X", 90.0), ("Y", 20.0), ("Z", 45.0)], "Verlet");
-    assert_eq!(lines.len(), 3, "{lines:?}");
+    let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
+    let about = |axis, angle: f64| Rotation3::from_axis_angle(&axis, angle.to_radians());
+    let rotation = about(x, 90.0) * about(y, 20.0) * about(z, 45.0);
+    for (solver, expected) in [
+        ("Verlet", rotation.inverse()),
+        ("Verlet Matrix Based", rotation),
+        ("Newmark", rotation),
+    ] {
+        let angles = [("X", 90.0), ("Y", 20.0), ("Z", 45.0)];
+        let (_, lines) = with_angles(solid, &angles, solver);
+        let written = lines.iter().map(|line| line.split_once(" = ").unwrap().1);
+        let written: Vec<f64> = written.map(|angle| angle.parse().unwrap()).collect();
+        let [first, second, third] = written[..] else {
+            panic!("{lines:?}")
+        };
+        let found = about(z, first) * about(x, second) * about(z, third);
+        let difference = (found.matrix() - expected.matrix()).norm();
+        assert!(difference < 1e-12, "{solver}: {difference}");
+    }
     // PeriLab reads the other angles only together with `Angle X`.
     let (imported, lines) = with_angles(solid, &[("Z", 45.0)], "Verlet");
     assert!(lines.is_empty(), "{lines:?}");

@@ -58,12 +58,11 @@ pub(super) fn angles(
     } else {
         about(Vector3::x_axis(), x) * about(Vector3::y_axis(), y) * about(Vector3::z_axis(), z)
     };
-    let (rotation, note) = match has_matrix {
-        true => (rotation, "the rotation of this solver of PeriLab"),
-        false => (
-            rotation.inverse(),
-            "PeriLab rotates the axes by the inverse rotation",
-        ),
+    let (rotation, note) = if has_matrix {
+        (rotation, "the rotation of this solver of PeriLab")
+    } else {
+        let note = "PeriLab rotates the axes by the inverse rotation";
+        (rotation.inverse(), note)
     };
     for node in &nodes {
         log.approximated(
@@ -71,9 +70,10 @@ pub(super) fn angles(
             format!("angle_1, angle_2 and angle_3 of the material: {note}"),
         );
     }
-    Ok(match nodes.is_empty() {
-        true => [0.0; 3],
-        false => bunge(rotation.matrix()),
+    Ok(if nodes.is_empty() {
+        [0.0; 3]
+    } else {
+        bunge(rotation.matrix())
     })
 }
 
@@ -81,20 +81,13 @@ pub(super) fn angles(
 fn bunge(rotation: &Matrix3<f64>) -> [f64; 3] {
     let at = |row: usize, column: usize| rotation[(row, column)];
     let second = libm::acos(at(2, 2).clamp(-1.0, 1.0));
-    // If z is not tilted, or is reversed, only the sum or the difference of the other angles counts.
-    let is_upright = libm::sin(second).abs() < 1e-12;
-    let (first, third) = if is_upright {
-        (libm::atan2(at(1, 0), at(0, 0)), 0.0)
+    let [first, second, third] = if libm::sin(second).abs() < 1e-12 {
+        // The first and the third angle are about the same axis.
+        let second = if at(2, 2) > 0.0 { 0.0 } else { PI };
+        [libm::atan2(at(1, 0), at(0, 0)), second, 0.0]
     } else {
-        (
-            libm::atan2(at(0, 2), -at(1, 2)),
-            libm::atan2(at(2, 0), at(2, 1)),
-        )
-    };
-    let second = match is_upright {
-        true if at(2, 2) > 0.0 => 0.0,
-        true => PI,
-        false => second,
+        let first = libm::atan2(at(0, 2), -at(1, 2));
+        [first, second, libm::atan2(at(2, 0), at(2, 1))]
     };
     [first, second, third].map(|angle| angle.to_degrees())
 }

@@ -84,7 +84,7 @@ pub(super) fn conditions(
         // PeriLab sets initial values only if the time is exactly 0.
         let first = &stages[0];
         let acts = |step| steps.is_empty() || steps.contains(&step);
-        if is_initial && (first.start != 0.0 || !first.step_id.is_none_or(acts)) {
+        if is_initial && !first.step_id.is_none_or(acts) {
             let note = "PeriLab sets initial values at the time 0 only";
             translation.leave_out_load(table, "initial", name, note);
             continue;
