@@ -27,22 +27,27 @@ fn bar(front: &str) -> String {
 
 #[test]
 fn a_front_is_where_the_field_crosses_the_threshold_between_two_points() {
-    let deck = bar("from = [1], direction = [2], field = 'displacement', threshold = 0.43");
-    simulate::<1, _>(&deck, |mut simulation| {
-        // A field that decreases along the line; the front moves over points and between points.
-        for k in 0..150 {
-            let reach = 7.0 + 0.1 * f64::from(k);
-            displace(&mut simulation, |[x, y, z]| {
-                [x - 0.1 * (reach - x).max(0.0), y, z]
-            });
-            let [front] = last(&mut simulation);
-            let expected = (reach - 4.3).min(19.5) - 1.0;
-            assert!((front - expected).abs() < 1e-12, "{front} {expected}");
-        }
-        // The threshold applies to the absolute value. Without a point above it, the front is NaN.
-        displace(&mut simulation, |[x, y, z]| [x + 0.01 * x, y, z]);
-        assert!(last::<1, 1>(&mut simulation)[0].is_nan());
-    });
+    let same = bar("from = [1], direction = [2], field = 'displacement', threshold = 0.43");
+    // The body has the spacing and the horizon of before, and those of the grid are smaller.
+    let own = (same.replace("spacing = 1, horizon = 3", "spacing = 0.2, horizon = 0.6"))
+        .replace("shape.box", "spacing = 1, horizon = 3, shape.box");
+    for deck in [same, own] {
+        simulate::<1, _>(&deck, |mut simulation| {
+            // A field that decreases along the line; the front moves over points and between points.
+            for k in 0..150 {
+                let reach = 7.0 + 0.1 * f64::from(k);
+                displace(&mut simulation, |[x, y, z]| {
+                    [x - 0.1 * (reach - x).max(0.0), y, z]
+                });
+                let [front] = last(&mut simulation);
+                let expected = (reach - 4.3).min(19.5) - 1.0;
+                assert!((front - expected).abs() < 1e-12, "{front} {expected}");
+            }
+            // The threshold applies to the absolute value. Without a point above it, the front is NaN.
+            displace(&mut simulation, |[x, y, z]| [x + 0.01 * x, y, z]);
+            assert!(last::<1, 1>(&mut simulation)[0].is_nan());
+        });
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The farthest position along a line at which values exceed a threshold. The values are interpolated between
 //! points to find the position where they equal the threshold.
 
+use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
 use crate::comm::{self, Communicator, Found, least, total};
@@ -17,6 +18,14 @@ const TOLERANCE: f64 = 1e-9;
 pub struct Course {
     line: Line,
     points: Vec<(u32, f64)>,
+}
+
+/// Position (m) of a point, and the horizon of its body (m).
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Foremost {
+    position: [f64; 3],
+    horizon: f64,
 }
 
 /// The farthest position along the line at which values exceed the threshold.
@@ -67,7 +76,7 @@ impl Course {
     ///
     /// The search starts at the farthest point whose value exceeds the threshold. If several of these points
     /// are equally far, the search starts at the point with the smallest id. Only points ahead of this point
-    /// and within one horizon of it are considered. Among them, the next points are those with the smallest
+    /// and within the horizon of its body are considered. Among them, the next points are those with the smallest
     /// distance from the start of the line, measured along the line. Between the farthest point and the next
     /// points, the values are interpolated linearly. The result is the position at which the interpolated
     /// value equals the threshold. Without next points, it is the position of the farthest point. If several
@@ -80,9 +89,8 @@ impl Course {
         threshold: f64,
         value: impl Fn(usize) -> f64,
     ) -> Option<Reached> {
-        let (model, comm) = (&simulation.model, simulation.comm);
-        let horizon = simulation.problem.horizon;
-        let tolerance = TOLERANCE * horizon;
+        let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
+        let tolerance = TOLERANCE * problem.horizon;
         let points = || {
             let entry = |(point, along): &(u32, f64)| (*point as usize, *along);
             self.points.iter().map(entry)
@@ -102,9 +110,18 @@ impl Course {
             .map(|point| Found {
                 key: 0.0,
                 ids: [model.ids[point]],
-                payload: model.position(point),
+                payload: Foremost {
+                    position: model.position(point),
+                    horizon: {
+                        let body = problem.body_of(usize::from(model.block[point]));
+                        problem.bodies[body].horizon
+                    },
+                },
             });
-        let place = least(comm, foremost)?.payload;
+        let Foremost {
+            position: place,
+            horizon,
+        } = least(comm, foremost)?.payload;
 
         let near = |point: usize| {
             distance_squared(place, model.position(point)).sqrt() <= horizon + tolerance

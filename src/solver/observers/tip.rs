@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::problem;
 
+use super::crack_points::horizon_of;
 use super::reach::{Course, Reached};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
@@ -42,6 +43,7 @@ impl Tip {
         let key = format!("[history.tip.{}] set", rule.name);
         let place = (&key[..], rule.span.clone());
         not_empty(problem, simulation.comm, rule.set, &points, place)?;
+        let horizon = horizon_of(simulation, &points);
         let everywhere = (f64::INFINITY, f64::INFINITY);
         let course = Course::new(simulation, rule.line, everywhere, points.into_iter());
         if course.is_empty(simulation.comm) {
@@ -55,7 +57,7 @@ impl Tip {
             name: rule.name.clone(),
             threshold: rule.threshold,
             course,
-            growth: Growth::new(problem.horizon),
+            growth: Growth::new(horizon),
         })
     }
 
