@@ -57,15 +57,16 @@ pub type HorizonRatios = [[f64; 2]; 2];
 /// Conversion of the critical stretches of points i and j to the critical stretch of their bond, for ends
 /// with different horizons or different damage laws.
 ///
-/// An end e acts on the bond if the bond is within the horizon of e. The end then contributes ½ k_e s² |ξ| to
-/// the energy of the bond. Here s is the stretch of the bond, and k_e is the stiffness of this end.
+/// End e contributes ½ k_e w_e s² |ξ| to the energy of the bond. Here s is the stretch of the bond, k_e is the
+/// stiffness of this end, and w_e is its weight, see [`Weights`]. The weight is 0 beyond the horizon of the
+/// end.
 ///
 /// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k. The minimum is over the
 /// points k of the bond: k = i and k = j. Here t_k is the critical stretch of point k, and r_ek is the factor
 /// in [`Self::ratios`].
 ///
-/// The energy of the bond is Σ ½ k_e s² |ξ|, summed over the acting ends. The bond breaks when this energy
-/// reaches Σ ½ k_e m_e² |ξ|. The critical stretch s is therefore given by s² = Σ k_e m_e²/Σ k_e.
+/// The energy of the bond is Σ ½ k_e w_e s² |ξ|, summed over the two ends. The bond breaks when this energy
+/// reaches Σ ½ k_e w_e m_e² |ξ|. The critical stretch s is therefore given by s² = Σ k_e w_e m_e²/Σ k_e w_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
     /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. There are two
@@ -78,12 +79,12 @@ pub struct StretchConversion {
 impl StretchConversion {
     /// Return the critical stretch of each bond, from the critical stretches of points i and j.
     #[inline(always)]
-    fn convert<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Lanes {
+    fn convert(self, [i, j]: [Lanes; 2], weights: Weights) -> Lanes {
         let [[ii, ij], [ji, jj]] = self.ratios;
         let critical_i = (i * ii).min(j * ij);
         let critical_j = (i * ji).min(j * jj);
-        let k_i = simd.keep(Lanes::splat(self.stiffness[0]), acting[0]);
-        let k_j = simd.keep(Lanes::splat(self.stiffness[1]), acting[1]);
+        let k_i = weights.own() * self.stiffness[0];
+        let k_j = weights.far() * self.stiffness[1];
         ((critical_i * critical_i * k_i + critical_j * critical_j * k_j) / (k_i + k_j)).sqrt()
     }
 
@@ -335,7 +336,7 @@ impl Criterion {
             }
             Self::StretchBetween(critical, conversion) => {
                 let both = [Lanes::splat(critical[0]), Lanes::splat(critical[1])];
-                let threshold = conversion.convert(simd, both, ends.weights.acting());
+                let threshold = conversion.convert(both, ends.weights);
                 match scale {
                     Some(scale) => threshold * scale,
                     None => threshold,
@@ -356,7 +357,7 @@ impl Criterion {
                 }
                 match *self {
                     Self::ThresholdsBetween(conversion, _) => {
-                        conversion.convert(simd, [threshold_i, threshold_j], ends.weights.acting())
+                        conversion.convert([threshold_i, threshold_j], ends.weights)
                     }
                     _ => threshold_i.min(threshold_j),
                 }
