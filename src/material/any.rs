@@ -230,6 +230,10 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::has_plasticity(law))
     }
 
+    fn correct_mean(&self, plastic: &mut PlasticState) {
+        with_law!(self, law => Law::<D>::correct_mean(law, plastic));
+    }
+
     #[inline(never)]
     fn bond_history(
         &self,

@@ -247,6 +247,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
+    /// Correct the plastic state of a point that is the mean of the states of other points.
+    fn correct_mean(&self, _plastic: &mut PlasticState) {}
+
     /// Test whether a pass reads the advanced bond history, which belongs to the end of the step. Otherwise
     /// the pass reads the history that belongs to the start of the step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {

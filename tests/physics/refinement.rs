@@ -731,3 +731,51 @@ fn a_crack_of_the_coarse_grid_stays_when_finer_ones_have_come_and_gone() {
         assert_eq!(finest, 2);
     });
 }
+
+#[test]
+fn the_mean_of_plastic_states_preserves_volume() {
+    // The shear differs from row to row. The mean of two tensors C_p⁻¹ whose shears differ by Δ has the
+    // determinant 1 + Δ²/4.
+    let text = "dimension = 'plane-strain'
+        parameters.dx = 1e-3
+        grid = { spacing = 'dx', horizon = '2.015*dx', volume_correction = 'none' }
+        [material.steel.correspondence]
+        density = 8000
+        youngs_modulus = 200e9
+        poisson_ratio = 0.3
+        yield_stress = 200e6
+        hardening_modulus = 1e9
+        strain_measure = 'logarithmic'
+        [body.block]
+        material = 'steel'
+        shape.box = { lower = [0, 0], upper = ['12*dx', '12*dx'] }
+        [condition.shear]
+        set = 'all'
+        displacement = ['0.1*(y - 6*dx)*abs(y - 6*dx)/dx*min(1, t/5e-7)', 0]
+        [refinement]
+        levels = 1
+        trigger = { where = 'x > 4*dx && x < 8*dx && t > 5e-7 && t < 8e-7', every_steps = 1, coarsen_after = 1e-7 }
+        [time]
+        end = 2e-6
+        step = 5e-8
+        ";
+    simulate_on::<2, _>(1, text, |mut simulation| {
+        let check = |simulation: &Simulation<'_, 2>| {
+            let [xx, yy, zz, yz, xz, xy] = simulation.fields.plastic_strain.as_ref().unwrap();
+            let flow = simulation.fields.plastic_strain_equivalent.as_ref();
+            assert!(flow.unwrap().iter().any(|flow| *flow > 0.2));
+            for k in 0..simulation.model.owned() {
+                let [a, b, c] = [xx, yy, zz].map(|diagonal| 1.0 + diagonal[k]);
+                assert!(yz[k] == 0.0 && xz[k] == 0.0);
+                let determinant = c * (a * b - xy[k] * xy[k]);
+                assert!((determinant - 1.0).abs() < 1e-8, "{determinant}");
+            }
+        };
+        let [created, _] = go_on(&mut simulation, 14);
+        assert!(created > 0);
+        check(&simulation);
+        let [_, removed] = go_on(&mut simulation, 16);
+        assert!(removed > 0);
+        check(&simulation);
+    });
+}

@@ -24,6 +24,10 @@ const MOST_SWEEPS: usize = 30;
 /// entries, and a is the sum of the squares of all nine entries.
 const CONVERGED: f64 = 1e-32;
 
+/// Largest difference of det C_p⁻¹ from 1 that counts as round-off. In a metal, this difference corresponds to
+/// a pressure below 100 Pa.
+const ROUND_OFF: f64 = 1e-9;
+
 /// Elastic trial state of a point, before any flow.
 struct Trial {
     /// Inverse deformation gradient F⁻¹.
@@ -103,6 +107,20 @@ pub fn out_of_plane_stress<const D: usize>(
     let trial = Trial::of(gradient, state)?;
     let stress = law.stress(&Matrix3::from_diagonal(&trial.strains));
     Some(trial.tensor(&stress.diagonal())[(2, 2)])
+}
+
+/// Divide C_p⁻¹ by the cube root of its determinant. Plastic flow preserves volume, so the determinant of each
+/// C_p⁻¹ is 1, but the determinant of a mean of different C_p⁻¹ is not. `entries` are those of C_p⁻¹ − I. They
+/// do not change if the determinant is 1 except for round-off.
+pub fn restore_volume(entries: &mut [f64; 6]) {
+    let one = Matrix3::identity();
+    let inverse = one + tensor_of(entries);
+    let determinant = determinant(&inverse);
+    if (determinant - 1.0).abs() > ROUND_OFF {
+        let restored = inverse / libm::cbrt(determinant) - one;
+        *entries = [0.0; 6];
+        add(entries, &restored);
+    }
 }
 
 /// Add a symmetric tensor to the entries xx, yy, zz, yz, xz, xy of another tensor.

@@ -503,6 +503,12 @@ impl<const D: usize> Law<D> for Correspondence {
         self.plastic().is_some()
     }
 
+    fn correct_mean(&self, plastic: &mut PlasticState) {
+        if let Some(law) = self.plastic() {
+            law.correct_mean(plastic);
+        }
+    }
+
     fn is_singular(&self, numbers: &[f64]) -> bool {
         numbers[CONSTANTS + D * D + 2 * D + 1] > 0.0
     }

@@ -201,6 +201,13 @@ impl Plastic {
         Some((second + gradient * second, 0.5 * stress.dot(&elastic)))
     }
 
+    /// Correct the plastic state of a point that is the mean of the states of other points.
+    pub fn correct_mean(&self, state: &mut PlasticState) {
+        if self.is_logarithmic {
+            logarithmic::restore_volume(&mut state.strain);
+        }
+    }
+
     /// Return the out-of-plane Kirchhoff stress in plane strain, Pa; `None` if the logarithmic strain does
     /// not exist.
     pub fn out_of_plane_stress<const D: usize>(

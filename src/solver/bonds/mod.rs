@@ -38,7 +38,7 @@ use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Fault, Grid, Which};
 use crate::lanes::{Instructions, LaneTuple};
-use crate::material::{Law, MOST};
+use crate::material::{Law, MOST, PlasticState};
 use crate::memory::check_room;
 
 use super::model::Model;
@@ -351,6 +351,18 @@ impl<const D: usize> Forces<D> {
         self.blocks
             .iter()
             .any(|block| Law::<D>::has_plasticity(&block.law))
+    }
+
+    /// Correct the plastic states of owned points, some of which are means of the states of other points.
+    pub fn correct_means(&self, model: &Model<D>, mut plastic: PlasticColumns<'_>) {
+        for (point, block) in model.block.iter().enumerate() {
+            let law = &self.blocks[usize::from(*block)].law;
+            let mut state = PlasticState::of(plastic.each_ref().map(|column| column[point]));
+            Law::<D>::correct_mean(law, &mut state);
+            for (column, number) in plastic.iter_mut().zip(state.numbers()) {
+                column[point] = number;
+            }
+        }
     }
 
     /// Instruction set of the loops.

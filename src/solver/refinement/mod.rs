@@ -24,7 +24,7 @@ mod trigger;
 
 use super::Simulation;
 use super::assign::cutoffs;
-use super::motion::fields::Birth;
+use super::motion::fields::{Birth, plastic_columns};
 use super::observers::Snapshot;
 use super::observers::history::point_sums;
 use super::steps::automatic_step;
@@ -339,7 +339,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Set the state of the owned points from the rows of [`GridState`]. Fields of [`Birth::Shared`] are
     /// multiplied by the volume, because rows contain the densities of these fields. The last number of a row
-    /// is the previous block, which is not part of the state.
+    /// is the previous block, which is not part of the state. The rows of some points are means over other
+    /// points; the laws correct the plastic states of these points.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
         let volume = &self.model.volume;
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);
@@ -353,6 +354,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
                     _ => *value,
                 };
             }
+        }
+        if self.forces.has_plasticity() {
+            let fields = &mut self.fields;
+            let plastic = plastic_columns(
+                &mut fields.plastic_strain,
+                &mut fields.plastic_strain_equivalent,
+                &mut fields.yield_change,
+                &mut fields.control_energy,
+                &mut fields.plastic_work,
+            );
+            self.forces.correct_means(&self.model, plastic);
         }
     }
 }
