@@ -98,9 +98,12 @@ impl Method {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {
-                "give [time.static] more `load_steps`, `max_iterations` or `max_halvings`"
+                "give [time.static] more `load_steps`, `max_iterations` or `max_halvings` or a larger `tolerance`, or use \
+                 `method = \"relaxation\"`"
             }
-            Self::Explicit | Self::Relaxation(_) => "give [time.relaxation] more `iterations`",
+            Self::Explicit | Self::Relaxation(_) => {
+                "give [time.relaxation] more `iterations` or a larger `tolerance`"
+            }
         }
     }
 

@@ -309,10 +309,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Apply the second half kick of the step that ends at the present time.
     pub(super) fn kick(&mut self) {
         let start = Instant::now();
-        let (clock, work) = (self.clock, self.work_formula());
+        let clock = self.clock;
         self.set_second_half(&clock);
-        let finite = self
-            .walk(|part, mut conditions| second_half(part, &mut conditions, clock.step(), work));
+        let finite =
+            self.walk(|part, mut conditions| second_half(part, &mut conditions, clock.step()));
         if !finite {
             self.note_bad(&clock);
         }
@@ -323,7 +323,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// pending, apply that half kick first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
-        let (before, work) = (self.clock, self.work_formula());
+        let before = self.clock;
         let step = before.step();
         if half_kick_pending {
             self.set_second_half(&before);
@@ -338,8 +338,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
             let finite = if half_kick_pending && conditions.is_empty() && part.damping.is_none() {
                 verlet::kick_and_drift(part, step)
             } else {
-                let finite = !half_kick_pending || second_half(part, &mut conditions, step, work);
-                conditions.before_moving(part, work);
+                let finite = !half_kick_pending || second_half(part, &mut conditions, step);
+                conditions.before_moving(part, Work::Step);
                 verlet::half_kick_and_drift(part, step);
                 conditions.apply_displacements(part);
                 finite
@@ -354,14 +354,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         self.times.motion += start.elapsed();
         self.evaluate_at_bond_inputs(BondUpdate::Step(step));
-    }
-
-    /// Formula for the work of loads and supports in an explicit step of the present stage.
-    fn work_formula(&self) -> Work {
-        match self.time_rule().adaptive {
-            Some(_) => Work::KineticEnergy,
-            None => Work::Trapezoid,
-        }
     }
 
     /// Prepare the conditions for the second half kick at the time of `clock`.
@@ -606,19 +598,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
 }
 
 /// Complete a step of length `step` (s) after the forces at the new positions have been evaluated. Apply the
-/// loads, the second half kick and the supports. Then add the work of loads and supports by the formula
-/// `work`, and the energy that viscous damping has dissipated. Return whether all velocities and reactions
-/// are finite.
+/// loads, the second half kick and the supports. Then add the work of loads and supports, and the energy that
+/// viscous damping has dissipated. Return whether all velocities and reactions are finite.
 fn second_half<const D: usize>(
     part: &mut Part<'_, D>,
     conditions: &mut PartConditions<'_, D>,
     step: f64,
-    work: Work,
 ) -> bool {
     conditions.apply_loads(part);
     let finite = verlet::second_half_kick(part, step);
     let finite = conditions.apply_velocities(part) && finite;
-    conditions.add_work(part, work);
+    conditions.add_work(part, Work::Step);
     part.add_damped_energy(step);
     finite
 }

@@ -83,7 +83,7 @@ fn steps_that_are_long_for_bonds_that_break_are_told() {
     assert!(!warned("safety = 0.8", &["--quiet"]));
 }
 
-/// The work of a support is that of the present step length, also if its motion jumps between two steps.
+/// The energy balance closes in each row, also if the motion of a support jumps between two steps.
 #[test]
 fn a_kink_of_a_support_does_not_spoil_the_energy_balance() {
     // The step is 0.1 s before t = 2 s, and 0.2 s after it.

@@ -159,7 +159,7 @@ impl<const D: usize> Loaded<D> {
             return;
         };
         let mean = |before: f64, now: f64| match kind {
-            Work::Trapezoid | Work::KineticEnergy => 0.5 * (before + now),
+            Work::Trapezoid | Work::Step => 0.5 * (before + now),
             Work::FirstEquilibrium => 0.5 * (before - now),
             Work::LastEquilibrium => now,
         };

@@ -63,13 +63,14 @@ pub enum Work {
     FirstEquilibrium,
     /// At the last of several equilibria: for supports, 0; for loads, f₁·(u₂ − u₀) V.
     LastEquilibrium,
-    /// For loads, as [`Self::Trapezoid`]. For supports, the change of the kinetic energy minus the work of
-    /// the other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
+    /// In an explicit step: for loads, as [`Self::Trapezoid`]; for supports, the change of the kinetic energy
+    /// minus the work of the other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
     ///
-    /// A reaction that was computed for one step length does not give the prescribed motion in a step of
-    /// another length. Its trapezoidal rule is therefore wrong by ½ ρ w² (Δt₂/Δt₁ − 1) if the velocity jumps
-    /// from 0 to w between steps of Δt₁ and Δt₂.
-    KineticEnergy,
+    /// If the velocity of a support jumps from 0 to w at a step, its velocity is ½ w at this time. The
+    /// trapezoidal rule would then give a kinetic energy of ½ ρ w² too early or too late, so the energy
+    /// balance would not close at this time. If the next step had another length, the balance would not close
+    /// afterwards either.
+    Step,
 }
 
 /// The conditions that act on a [`Part`] of the points.
@@ -511,7 +512,7 @@ impl<'a, const D: usize> PartConditions<'a, D> {
         let reaction = part.reaction.as_ref();
         let reaction = reaction.map(|reaction| reaction.each_ref().map(|column| &**column));
         self.record_for_work(displacement, reaction);
-        if work == Work::KineticEnergy {
+        if work == Work::Step {
             for support in &mut self.on.supports {
                 support.record_motion(self.stage.supports, part);
             }

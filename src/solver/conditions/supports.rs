@@ -56,7 +56,7 @@ pub struct Supported {
     /// Displacement before the step, m.
     moved_from: Vec<f64>,
     /// Velocity (m/s) before the step, and sum of the other force densities on the point (N/m³). Empty if no
-    /// step has used [`Work::KineticEnergy`].
+    /// step has used [`Work::Step`].
     motion: Vec<[f64; 2]>,
 }
 
@@ -167,7 +167,7 @@ impl Supported {
         }
     }
 
-    /// Store velocities and the forces of all other causes, for [`Work::KineticEnergy`] of the next step.
+    /// Store velocities and the forces of all other causes, for [`Work::Step`] of the next step.
     pub fn record_motion<const D: usize>(&mut self, supports: &[Support], part: &Part<'_, D>) {
         let component = supports[self.support].component;
         self.motion.clear();
@@ -283,7 +283,7 @@ impl Supported {
         for (k, point) in self.points.iter().enumerate() {
             let point = usize::from(*point);
             let moved = part.displacement[component][point] - self.moved_from[k];
-            let density = if work == Work::KineticEnergy {
+            let density = if work == Work::Step {
                 let [velocity, force] = self.motion[k];
                 let now = part.velocity[component][point];
                 let others = 0.5 * (force + part.force_without_reaction(component, point));

@@ -409,8 +409,7 @@ impl<const D: usize> Simulation<'_, D> {
         let remedy = self.time_rule().method.remedy();
         let cause = if residual.is_finite() {
             format!(
-                "the unbalanced forces are still {residual:.1e} of {}{}. If the body can carry the loads, \
-                 {remedy} or a larger `tolerance`",
+                "the unbalanced forces are still {residual:.1e} of {}{}. If the body can carry the loads, {remedy}",
                 self.progress.load_step.reference(),
                 self.worst_point()
             )
