@@ -29,7 +29,8 @@ pub enum Criterion {
     /// [`StretchConversion`] converts these stretches to the critical stretch of the bond. A block
     /// without critical stretch has the value ∞.
     StretchBetween([f64; 2], StretchConversion),
-    /// Same as [`Self::Thresholds`], for thresholds of points i and j that belong to different horizons.
+    /// Same as [`Self::Thresholds`], for thresholds of points i and j that belong to different horizons or
+    /// moduli.
     /// [`StretchConversion`] converts these thresholds to the critical stretch of the bond.
     ThresholdsBetween(StretchConversion, Directions),
     /// Bonds break when their work reaches their critical work. Each end that acts on a bond adds the work of
@@ -55,7 +56,7 @@ pub type Directions = Option<[ToughnessByDirection; 2]>;
 pub type HorizonRatios = [[f64; 2]; 2];
 
 /// Conversion of the critical stretches of points i and j to the critical stretch of their bond, for ends
-/// with different horizons or different damage laws.
+/// with different horizons, moduli or damage laws.
 ///
 /// End e contributes ½ k_e w_e s² |ξ| to the energy of the bond. Here s is the stretch of the bond, k_e is the
 /// stiffness of this end, and w_e is its weight, see [`Weights`]. The weight is 0 beyond the horizon of the
@@ -69,8 +70,9 @@ pub type HorizonRatios = [[f64; 2]; 2];
 /// reaches Σ ½ k_e w_e m_e² |ξ|. The critical stretch s is therefore given by s² = Σ k_e w_e m_e²/Σ k_e w_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
-    /// Entry `[e][k]` is r_ek = √(δ_k/δ_e), with the horizons δ_k of point k and δ_e of end e. There are two
-    /// exceptions. If t_k holds for any horizon, r_ek is 1. If t_k does not limit m_e, r_ek is ∞.
+    /// Entry `[e][k]` is r_ek: the critical stretch that follows from the fracture energy of point k with the
+    /// law, the modulus and the horizon of end e, divided by the one with those of point k. There are two
+    /// exceptions. If t_k is given in the deck, r_ek is 1. If t_k does not limit m_e, r_ek is ∞.
     pub ratios: HorizonRatios,
     /// Stiffnesses k_e, in any unit.
     pub stiffness: [f64; 2],

@@ -777,6 +777,38 @@ fn between_bars_of_different_horizons_with_volume_correction() {
     assert!((cost * 144.0 / 155.0 - 1.0).abs() < 1e-3, "{cost}");
 }
 
+/// Opening the joint of a soft and a stiff body costs the smaller fracture energy of the two bodies.
+#[test]
+fn between_bars_of_different_moduli() {
+    // The sum over the bonds of a uniform bar is 19/18 of the fracture energy.
+    let costs = |rule: &str, tougher: &str| {
+        let bars = format!(
+            "dimension = '1d'
+            constraint = 'uniaxial-stress'
+            grid = {{ spacing = 1, horizon = 3, volume_correction = 'exact' }}
+            material.soft.pmb = {{ density = 1, youngs_modulus = 3e3 }}
+            material.hard.pmb = {{ density = 1, youngs_modulus = 9e3 }}
+            damage.brittle.{rule} = {{ fracture_energy = {FRACTURE_ENERGY} }}
+            damage.tough.{rule} = {{ fracture_energy = '4*{FRACTURE_ENERGY}' }}
+            body.left = {{ material = 'soft', damage = 'brittle', shape.box = {{ lower = [-6], upper = [0] }} }}
+            body.right = {{ material = 'hard'{tougher}, shape.box = {{ lower = [0], upper = [6] }} }}
+            [time]
+            end = 1
+            "
+        );
+        cost_of_deck::<1>(Mode::Opening, &bars, 0.001)
+    };
+    for rule in [STRETCH, ENERGY] {
+        for tougher in [", damage = 'brittle'", ", damage = 'tough'", ""] {
+            let cost = costs(rule, tougher);
+            assert!(
+                (cost * 18.0 / 19.0 - 1.0).abs() < 1e-3,
+                "{rule} {tougher}: {cost}"
+            );
+        }
+    }
+}
+
 /// Return the work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. In each step,
 /// the extension of the bond grows by 0.1 %, so this work is up to 0.2 % below the threshold. The horizon is
 /// 1.5, and the thickness is 0.5 in the plane.

@@ -215,6 +215,41 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
+/// Return the fracture energy (J/m²) of a damage from which critical stretches follow, for a body with these
+/// constants. `None` if the deck gives a critical stretch or a strength instead.
+fn fracture_energy(problem: &Problem, damage: &problem::Damage, elastic: Isotropic) -> Option<f64> {
+    let dimension = problem.dimension;
+    let energy = match damage.toughness {
+        Toughness::FractureEnergy(energy) => energy,
+        Toughness::FractureToughness(toughness) => {
+            CriticalStretch::energy_from_toughness(dimension, elastic, toughness)
+        }
+        Toughness::CriticalStretch(_) | Toughness::Strength(_) => return None,
+    };
+    Some(match damage.rule {
+        DamageRule::CriticalStretch | DamageRule::Stress(_) => energy,
+        DamageRule::Energy { calibration, .. } => energy * calibration.energy_ratio(dimension),
+    })
+}
+
+/// Return the critical stretch at one end of a bond for a fracture energy (J/m²). `body` and `constants` are
+/// the body and the constants of this end, and `damage` is the damage of the bonds of this body.
+fn critical_stretch(
+    problem: &Problem,
+    body: &Body,
+    damage: Option<&problem::Damage>,
+    constants: Constants,
+    energy: f64,
+) -> f64 {
+    match body.material.law.declaration.critical_stretch {
+        Some(stretch) => stretch(&given(problem, body, damage, constants), energy),
+        None => {
+            let Constants { elastic, horizon } = constants;
+            CriticalStretch::from_energy(problem.dimension, elastic, energy, horizon)
+        }
+    }
+}
+
 /// Return the damage law at one end of a bond, computed from the damage in the deck. `body` and `constants`
 /// are the body and the constants of this end.
 fn damage_law(
@@ -223,34 +258,21 @@ fn damage_law(
     damage: &problem::Damage,
     constants: Constants,
 ) -> DamageLaw {
-    let (dimension, elastic) = (problem.dimension, constants.elastic);
-    let given = given(problem, body, Some(damage), constants);
-    let of_law = body.material.law.declaration.critical_stretch;
-    let stretch = |energy: f64| match of_law {
-        Some(stretch) => stretch(&given, energy),
-        None => CriticalStretch::from_energy(dimension, elastic, energy, constants.horizon),
+    let dimension = problem.dimension;
+    let Some(energy) = fracture_energy(problem, damage, constants.elastic) else {
+        return match (damage.toughness, damage.rule) {
+            (Toughness::CriticalStretch(critical), _) => {
+                let alpha = damage.alpha;
+                DamageLaw::CriticalStretch(CriticalStretch { critical, alpha })
+            }
+            (Toughness::Strength(strength), DamageRule::Stress(rule)) => {
+                DamageLaw::Stress(StressLimit { strength, rule })
+            }
+            _ => unreachable!("only stress is compared with a strength"),
+        };
     };
-    let energy = match damage.toughness {
-        Toughness::FractureEnergy(energy) => energy,
-        Toughness::FractureToughness(toughness) => {
-            CriticalStretch::energy_from_toughness(dimension, elastic, toughness)
-        }
-        Toughness::CriticalStretch(critical) => {
-            let alpha = damage.alpha;
-            return DamageLaw::CriticalStretch(CriticalStretch { critical, alpha });
-        }
-        Toughness::Strength(strength) => {
-            let DamageRule::Stress(rule) = damage.rule else {
-                unreachable!("only stress is compared with a strength");
-            };
-            return DamageLaw::Stress(StressLimit { strength, rule });
-        }
-    };
-    let energy = match damage.rule {
-        DamageRule::CriticalStretch | DamageRule::Stress(_) => energy,
-        DamageRule::Energy { calibration, .. } => energy * calibration.energy_ratio(dimension),
-    };
-    let (critical, alpha) = (stretch(energy), damage.alpha);
+    let critical = critical_stretch(problem, body, Some(damage), constants, energy);
+    let alpha = damage.alpha;
     match damage.rule {
         DamageRule::Energy { work, .. } if breaks(body, damage) == Breaks::Work => {
             DamageLaw::BondEnergy(BondEnergy {
@@ -287,6 +309,25 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     }
 }
 
+/// Factor that converts a critical stretch of the body of block `from` to an end of bonds in block `to`.
+/// `constants` are the constants of this end. The fracture energy remains the same.
+fn stretch_ratio(problem: &Problem, [to, from]: [usize; 2], constants: Constants) -> f64 {
+    let [to, from] = [to, from].map(|block| problem.block(block));
+    let damage = from.body.damage.as_ref();
+    let elastic = from.body.material.elastic;
+    // A critical stretch in the deck is used as given, for any horizon and modulus.
+    let Some(energy) = damage.and_then(|damage| fracture_energy(problem, damage, elastic)) else {
+        return 1.0;
+    };
+    if to.body.name == from.body.name {
+        return (from.horizon / constants.horizon).sqrt();
+    }
+    let at = |block: &Block, constants: Constants| {
+        critical_stretch(problem, block.body, damage, constants, energy)
+    };
+    at(&to, constants) / at(&from, self::constants(problem, &from, &from))
+}
+
 /// Failure criterion of the bonds between two blocks, from the damage of both blocks; see [`Criterion`]. A
 /// block without damage sets no threshold. `ends` are the indices of both blocks. `of_ends` has one entry per
 /// block: the data of the bonds' end in this block. `per_point` says whether thresholds are stored per point.
@@ -301,7 +342,7 @@ fn criterion(
     if let [Some(i), Some(j)] = of_ends.each_ref().map(|end| end.own_critical_stretch) {
         return Criterion::Stretch(i.max(j));
     }
-    let horizons = of_ends.each_ref().map(|end| end.horizon);
+    let horizons = of_ends.each_ref().map(|end| end.constants.horizon);
     let stiffness = of_ends.each_ref().map(|end| end.stiffness);
     let laws = ends.map(|block| blocks[block].damage);
     let critical = laws.map(|law| law.map(|law| law.critical()));
@@ -328,14 +369,8 @@ fn criterion(
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
-    // A critical stretch in the deck is used as given, for any horizon.
-    let is_given = ends.map(|block| match &problem.block(block).body.damage {
-        Some(damage) => matches!(damage.toughness, Toughness::CriticalStretch(_)),
-        None => (problem.block(block).body.material.law.declaration).breaks_by_itself(),
-    });
-    let stretch_ratios: HorizonRatios = horizons.map(|horizon| {
-        let ratio = |k: usize| (problem.block(ends[k]).horizon / horizon).sqrt();
-        [0, 1].map(|k| if is_given[k] { 1.0 } else { ratio(k) })
+    let stretch_ratios: HorizonRatios = [0, 1].map(|end| {
+        [0, 1].map(|k| stretch_ratio(problem, [ends[end], ends[k]], of_ends[end].constants))
     });
     let conversion = (stretch_ratios != [[1.0; 2]; 2]).then_some(StretchConversion {
         ratios: stretch_ratios,
@@ -387,7 +422,6 @@ pub fn assign<const D: usize>(
         let pair_damage = problem.interface.damage_between(here.body, there.body);
         let ends = [(here, there), (there, here)].map(|(block, other)| {
             let constants = constants(problem, &block, &other);
-            let horizon = constants.horizon;
             let damage = pair_damage.own().or(block.body.damage.as_ref());
             End {
                 stiffness: bond_stiffness(&constants, problem.dimension),
@@ -396,8 +430,8 @@ pub fn assign<const D: usize>(
                     .own()
                     .map(|damage| damage_law(problem, block.body, damage, constants)),
                 own_critical_stretch: own_critical_stretch(problem, block.body, constants),
-                horizon,
-                volume_factors: volume_factors(problem, &other, horizon),
+                constants,
+                volume_factors: volume_factors(problem, &other, constants.horizon),
             }
         });
         weigh(problem, model, &mut bonds, &ends)?;
@@ -434,8 +468,7 @@ struct End {
     stiffness: f64,
     /// Separate damage law of the pair of bodies, for this end; `None` if the pair has none.
     pair_damage: Option<DamageLaw>,
-    /// Horizon, m.
-    horizon: f64,
+    constants: Constants,
     /// Volume correction factors for the neighbours of a point at this end; the neighbours are in the other
     /// block.
     volume_factors: VolumeFactors,
@@ -461,7 +494,7 @@ fn weigh<const D: usize>(
     ends: &[End; 2],
 ) -> std::result::Result<(), Fault> {
     let plain = problem.volume_correction == VolumeCorrection::None
-        && ends[0].horizon == ends[1].horizon
+        && ends[0].constants.horizon == ends[1].constants.horizon
         && ends.iter().all(|end| end.built.influence.is_none());
     if plain {
         return Ok(());
