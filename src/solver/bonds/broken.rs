@@ -105,9 +105,8 @@ impl<const D: usize> Forces<D> {
         let start = Instant::now();
         let halo_before = times.halo;
         let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
-        for points in self.ranges(own.iter().copied()) {
-            self.find_numbers(points, model, &mut acting);
-        }
+        let affected = self.ranges(own.iter().copied());
+        self.find_numbers(&affected, model, &mut acting);
         let changed = self.send_numbers(comm, model, own, times);
         for points in self.ranges(changed.into_iter()) {
             self.find_forces(points, acting.force);
@@ -115,28 +114,38 @@ impl<const D: usize> Forces<D> {
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Recompute the point numbers of a range of points. Record the energy that points with broken bonds lose
+    /// Recompute the point numbers of ranges of points. Record the energy that points with broken bonds lose
     /// by this change. The energy that plastic flow dissipates is not included.
-    fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
+    fn find_numbers(
+        &mut self,
+        ranges: &[Range<usize>],
+        model: &Model<D>,
+        acting: &mut Acting<'_, D>,
+    ) {
         // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);
         let Acting { force, plastic, .. } = acting;
-        let before = self.energy_with_plastic_work(model, points.clone(), plastic);
+        let before: Vec<Vec<f64>> = ranges
+            .iter()
+            .map(|points| self.energy_with_plastic_work(model, points.clone(), plastic))
+            .collect();
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
-            if pass != Pass::PointSum(0) {
-                self.update(HaloContent::OwnNumbers, Which::Owned);
+            for points in ranges {
+                self.clear(pass, points.clone());
+                self.run(pass, points.clone(), force, BondUpdate::None);
+                self.finish(pass, points.clone(), model, bond_update, plastic);
             }
-            self.clear(pass, points.clone());
-            self.run(pass, points.clone(), force, BondUpdate::None);
-            self.finish(pass, points.clone(), model, bond_update, plastic);
+            // Lattice bonds read copies of the point numbers in the grids, so update these copies. One update
+            // for all ranges is enough, because a point sum reads the point numbers of point i only.
+            self.update(HaloContent::OwnNumbers, Which::Owned);
         }
-        // Lattice bonds read copies of the point numbers in the grids, so update these copies.
-        self.update(HaloContent::OwnNumbers, Which::Owned);
-        let after = self.energy_with_plastic_work(model, points.clone(), plastic);
-        for broken in &mut self.broken {
-            if points.contains(&broken.point) {
-                let k = broken.point - points.start;
-                broken.energy += model.volume[broken.point] * (before[k] - after[k]);
+        for (points, before) in ranges.iter().zip(before) {
+            let after = self.energy_with_plastic_work(model, points.clone(), plastic);
+            for broken in &mut self.broken {
+                if points.contains(&broken.point) {
+                    let k = broken.point - points.start;
+                    broken.energy += model.volume[broken.point] * (before[k] - after[k]);
+                }
             }
         }
     }
@@ -181,7 +190,8 @@ impl<const D: usize> Forces<D> {
         halo.update_ghosts(comm, &mut columns.collect::<Vec<_>>());
         self.halo = halo;
         times.halo += start.elapsed();
-        self.update(HaloContent::PointNumbers, Which::All);
+        // `find_numbers` has already updated the copies of owned points.
+        self.update(HaloContent::PointNumbers, Which::Ghosts);
         let mut changed = own.clone();
         for interaction in &self.interactions {
             for point in &own {
