@@ -81,19 +81,7 @@ impl<const D: usize> Forces<D> {
         mut acting: Acting<'_, D>,
         times: &mut ForceTimes,
     ) {
-        self.broken.sort_by_key(|broken| broken.point);
-        self.broken.dedup_by(|later, first| {
-            let same = later.point == first.point;
-            if same {
-                first.count += later.count;
-                first.energy += later.energy;
-                first.overshoot += later.overshoot;
-                for d in 0..D {
-                    first.force[d] += later.force[d];
-                }
-            }
-            same
-        });
+        self.merge_broken();
         if self.numbers.passes == 0 || !self.breaks {
             return;
         }
@@ -111,7 +99,25 @@ impl<const D: usize> Forces<D> {
         for points in self.ranges(changed.into_iter()) {
             self.find_forces(points, acting.force);
         }
+        self.merge_broken();
         times.bonds += start.elapsed() - (times.halo - halo_before);
+    }
+
+    /// Sort the entries of [`Self::broken`] by point, and merge the entries of the same point.
+    fn merge_broken(&mut self) {
+        self.broken.sort_by_key(|broken| broken.point);
+        self.broken.dedup_by(|later, first| {
+            let same = later.point == first.point;
+            if same {
+                first.count += later.count;
+                first.energy += later.energy;
+                first.overshoot += later.overshoot;
+                for d in 0..D {
+                    first.force[d] += later.force[d];
+                }
+            }
+            same
+        });
     }
 
     /// Recompute the point numbers of ranges of points. Record the energy that points with broken bonds lose
@@ -141,11 +147,11 @@ impl<const D: usize> Forces<D> {
         }
         for (points, before) in ranges.iter().zip(before) {
             let after = self.energy_with_plastic_work(model, points.clone(), plastic);
-            for broken in &mut self.broken {
-                if points.contains(&broken.point) {
-                    let k = broken.point - points.start;
-                    broken.energy += model.volume[broken.point] * (before[k] - after[k]);
-                }
+            let first = (self.broken).partition_point(|broken| broken.point < points.start);
+            let of_range = self.broken[first..].iter_mut();
+            for broken in of_range.take_while(|broken| broken.point < points.end) {
+                let k = broken.point - points.start;
+                broken.energy += model.volume[broken.point] * (before[k] - after[k]);
             }
         }
     }
@@ -208,8 +214,8 @@ impl<const D: usize> Forces<D> {
         changed
     }
 
-    /// Recompute the forces on a range of points, and record the changes of the force densities as lost
-    /// forces.
+    /// Recompute the forces on a range of points. Append the changes of the force densities to
+    /// [`Self::broken`], as lost forces. The new entries are not yet merged with the other entries.
     fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
         let before = force
             .each_ref()
@@ -223,19 +229,11 @@ impl<const D: usize> Forces<D> {
             if lost == [0.0; D] {
                 continue;
             }
-            let place = match self
-                .broken
-                .binary_search_by_key(&point, |broken| broken.point)
-            {
-                Ok(place) => place,
-                Err(place) => {
-                    self.broken.insert(place, Broken::none(point));
-                    place
-                }
-            };
+            let mut broken = Broken::none(point);
             for d in 0..D {
-                self.broken[place].force[d] += lost[d];
+                broken.force[d] += lost[d];
             }
+            self.broken.push(broken);
         }
     }
 
