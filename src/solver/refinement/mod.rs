@@ -118,8 +118,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
             return Ok(None);
         };
         let start = Instant::now();
-        let snapshot = Snapshot::new(self);
+        let snapshot = if trigger.energy.is_some() {
+            Snapshot::new(self)
+        } else {
+            Snapshot::without_energies(self)
+        };
         let wanted = self.wanted(trigger, &snapshot);
+        drop(snapshot);
         if wanted.finer.is_empty() && wanted.coarser.is_empty() {
             return Ok(None);
         }
@@ -135,12 +140,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 facets.lie_between(&facets.near(a), a, b)
             });
         }
-        let (energy, bonds) = self.energy_and_bonds(&snapshot);
-        drop(snapshot);
+        let (energy, bonds) = self.energy_and_bonds();
         let before = self.model.total;
         self.regrid(grids, &removed, &facets)?;
-        let snapshot = Snapshot::new(self);
-        let (new_energy, new_bonds) = self.energy_and_bonds(&snapshot);
+        let (new_energy, new_bonds) = self.energy_and_bonds();
         self.progress.refined.energy += new_energy - energy;
         self.progress.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
@@ -153,8 +156,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Sum kinetic and strain energy (J) over all ranks, and count the intact bonds; each bond counts twice.
     /// Collective.
-    fn energy_and_bonds(&self, snapshot: &Snapshot) -> (f64, u64) {
-        let sums = point_sums(self, snapshot);
+    fn energy_and_bonds(&mut self) -> (f64, u64) {
+        let snapshot = Snapshot::new(self);
+        let sums = point_sums(self, &snapshot);
         // Both energies are in one sum, which is rounded once.
         let mut energy = [sums[0].clone()];
         energy[0].merge(&sums[1]);

@@ -180,14 +180,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Mark the owned points that trigger refinement. Collective.
     fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
-        let mut most = [0.0_f64];
-        for energy in &snapshot.stored.energy {
-            most[0] = most[0].max(*energy);
-        }
-        self.comm.max(&mut most);
-        let least = trigger
-            .energy
-            .map_or(f64::INFINITY, |share| share * most[0]);
+        let least_energy = trigger.energy.map(|share| {
+            let mut most = [0.0_f64];
+            for energy in &snapshot.stored.energy {
+                most[0] = most[0].max(*energy);
+            }
+            self.comm.max(&mut most);
+            share * most[0]
+        });
         let time = self.clock.time();
         let holds = |condition: &Expression, point| condition.is_true(model.position(point), time);
         let is_trigger = |point: usize| {
@@ -198,9 +198,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
             {
                 return false;
             }
-            let energy = snapshot.stored.energy[point];
+            let has_energy = |least: f64| {
+                let energy = snapshot.stored.energy[point];
+                energy >= least && energy > 0.0
+            };
             let damage = || snapshot.damage(&self.undeformed.family_volume, point);
-            energy >= least && energy > 0.0
+            least_energy.is_some_and(has_energy)
                 || trigger.damage.is_some_and(|least| damage() >= least)
                 || (trigger.condition.as_ref()).is_some_and(|condition| holds(condition, point))
         };
