@@ -190,9 +190,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let broken = order.spread_ragged(comm, &broken, &own_lengths, &lengths);
         other.inherit(&rows, width, (&own_lengths, &broken), facets);
         other.take_rows(&rows, width);
-        let steps = std::mem::take(&mut other.stages.steps);
         other.continue_from(&self.progress_words());
-        other.stages.steps = steps;
         other.take_over(self);
         let (time, rule) = (other.clock.time(), other.time_rule());
         if let StepRule::Automatic(safety) = rule.step {
