@@ -229,22 +229,21 @@ impl<const D: usize> Forces<D> {
 
     /// Return the name and the number of columns of each halo exchange of a force evaluation. If bonds break,
     /// the point numbers are sent a second time. The result does not contain this second exchange.
-    pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
-        let mut thermal_stretch = Vec::new();
+    pub fn halo_sizes(&mut self) -> Vec<(&'static str, usize)> {
         let mut sizes = Vec::new();
         for pass_index in 0..self.passes.len() {
-            let name = match self.content(pass_index) {
-                HaloContent::Motion if is_thermal => "displacements and thermal stretches",
-                HaloContent::Motion => "displacements",
-                HaloContent::Thresholds => "thresholds",
-                HaloContent::PointNumbers => "point numbers, rotations and stresses",
+            sizes.push(match self.content(pass_index) {
+                HaloContent::Motion if self.is_thermal => {
+                    ("displacements and thermal stretches", D + 1)
+                }
+                HaloContent::Motion => ("displacements", D),
+                HaloContent::Thresholds => ("thresholds", 1),
+                HaloContent::PointNumbers => {
+                    let (_, count) = self.changing_columns();
+                    ("point numbers, rotations and stresses", count)
+                }
                 HaloContent::OwnNumbers | HaloContent::None => continue,
-            };
-            let mut displacement = [const { Vec::new() }; D];
-            let thermal_stretch = is_thermal.then_some(&mut thermal_stretch[..]);
-            let (_, columns) =
-                self.halo_columns(self.content(pass_index), &mut displacement, thermal_stretch);
-            sizes.push((name, columns));
+            });
         }
         sizes
     }

@@ -402,24 +402,9 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Exchange the ghost values of a column. The column has one value per local point. Collective.
-    pub fn update_ghosts_of(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
-        self.halo.update_ghosts(comm, &mut [values]);
-    }
-
-    /// Exchange the ghost values of several columns. Each column has one value per local point. Collective.
-    pub fn update_ghosts_of_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
+    /// Exchange the ghost values of columns. Each column has one value per local point. Collective.
+    pub fn update_ghosts(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
         self.halo.update_ghosts(comm, columns);
-    }
-
-    /// Exchange the displacements of the ghosts. Collective.
-    pub fn update_ghost_displacements(
-        &mut self,
-        comm: &dyn Communicator,
-        displacement: &mut [Vec<f64>; D],
-    ) {
-        let mut components = displacement.each_mut().map(Vec::as_mut_slice);
-        self.halo.update_ghosts(comm, &mut components);
     }
 
     /// Make a bond unbreakable if `between` is true for its two blocks and `protected` is 1 at one of its
@@ -432,7 +417,7 @@ impl<const D: usize> Forces<D> {
         protected: &mut [f64],
         between: impl Fn([usize; 2]) -> bool,
     ) {
-        self.update_ghosts_of(comm, protected);
+        self.update_ghosts(comm, &mut [&mut *protected]);
         let mut in_block = vec![0.0_f64; self.blocks.len()];
         for (block, protected) in block.iter().zip(&*protected) {
             let most = &mut in_block[usize::from(*block)];

@@ -298,7 +298,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .collect();
         for column in [&mut was, &mut same] {
             column.resize(model.volume.len(), 0.0);
-            self.forces.update_ghosts_of(self.comm, column);
+            self.forces.update_ghosts(self.comm, &mut [column]);
         }
         let ends = lengths.iter().scan(0, |end, length| {
             *end += *length as usize;

@@ -222,7 +222,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 *horizon = self.problem.block(usize::from(model.block[point])).horizon;
             }
         }
-        self.forces.update_ghosts_of(self.comm, &mut horizons);
+        self.forces.update_ghosts(self.comm, &mut [&mut horizons]);
         let sources = horizons.into_iter().enumerate();
         let sources = sources.filter(|(_, horizon)| *horizon > 0.0);
         sources
