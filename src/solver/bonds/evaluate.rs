@@ -21,7 +21,7 @@ use super::point_numbers::PlasticColumns;
 use super::point_stresses::StressInputs;
 use super::point_sums::{PassSum, SmallestStretch};
 use super::sweep::{PointData, sweep, sweep_and_break};
-use super::{Forces, Pass};
+use super::{Forces, Pass, threshold};
 
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
@@ -403,10 +403,7 @@ impl<const D: usize> Forces<D> {
                         } else {
                             stretch_of(*value)
                         };
-                        let damage = blocks[usize::from(model.block[point])].damage;
-                        let strength = strength.get(point).copied().unwrap_or(1.0);
-                        *value =
-                            damage.map_or(f64::INFINITY, |law| law.threshold(strength, smallest));
+                        *value = threshold(blocks, model, strength, point, smallest);
                     });
             }
             Pass::PointSum(number) => {

@@ -116,6 +116,21 @@ fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64>
     (0..model.owned()).into_par_iter().map(strength).collect()
 }
 
+/// Threshold of an owned point with this smallest stretch, see
+/// [`DamageLaw::threshold`](crate::damage::DamageLaw::threshold); ∞ for a block without a damage law.
+/// `strengths` are the strengths f of the points.
+fn threshold<const D: usize>(
+    blocks: &[BlockLaws],
+    model: &Model<D>,
+    strengths: &[f64],
+    point: usize,
+    smallest: f64,
+) -> f64 {
+    let damage = blocks[usize::from(model.block[point])].damage;
+    let strength = strengths.get(point).copied().unwrap_or(1.0);
+    damage.map_or(f64::INFINITY, |law| law.threshold(strength, smallest))
+}
+
 /// The bonds of a rank and the data for sums over them.
 pub struct Forces<const D: usize> {
     interactions: Vec<Interaction>,
@@ -274,10 +289,7 @@ impl<const D: usize> Forces<D> {
             ..
         } = self;
         for point in 0..model.owned() {
-            let damage = blocks[usize::from(model.block[point])].damage;
-            let strength = strength.get(point).copied().unwrap_or(1.0);
-            limits.thresholds[point] =
-                damage.map_or(f64::INFINITY, |law| law.threshold(strength, 0.0));
+            limits.thresholds[point] = threshold(blocks, model, strength, point, 0.0);
         }
         halo.update_ghosts(comm, &mut [&mut limits.thresholds[..]]);
         for grid in grids {
