@@ -71,8 +71,7 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
 /// Describe the halo exchanges of a force evaluation: the content of each exchange, and the number of values
 /// per ghost.
 fn sent<const D: usize>(simulation: &mut Simulation<'_, D>) -> String {
-    let is_thermal = simulation.problem.has_temperature();
-    let sizes = simulation.forces.halo_sizes(is_thermal).into_iter();
+    let sizes = simulation.forces.halo_sizes().into_iter();
     let parts: Vec<String> = sizes
         .map(|(name, columns)| format!("{name} ({columns})"))
         .collect();

@@ -23,7 +23,7 @@ impl<const D: usize> Simulation<'_, D> {
         loop {
             // Exchange the ghost values, then find the minima over the pieces of this rank. Repeat this until
             // no entry changes on any rank.
-            self.forces.update_ghosts_of_all(self.comm, columns);
+            self.forces.update_ghosts(self.comm, columns);
             let mut changed = 0;
             for column in columns.iter_mut() {
                 for point in 0..local {

@@ -140,7 +140,6 @@ impl<const D: usize> Simulation<'_, D> {
         let order = other.id_order();
         other.stages.steps.clone_from(&self.stages.steps);
         other.restore(&order, &saved)?;
-        other.clock = self.clock;
         other.take_over(self);
         *self = other;
         let ids = &self.model.ids[..self.model.owned()];

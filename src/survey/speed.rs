@@ -110,9 +110,8 @@ fn exchange_without_overlap<const D: usize>(
     barrier(comm);
     for _ in 0..times {
         let displacement = &mut simulation.fields.displacement;
-        simulation
-            .forces
-            .update_ghost_displacements(comm, displacement);
+        let mut columns = displacement.each_mut().map(Vec::as_mut_slice);
+        simulation.forces.update_ghosts(comm, &mut columns);
     }
     since(before, simulation.forces.halo().sent)
 }

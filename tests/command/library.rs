@@ -3,15 +3,18 @@
 use std::path::Path;
 use std::time::Duration;
 
+use crate::support;
 use crate::support::command::{Folder, fissure, succeed};
 use crate::support::datasets::{datasets, difference};
 use fissure::comm::threads;
 use fissure::error::ErrorKind;
+use fissure::expression::Expression;
 use fissure::output::ResultReader;
-use fissure::problem::{Interval, Problem, StepRule};
+use fissure::problem::{Interval, Problem, Selector, StepRule};
 use fissure::run::{
     Existing, Message, Observer, Options, Outcome, Reason, Row, RunState, Unobserved,
 };
+use fissure::solver::Simulation;
 
 #[allow(dead_code, reason = "the test calls what the example's main calls")]
 #[path = "../../examples/problem_in_rust.rs"]
@@ -132,6 +135,28 @@ fn a_plan_built_in_rust_gives_the_bits_of_its_deck() {
     let [by_deck, built] = [outcome, built_outcome].map(|outcome| outcome.last_row.unwrap());
     assert_eq!(by_deck.energies.kinetic, kinetic);
     assert_eq!(built.values, by_deck.values);
+}
+
+#[test]
+fn an_initial_velocity_from_rust_is_that_of_the_deck() {
+    let deck = format!(
+        "{PLATE}
+        set.left.where = 'x < 0.01'
+        initial.push = {{ set = 'left', velocity = ['5', '100*x'] }}"
+    );
+    let mut built = problem_in_rust::plate(3e-5).unwrap();
+    let left = Selector::Where(Expression::of("x < 0.01").unwrap());
+    let left = built.add_set("left", left);
+    let velocity = ["5", "100*x"].map(|text| Expression::of(text).unwrap());
+    built.add_initial_velocity("push", left, velocity.to_vec());
+    let velocities = |problem: &Problem| {
+        let comm = threads::alone();
+        let simulation = Simulation::<2>::new(problem, &comm).unwrap();
+        simulation.fields.velocity.clone()
+    };
+    let expected = velocities(&support::problem(&deck));
+    assert!(expected[0].contains(&5.0));
+    assert_eq!(velocities(&built), expected);
 }
 
 #[test]

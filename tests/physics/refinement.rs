@@ -561,6 +561,42 @@ fn points_are_triggers_only_where_they_may_be() {
     });
 }
 
+#[test]
+fn a_trigger_refines_the_next_body_too_on_any_number_of_ranks() {
+    // No bonds join the two bodies. The trigger is in the left body, and its horizon reaches into the right
+    // body.
+    let text = "dimension = 'plane-stress'
+        thickness = 1e-3
+        parameters.dx = 1e-3
+        grid = { spacing = 'dx', horizon = '3*dx' }
+        material.glass.pmb = { density = 2440, youngs_modulus = 72e9 }
+        body.left = { material = 'glass', shape.box = { lower = [0, 0], upper = [12e-3, 16e-3] } }
+        body.right = { material = 'glass', shape.box = { lower = [12e-3, 0], upper = [24e-3, 16e-3] } }
+        interface.rule = 'none'
+        refinement.levels = 1
+        refinement.trigger = { where = 'x > 11*dx && x < 12*dx', every_steps = 1, coarsen_after = 1e-7 }
+        time = { end = 1e-5, step = 2e-8 }
+        ";
+    let points = |ranks: usize| {
+        let found = simulate_on::<2, _>(ranks, text, |mut simulation| {
+            assert!(simulation.refine().unwrap().is_some());
+            let model = &simulation.model;
+            let point = |k: usize| (model.ids[k], model.position(k).map(f64::to_bits));
+            (0..model.owned()).map(point).collect::<Vec<_>>()
+        });
+        let mut all = found.concat();
+        all.sort_unstable();
+        all
+    };
+    let expected = points(1);
+    let is_right = |(_, [x, ..]): &&(u64, [u64; 3])| f64::from_bits(*x) > 12e-3;
+    let right = expected.iter().filter(is_right).count();
+    assert!(right > 12 * 16, "{right}");
+    for ranks in 2..=4 {
+        assert!(points(ranks) == expected, "on {ranks} ranks");
+    }
+}
+
 /// Return the deck of a plate that is refined twice by the trigger in `more`.
 fn passing(more: &str) -> String {
     format!(

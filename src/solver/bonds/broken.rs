@@ -81,6 +81,30 @@ impl<const D: usize> Forces<D> {
         mut acting: Acting<'_, D>,
         times: &mut ForceTimes,
     ) {
+        self.merge_broken();
+        if self.numbers.passes == 0 || !self.breaks {
+            return;
+        }
+        let mut whole = [f64::from(u8::from(self.broken.is_empty()))];
+        comm::min(comm, &mut whole);
+        if whole[0] > 0.0 {
+            return;
+        }
+        let start = Instant::now();
+        let halo_before = times.halo;
+        let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
+        let affected = self.ranges(own.iter().copied());
+        self.find_numbers(&affected, model, &mut acting);
+        let changed = self.send_numbers(comm, model, own, times);
+        for points in self.ranges(changed.into_iter()) {
+            self.find_forces(points, acting.force);
+        }
+        self.merge_broken();
+        times.bonds += start.elapsed() - (times.halo - halo_before);
+    }
+
+    /// Sort the entries of [`Self::broken`] by point, and merge the entries of the same point.
+    fn merge_broken(&mut self) {
         self.broken.sort_by_key(|broken| broken.point);
         self.broken.dedup_by(|later, first| {
             let same = later.point == first.point;
@@ -94,47 +118,38 @@ impl<const D: usize> Forces<D> {
             }
             same
         });
-        if self.numbers.passes == 0 || !self.breaks {
-            return;
-        }
-        let mut whole = [f64::from(u8::from(self.broken.is_empty()))];
-        comm::min(comm, &mut whole);
-        if whole[0] > 0.0 {
-            return;
-        }
-        let start = Instant::now();
-        let halo_before = times.halo;
-        let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
-        for points in self.ranges(own.iter().copied()) {
-            self.find_numbers(points, model, &mut acting);
-        }
-        let changed = self.send_numbers(comm, model, own, times);
-        for points in self.ranges(changed.into_iter()) {
-            self.find_forces(points, acting.force);
-        }
-        times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Recompute the point numbers of a range of points. Record the energy that points with broken bonds lose
+    /// Recompute the point numbers of ranges of points. Record the energy that points with broken bonds lose
     /// by this change. The energy that plastic flow dissipates is not included.
-    fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, acting: &mut Acting<'_, D>) {
+    fn find_numbers(
+        &mut self,
+        ranges: &[Range<usize>],
+        model: &Model<D>,
+        acting: &mut Acting<'_, D>,
+    ) {
         // The plastic states of the points have already advanced to the end of the step.
         let bond_update = BondUpdate::Step(0.0);
         let Acting { force, plastic, .. } = acting;
-        let before = self.energy_with_plastic_work(model, points.clone(), plastic);
+        let before: Vec<Vec<f64>> = ranges
+            .iter()
+            .map(|points| self.energy_with_plastic_work(model, points.clone(), plastic))
+            .collect();
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
-            if pass != Pass::PointSum(0) {
-                self.update(HaloContent::OwnNumbers, Which::Owned);
+            for points in ranges {
+                self.clear(pass, points.clone());
+                self.run(pass, points.clone(), force, BondUpdate::None);
+                self.finish(pass, points.clone(), model, bond_update, plastic);
             }
-            self.clear(pass, points.clone());
-            self.run(pass, points.clone(), force, BondUpdate::None);
-            self.finish(pass, points.clone(), model, bond_update, plastic);
+            // Lattice bonds read copies of the point numbers in the grids, so update these copies. One update
+            // for all ranges is enough, because a point sum reads the point numbers of point i only.
+            self.update(HaloContent::OwnNumbers, Which::Owned);
         }
-        // Lattice bonds read copies of the point numbers in the grids, so update these copies.
-        self.update(HaloContent::OwnNumbers, Which::Owned);
-        let after = self.energy_with_plastic_work(model, points.clone(), plastic);
-        for broken in &mut self.broken {
-            if points.contains(&broken.point) {
+        for (points, before) in ranges.iter().zip(before) {
+            let after = self.energy_with_plastic_work(model, points.clone(), plastic);
+            let first = (self.broken).partition_point(|broken| broken.point < points.start);
+            let of_range = self.broken[first..].iter_mut();
+            for broken in of_range.take_while(|broken| broken.point < points.end) {
                 let k = broken.point - points.start;
                 broken.energy += model.volume[broken.point] * (before[k] - after[k]);
             }
@@ -181,7 +196,8 @@ impl<const D: usize> Forces<D> {
         halo.update_ghosts(comm, &mut columns.collect::<Vec<_>>());
         self.halo = halo;
         times.halo += start.elapsed();
-        self.update(HaloContent::PointNumbers, Which::All);
+        // `find_numbers` has already updated the copies of owned points.
+        self.update(HaloContent::PointNumbers, Which::Ghosts);
         let mut changed = own.clone();
         for interaction in &self.interactions {
             for point in &own {
@@ -198,8 +214,8 @@ impl<const D: usize> Forces<D> {
         changed
     }
 
-    /// Recompute the forces on a range of points, and record the changes of the force densities as lost
-    /// forces.
+    /// Recompute the forces on a range of points. Append the changes of the force densities to
+    /// [`Self::broken`], as lost forces. The new entries are not yet merged with the other entries.
     fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
         let before = force
             .each_ref()
@@ -213,19 +229,11 @@ impl<const D: usize> Forces<D> {
             if lost == [0.0; D] {
                 continue;
             }
-            let place = match self
-                .broken
-                .binary_search_by_key(&point, |broken| broken.point)
-            {
-                Ok(place) => place,
-                Err(place) => {
-                    self.broken.insert(place, Broken::none(point));
-                    place
-                }
-            };
+            let mut broken = Broken::none(point);
             for d in 0..D {
-                self.broken[place].force[d] += lost[d];
+                broken.force[d] += lost[d];
             }
+            self.broken.push(broken);
         }
     }
 

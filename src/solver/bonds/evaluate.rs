@@ -21,7 +21,7 @@ use super::point_numbers::PlasticColumns;
 use super::point_stresses::StressInputs;
 use super::point_sums::{PassSum, SmallestStretch};
 use super::sweep::{PointData, sweep, sweep_and_break};
-use super::{Forces, Pass};
+use super::{Forces, Pass, threshold};
 
 /// Number of points that one task processes.
 const CHUNK: usize = 4096;
@@ -229,22 +229,21 @@ impl<const D: usize> Forces<D> {
 
     /// Return the name and the number of columns of each halo exchange of a force evaluation. If bonds break,
     /// the point numbers are sent a second time. The result does not contain this second exchange.
-    pub fn halo_sizes(&mut self, is_thermal: bool) -> Vec<(&'static str, usize)> {
-        let mut thermal_stretch = Vec::new();
+    pub fn halo_sizes(&mut self) -> Vec<(&'static str, usize)> {
         let mut sizes = Vec::new();
         for pass_index in 0..self.passes.len() {
-            let name = match self.content(pass_index) {
-                HaloContent::Motion if is_thermal => "displacements and thermal stretches",
-                HaloContent::Motion => "displacements",
-                HaloContent::Thresholds => "thresholds",
-                HaloContent::PointNumbers => "point numbers, rotations and stresses",
+            sizes.push(match self.content(pass_index) {
+                HaloContent::Motion if self.is_thermal => {
+                    ("displacements and thermal stretches", D + 1)
+                }
+                HaloContent::Motion => ("displacements", D),
+                HaloContent::Thresholds => ("thresholds", 1),
+                HaloContent::PointNumbers => {
+                    let (_, count) = self.changing_columns();
+                    ("point numbers, rotations and stresses", count)
+                }
                 HaloContent::OwnNumbers | HaloContent::None => continue,
-            };
-            let mut displacement = [const { Vec::new() }; D];
-            let thermal_stretch = is_thermal.then_some(&mut thermal_stretch[..]);
-            let (_, columns) =
-                self.halo_columns(self.content(pass_index), &mut displacement, thermal_stretch);
-            sizes.push((name, columns));
+            });
         }
         sizes
     }
@@ -404,10 +403,7 @@ impl<const D: usize> Forces<D> {
                         } else {
                             stretch_of(*value)
                         };
-                        let damage = blocks[usize::from(model.block[point])].damage;
-                        let strength = strength.get(point).copied().unwrap_or(1.0);
-                        *value =
-                            damage.map_or(f64::INFINITY, |law| law.threshold(strength, smallest));
+                        *value = threshold(blocks, model, strength, point, smallest);
                     });
             }
             Pass::PointSum(number) => {

@@ -116,6 +116,21 @@ fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64>
     (0..model.owned()).into_par_iter().map(strength).collect()
 }
 
+/// Threshold of an owned point with this smallest stretch, see
+/// [`DamageLaw::threshold`](crate::damage::DamageLaw::threshold); ∞ for a block without a damage law.
+/// `strengths` are the strengths f of the points.
+fn threshold<const D: usize>(
+    blocks: &[BlockLaws],
+    model: &Model<D>,
+    strengths: &[f64],
+    point: usize,
+    smallest: f64,
+) -> f64 {
+    let damage = blocks[usize::from(model.block[point])].damage;
+    let strength = strengths.get(point).copied().unwrap_or(1.0);
+    damage.map_or(f64::INFINITY, |law| law.threshold(strength, smallest))
+}
+
 /// The bonds of a rank and the data for sums over them.
 pub struct Forces<const D: usize> {
     interactions: Vec<Interaction>,
@@ -274,10 +289,7 @@ impl<const D: usize> Forces<D> {
             ..
         } = self;
         for point in 0..model.owned() {
-            let damage = blocks[usize::from(model.block[point])].damage;
-            let strength = strength.get(point).copied().unwrap_or(1.0);
-            limits.thresholds[point] =
-                damage.map_or(f64::INFINITY, |law| law.threshold(strength, 0.0));
+            limits.thresholds[point] = threshold(blocks, model, strength, point, 0.0);
         }
         halo.update_ghosts(comm, &mut [&mut limits.thresholds[..]]);
         for grid in grids {
@@ -414,24 +426,9 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Exchange the ghost values of a column. The column has one value per local point. Collective.
-    pub fn update_ghosts_of(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
-        self.halo.update_ghosts(comm, &mut [values]);
-    }
-
-    /// Exchange the ghost values of several columns. Each column has one value per local point. Collective.
-    pub fn update_ghosts_of_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
+    /// Exchange the ghost values of columns. Each column has one value per local point. Collective.
+    pub fn update_ghosts(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
         self.halo.update_ghosts(comm, columns);
-    }
-
-    /// Exchange the displacements of the ghosts. Collective.
-    pub fn update_ghost_displacements(
-        &mut self,
-        comm: &dyn Communicator,
-        displacement: &mut [Vec<f64>; D],
-    ) {
-        let mut components = displacement.each_mut().map(Vec::as_mut_slice);
-        self.halo.update_ghosts(comm, &mut components);
     }
 
     /// Make a bond unbreakable if `between` is true for its two blocks and `protected` is 1 at one of its
@@ -444,7 +441,7 @@ impl<const D: usize> Forces<D> {
         protected: &mut [f64],
         between: impl Fn([usize; 2]) -> bool,
     ) {
-        self.update_ghosts_of(comm, protected);
+        self.update_ghosts(comm, &mut [&mut *protected]);
         let mut in_block = vec![0.0_f64; self.blocks.len()];
         for (block, protected) in block.iter().zip(&*protected) {
             let most = &mut in_block[usize::from(*block)];

@@ -317,7 +317,7 @@ impl<const D: usize> Contact<D> {
         }
         (self.active, self.sums) = (active, sums);
         if let Some(end) = end {
-            self.close_step(comm, model, fields, largest, end);
+            self.close_step(comm, model, fields, largest, (end, look_ahead));
         }
     }
 
@@ -353,14 +353,15 @@ impl<const D: usize> Contact<D> {
 
     /// Sum the forces of points on rigid bodies, finish the step of the bodies, and compute the step limits
     /// of contact. `largest` contains the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned points, see
-    /// [`StepDemand`], and their largest [`PointSum::depth`]. Collective.
+    /// [`StepDemand`], and their largest [`PointSum::depth`]. `look_ahead` is the look-ahead with which
+    /// [`Self::find_active`] found the points at the bodies, s. Collective.
     fn close_step(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
         fields: &Fields<D>,
         mut largest: [f64; 3],
-        end: StepEnd,
+        (end, look_ahead): (StepEnd, f64),
     ) {
         if self.rigid.is_empty() {
             comm.max(&mut largest);
@@ -380,7 +381,7 @@ impl<const D: usize> Contact<D> {
                 if let Some(touch) = rigid.touch(block, &point) {
                     rigid.add_opposite(&mut wrench, point.position(), &touch);
                 }
-                if let Some(demand) = rigid.demand(block, &point, LOOK_AHEAD * end.longest) {
+                if let Some(demand) = rigid.demand(block, &point, look_ahead) {
                     *reach = reach.max(rigid.arm(point.position()));
                     demands[0].add(demand.stiffness);
                     demands[1].add(demand.damping);

@@ -133,7 +133,7 @@ impl CrackSurface {
         let mut columns = gradient.each_mut().map(|column| &mut column[..]);
         simulation
             .forces
-            .update_ghosts_of_all(simulation.comm, &mut columns);
+            .update_ghosts(simulation.comm, &mut columns);
         let gradient = |point: usize| Vector::from_fn(|d, _| gradient[d][point]);
         let (model, comm) = (&simulation.model, simulation.comm);
         let places: Vec<[f64; 3]> = damaged.iter().map(|point| model.position(*point)).collect();
@@ -215,7 +215,7 @@ impl CrackSurface {
         }
         simulation
             .forces
-            .update_ghosts_of(simulation.comm, &mut damage);
+            .update_ghosts(simulation.comm, &mut [&mut damage]);
         let in_set = |damage: f64| (!damage.is_nan()).then_some(damage);
         damage.into_iter().map(in_set).collect()
     }

@@ -93,7 +93,7 @@ impl JIntegrals {
                     column[point] = (0..D).map(|k| gradient[(d, k)] * direction[k]).sum();
                 }
             }
-            forces.update_ghosts_of_all(comm, &mut rate.each_mut().map(|column| &mut column[..]));
+            forces.update_ghosts(comm, &mut rate.each_mut().map(|column| &mut column[..]));
             forces.energy_rate(model.owned(), rate)
         });
         let energy_rates: Vec<Vec<f64>> = energy_rates.collect();

@@ -24,7 +24,7 @@ impl Facets {
         let model = &simulation.model;
         let mut blocks: Vec<f64> = model.block.iter().map(|block| f64::from(*block)).collect();
         blocks.resize(model.volume.len(), 0.0);
-        simulation.forces.update_ghosts_of(comm, &mut blocks);
+        simulation.forces.update_ghosts(comm, &mut [&mut blocks]);
         let mut own: Vec<Facet> = Vec::new();
         simulation.forces.for_each_broken(|here, there| {
             if model.ids[here] > model.ids[there] {

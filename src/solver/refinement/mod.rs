@@ -118,8 +118,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
             return Ok(None);
         };
         let start = Instant::now();
-        let snapshot = Snapshot::new(self);
+        let snapshot = if trigger.energy.is_some() {
+            Snapshot::new(self)
+        } else {
+            Snapshot::without_energies(self)
+        };
         let wanted = self.wanted(trigger, &snapshot);
+        drop(snapshot);
         if wanted.finer.is_empty() && wanted.coarser.is_empty() {
             return Ok(None);
         }
@@ -135,12 +140,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 facets.lie_between(&facets.near(a), a, b)
             });
         }
-        let (energy, bonds) = self.energy_and_bonds(&snapshot);
-        drop(snapshot);
+        let (energy, bonds) = self.energy_and_bonds();
         let before = self.model.total;
         self.regrid(grids, &removed, &facets)?;
-        let snapshot = Snapshot::new(self);
-        let (new_energy, new_bonds) = self.energy_and_bonds(&snapshot);
+        let (new_energy, new_bonds) = self.energy_and_bonds();
         self.progress.refined.energy += new_energy - energy;
         self.progress.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
@@ -153,8 +156,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Sum kinetic and strain energy (J) over all ranks, and count the intact bonds; each bond counts twice.
     /// Collective.
-    fn energy_and_bonds(&self, snapshot: &Snapshot) -> (f64, u64) {
-        let sums = point_sums(self, snapshot);
+    fn energy_and_bonds(&mut self) -> (f64, u64) {
+        let snapshot = Snapshot::new(self);
+        let sums = point_sums(self, &snapshot);
         // Both energies are in one sum, which is rounded once.
         let mut energy = [sums[0].clone()];
         energy[0].merge(&sums[1]);
@@ -186,9 +190,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let broken = order.spread_ragged(comm, &broken, &own_lengths, &lengths);
         other.inherit(&rows, width, (&own_lengths, &broken), facets);
         other.take_rows(&rows, width);
-        let steps = std::mem::take(&mut other.stages.steps);
         other.continue_from(&self.progress_words());
-        other.stages.steps = steps;
         other.take_over(self);
         let (time, rule) = (other.clock.time(), other.time_rule());
         if let StepRule::Automatic(safety) = rule.step {
@@ -296,7 +298,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .collect();
         for column in [&mut was, &mut same] {
             column.resize(model.volume.len(), 0.0);
-            self.forces.update_ghosts_of(self.comm, column);
+            self.forces.update_ghosts(self.comm, &mut [column]);
         }
         let ends = lengths.iter().scan(0, |end, length| {
             *end += *length as usize;

@@ -54,7 +54,7 @@ impl Past {
         births.push(Birth::FoundAnew);
         for column in &mut columns {
             column.resize(local, 0.0);
-            simulation.forces.update_ghosts_of(comm, column);
+            simulation.forces.update_ghosts(comm, &mut [column]);
         }
         // The parents of new and removed points lie in level-0 cells in which the grid differs from an
         // unrefined grid, before or after the refinement.
@@ -127,10 +127,10 @@ impl Past {
                 for ((value, gain), volume) in column.iter_mut().zip(gain).zip(&grown) {
                     *value += gain / volume;
                 }
-                simulation.forces.update_ghosts_of(comm, column);
+                simulation.forces.update_ghosts(comm, &mut [column]);
             }
             volume = grown;
-            simulation.forces.update_ghosts_of(comm, &mut volume);
+            simulation.forces.update_ghosts(comm, &mut [&mut volume]);
         }
         for [body, _, x, y, z] in removed {
             if let Some(point) = self.at.get(&(*body as usize, [*x, *y, *z])) {

@@ -9,11 +9,9 @@ use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
-/// Message to all ranks: a point that triggers refinement or has broken bonds. Points within the horizon of a
+/// An owned point or ghost that triggers refinement or has broken bonds. Points within the horizon of a
 /// triggering point are refined. Points within the horizon of a triggering point, or of a point with broken
 /// bonds, are not coarsened.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
 struct Source {
     position: [f64; 3],
     horizon: f64,
@@ -134,17 +132,20 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// point that meets the condition of [`Trigger::coarsen_after`], select the node to coarsen. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
+        let sources = self.sources(&triggers);
         let pick = |block, position| self.grids.refining(block, position);
         // Without coarsening, points that cannot be refined further are not checked.
         let matters =
             |block, position| trigger.coarsen_after.is_some() || pick(block, position).is_some();
-        let near_trigger = self.near_any(&self.sources(|point| triggers[point]), matters);
+        let near_trigger = self.near_any(&sources, matters);
         let finer = self.picks(&near_trigger, pick);
         let mut coarser = Vec::new();
         if let Some(limit) = trigger.coarsen_after {
             let is_damaged =
                 |point| snapshot.damage(&self.undeformed.family_volume, point) > LEAST_DAMAGE;
-            let near_damage = self.near_any(&self.sources(is_damaged), |_, _| true);
+            let damaged: Vec<bool> = (0..self.model.owned()).map(is_damaged).collect();
+            let sources = self.sources(&damaged);
+            let near_damage = self.near_any(&sources, |_, _| true);
             let now = self.clock.time();
             let last = self.fields.last_seen.iter_mut().flatten();
             let to_coarsen = last.zip(near_trigger.iter().zip(near_damage)).map(
@@ -179,14 +180,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Mark the owned points that trigger refinement. Collective.
     fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
-        let mut most = [0.0_f64];
-        for energy in &snapshot.stored.energy {
-            most[0] = most[0].max(*energy);
-        }
-        self.comm.max(&mut most);
-        let least = trigger
-            .energy
-            .map_or(f64::INFINITY, |share| share * most[0]);
+        let least_energy = trigger.energy.map(|share| {
+            let mut most = [0.0_f64];
+            for energy in &snapshot.stored.energy {
+                most[0] = most[0].max(*energy);
+            }
+            self.comm.max(&mut most);
+            share * most[0]
+        });
         let time = self.clock.time();
         let holds = |condition: &Expression, point| condition.is_true(model.position(point), time);
         let is_trigger = |point: usize| {
@@ -197,26 +198,39 @@ impl<'a, const D: usize> Simulation<'a, D> {
             {
                 return false;
             }
-            let energy = snapshot.stored.energy[point];
+            let has_energy = |least: f64| {
+                let energy = snapshot.stored.energy[point];
+                energy >= least && energy > 0.0
+            };
             let damage = || snapshot.damage(&self.undeformed.family_volume, point);
-            energy >= least && energy > 0.0
+            least_energy.is_some_and(has_energy)
                 || trigger.damage.is_some_and(|least| damage() >= least)
                 || (trigger.condition.as_ref()).is_some_and(|condition| holds(condition, point))
         };
         (0..model.owned()).map(is_trigger).collect()
     }
 
-    /// Collect the marked points of all ranks with their horizons. Collective.
-    fn sources(&self, marked: impl Fn(usize) -> bool) -> Vec<Source> {
+    /// Collect the marked points among the local points, with their horizons. `marked` has an entry for each
+    /// owned point. A rank has all points within the length of the longest bond from its owned points, so the
+    /// result contains every source whose horizon includes an owned point. Collective.
+    fn sources(&mut self, marked: &[bool]) -> Vec<Source> {
         let model = &self.model;
-        let own = (0..model.owned()).filter(|point| marked(*point));
-        let own: Vec<Source> = own
-            .map(|point| Source {
-                position: model.position(point),
-                horizon: self.problem.block(usize::from(model.block[point])).horizon,
+        // 0 for points that are not marked.
+        let mut horizons = vec![0.0; model.volume.len()];
+        for (point, horizon) in horizons[..model.owned()].iter_mut().enumerate() {
+            if marked[point] {
+                *horizon = self.problem.block(usize::from(model.block[point])).horizon;
+            }
+        }
+        self.forces.update_ghosts(self.comm, &mut [&mut horizons]);
+        let sources = horizons.into_iter().enumerate();
+        let sources = sources.filter(|(_, horizon)| *horizon > 0.0);
+        sources
+            .map(|(point, horizon)| Source {
+                position: self.model.position(point),
+                horizon,
             })
-            .collect();
-        all_gather_many(self.comm, &own)
+            .collect()
     }
 
     /// Mark the owned points within the horizon of a source. Only points for which `matters(block, position)`
