@@ -109,6 +109,8 @@ pub struct Times {
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
+    /// Index of the stage. At the end of a stage, it is this stage and not the next one.
+    stage: usize,
     time: f64,
     id: u64,
     block: u16,
@@ -217,7 +219,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(density) = &mut fields.fictitious_density {
             *density = fictitious_density(&stiffness);
         }
-        are_finite(problem, comm, &model, 0.0)?;
+        are_finite(problem, comm, &model, (0, 0.0))?;
         let intact_at_start = starts_deformed(problem).then(|| {
             let mut intact = 0;
             forces.for_each_intact(|_, _| intact += 1);
@@ -517,7 +519,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Return the point with the smallest id among the owned points whose motion, force or reaction is not
-    /// finite. The step and the time of the returned [`BadPoint`] are those of `clock`.
+    /// finite. The step and the time of the returned [`BadPoint`] are those of `clock`, in the present stage.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -535,6 +537,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .min_by_key(|k| self.model.ids[*k])
             .map(|index| BadPoint {
                 step: clock.number(),
+                stage: self.progress.stage,
                 time: clock.time(),
                 id: self.model.ids[index],
                 block: self.model.block[index],
@@ -553,16 +556,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
     ///   is one.
     pub fn check(&mut self) -> Result<()> {
-        let mut earliest = self
-            .bad
-            .map_or([f64::MAX; 2], |bad| [bad.step as f64, bad.time]);
+        let mut earliest = self.bad.map_or([f64::MAX; 3], |bad| {
+            [bad.step as f64, bad.stage as f64, bad.time]
+        });
         comm::min(self.comm, &mut earliest);
-        let [step, time] = earliest;
+        let [step, stage, time] = earliest;
         if step == f64::MAX {
             self.check_rigid()?;
             return self.check_equilibrium();
         }
-        let valued = are_finite(self.problem, self.comm, &self.model, time);
+        let place = (stage as usize, time);
+        let valued = are_finite(self.problem, self.comm, &self.model, place);
         valued.map_err(|error| Error {
             kind: ErrorKind::Run,
             ..error
