@@ -95,13 +95,42 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration and conditions. This includes the time to copy displacements and thermal stretches for
-    /// the bond passes.
+    /// The rest of the steps: integration, conditions, and the solution of load steps. This includes the time
+    /// to copy displacements and thermal stretches for the bond passes.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
     /// Refinement of grids, and rebalancing.
     pub regridding: Duration,
+}
+
+/// Start of a phase, see [`Times::start`].
+pub(super) struct PhaseStart {
+    start: Instant,
+    /// Time of all phases of the time loop at the start.
+    counted: Duration,
+}
+
+impl Times {
+    /// Start a phase that may contain other phases, such as motion with force evaluations.
+    pub(super) fn start(&self) -> PhaseStart {
+        PhaseStart {
+            start: Instant::now(),
+            counted: self.counted(),
+        }
+    }
+
+    /// Time since the start of a phase, without the phases that have been counted since. Therefore no time
+    /// counts twice.
+    pub(super) fn since(&self, phase: &PhaseStart) -> Duration {
+        let others = self.counted() - phase.counted;
+        phase.start.elapsed().saturating_sub(others)
+    }
+
+    /// Time of all phases of the time loop.
+    fn counted(&self) -> Duration {
+        self.forces.whole() + self.contact + self.motion + self.regridding
+    }
 }
 
 /// The first point of this rank whose motion, force or reaction is not finite. If several points are found at
@@ -293,6 +322,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// must still be applied. This argument must be false if a stage begins or if contact changes the step.
     /// Returns whether the second half kick of this step must still be applied. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
+        let start = self.times.start();
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
@@ -305,12 +335,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let is_pending = integrator.advance(self, half_kick_pending);
         self.integrator = Some(integrator);
         self.progress.newton.evaluations += self.times.evaluations - evaluations;
+        let motion = self.times.since(&start);
+        self.times.motion += motion;
         is_pending
     }
 
     /// Apply the second half kick of the step that ends at the present time.
     pub(super) fn kick(&mut self) {
-        let start = Instant::now();
+        let start = self.times.start();
         let (clock, work) = (self.clock, self.work_formula());
         self.set_second_half(&clock);
         let finite = self
@@ -318,13 +350,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if !finite {
             self.note_bad(&clock);
         }
-        self.times.motion += start.elapsed();
+        let motion = self.times.since(&start);
+        self.times.motion += motion;
     }
 
     /// Make one explicit step without its second half kick. If the second half kick of the previous step is
     /// pending, apply that half kick first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
-        let start = Instant::now();
         let (before, work) = (self.clock, self.work_formula());
         let step = before.step();
         if half_kick_pending {
@@ -354,7 +386,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if !finite {
             self.note_bad(&before);
         }
-        self.times.motion += start.elapsed();
         self.evaluate_at_bond_inputs(BondUpdate::Step(step));
     }
 

@@ -9,7 +9,6 @@
 //! separates.
 
 use std::cell::OnceCell;
-use std::time::Instant;
 
 use crate::comm::sum::reduce;
 use crate::comm::{self, IdOrder};
@@ -117,7 +116,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
         };
-        let start = Instant::now();
+        let start = self.times.start();
         let snapshot = Snapshot::new(self);
         let wanted = self.wanted(trigger, &snapshot);
         if wanted.finer.is_empty() && wanted.coarser.is_empty() {
@@ -143,7 +142,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (new_energy, new_bonds) = self.energy_and_bonds(&snapshot);
         self.progress.refined.energy += new_energy - energy;
         self.progress.refined.bonds += new_bonds as i64 - bonds as i64;
-        self.times.regridding += start.elapsed();
+        let regridding = self.times.since(&start);
+        self.times.regridding += regridding;
         let removed = removed.len() as u64;
         Ok(Some(Regridded {
             created: self.model.total + removed - before,
