@@ -4,7 +4,9 @@
 //! converts the span to file, line and column.
 
 use std::fmt;
+use std::io;
 use std::ops::Range;
+use std::path::Path;
 
 /// Category of an error; sets the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +89,11 @@ impl Error {
     /// Create an error of the kind [`ErrorKind::Stopped`].
     pub fn stopped(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Stopped, message)
+    }
+
+    /// Create the error of a failed file operation. `doing` is the operation, such as `read`.
+    pub fn file(path: &Path, doing: &str, error: &io::Error) -> Self {
+        Self::run(format!("cannot {doing} {}: {error}", path.display()))
     }
 
     /// Return the error with a span in the deck.

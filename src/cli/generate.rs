@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, ValueEnum};
 use clap_complete::Shell;
 use fissure::deck;
-use fissure::error::Result;
+use fissure::error::{Error, Result};
 
-use super::{CommandLine, Verbosity, file_error, outln, print};
+use super::{CommandLine, Verbosity, outln, print};
 
 /// Print the JSON Schema of decks, which lets editors complete keys and mark errors.
 #[derive(Args)]
@@ -98,7 +98,7 @@ pub fn man(arguments: &ManArguments, verbosity: Verbosity) -> Result<()> {
     let folder = &arguments.folder;
     let written = std::fs::create_dir_all(folder)
         .and_then(|()| clap_mangen::generate_to(CommandLine::command(), folder));
-    written.map_err(|error| file_error(folder, "write the man pages to", &error))?;
+    written.map_err(|error| Error::file(folder, "write the man pages to", &error))?;
     if verbosity > Verbosity::Quiet {
         outln!(
             "wrote fissure.1 and a page of each command to {}",

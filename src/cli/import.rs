@@ -9,7 +9,7 @@ use fissure::error::{Error, Result};
 use fissure::import::log::Fate;
 use fissure::import::{self, Code};
 
-use super::{Verbosity, errln, file_error, outln};
+use super::{Verbosity, errln, outln};
 
 /// Translate a deck of Peridigm, PeriLab or LAMMPS.
 ///
@@ -102,10 +102,10 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     let mut file = match options.open(&target) {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(exists()),
-        Err(error) => return Err(file_error(&target, "create", &error)),
+        Err(error) => return Err(Error::file(&target, "create", &error)),
     };
     file.write_all(imported.text.as_bytes())
-        .map_err(|error| file_error(&target, "write", &error))?;
+        .map_err(|error| Error::file(&target, "write", &error))?;
     if verbosity == Verbosity::Quiet {
         return Ok(());
     }

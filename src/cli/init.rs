@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use fissure::deck;
 use fissure::error::{Error, Result};
 
-use super::{Verbosity, file_error, outln};
+use super::{Verbosity, outln};
 
 /// Write a commented example deck.
 #[derive(Args)]
@@ -131,8 +131,8 @@ fn write_new(path: &Path, text: &str) -> Result<()> {
     let mut file = match OpenOptions::new().write(true).create_new(true).open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(exists(path)),
-        Err(error) => return Err(file_error(path, "create", &error)),
+        Err(error) => return Err(Error::file(path, "create", &error)),
     };
     file.write_all(text.as_bytes())
-        .map_err(|error| file_error(path, "write", &error))
+        .map_err(|error| Error::file(path, "write", &error))
 }

@@ -412,8 +412,3 @@ fn without_output(path: &Path) -> Error {
         path.display()
     ))
 }
-
-/// Return the error of a failed file operation. `doing` is the operation, such as `read`.
-fn file_error(path: &std::path::Path, doing: &str, error: &std::io::Error) -> Error {
-    Error::run(format!("cannot {doing} {}: {error}", path.display()))
-}

@@ -13,7 +13,7 @@ use super::plot::limits::Frame;
 use super::plot::painter::Painter;
 use super::plot::picture::{PictureArguments, beside, nothing_to_draw};
 use super::progress::Progress;
-use super::{Verbosity, file_error, outln, result_file, without_output};
+use super::{Verbosity, outln, result_file, without_output};
 
 /// Draw a field over time as an animated PNG, for browsers and presentations.
 ///
@@ -96,25 +96,25 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
         Some(_) => None,
         None => {
             let film = Film::create(&path, &draw(chosen[0])?, count as u32, arguments.rate);
-            Some(film.map_err(|error| file_error(&path, "write", &error))?)
+            Some(film.map_err(|error| Error::file(&path, "write", &error))?)
         }
     };
     for (number, index) in chosen.iter().enumerate() {
         let image = draw(*index)?;
         if let Some(film) = &mut film {
             let written = film.append(&image);
-            written.map_err(|error| file_error(&path, "write", &error))?;
+            written.map_err(|error| Error::file(&path, "write", &error))?;
         }
         if let Some(folder) = &arguments.frames {
             let path = folder.join(format!("frame_{number:04}.png"));
             let written = image.write_png(&path);
-            written.map_err(|error| file_error(&path, "write", &error))?;
+            written.map_err(|error| Error::file(&path, "write", &error))?;
         }
         progress.update(count + number as u64 + 1, 2 * count, times[*index]);
     }
     if let Some(film) = film {
         let written = film.finish();
-        written.map_err(|error| file_error(&path, "write", &error))?;
+        written.map_err(|error| Error::file(&path, "write", &error))?;
     }
     progress.finish(true);
     if verbosity > Verbosity::Quiet {
@@ -133,7 +133,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
 /// Create the folder of the frames; an existing folder must be empty.
 fn create_folder(folder: &Path) -> Result<()> {
     let created = std::fs::create_dir_all(folder).and_then(|()| std::fs::read_dir(folder));
-    let mut entries = created.map_err(|error| file_error(folder, "create", &error))?;
+    let mut entries = created.map_err(|error| Error::file(folder, "create", &error))?;
     if entries.next().is_some() {
         return Err(Error::input(format!(
             "--frames {}: the folder is not empty; name a new one",

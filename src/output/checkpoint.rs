@@ -143,8 +143,7 @@ impl Checkpoints {
             let path = self.folder.join(name);
             match std::fs::remove_file(&path) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                    let path = path.display();
-                    return Err(Error::run(format!("cannot remove {path}: {error}")));
+                    return Err(Error::file(&path, "remove", &error));
                 }
                 _ => {}
             }

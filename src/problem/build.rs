@@ -1,10 +1,10 @@
 //! Problems that are built in Rust, without a deck.
 
 use super::{
-    Action, Body, CheckpointRule, Condition, Crack, DEFAULT_DAMAGE_THRESHOLD, DEFAULT_FIELDS,
-    Damage, DamageRule, FamilyRule, History, Initial, Interface, InterfaceRule, Interval, Law,
-    Material, Method, OUTPUTS, Output, PointSource, PreCrack, Problem, Quadrature, Selector, Set,
-    Shape, Spans, StepRule, ThermalExpansion, Time, Toughness, VolumeCorrection,
+    Action, Body, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule, History,
+    Initial, Interface, InterfaceRule, Interval, Law, Material, Method, OUTPUTS, Output,
+    PointSource, PreCrack, Problem, Quadrature, Selector, Set, Shape, Spans, StepRule,
+    ThermalExpansion, Time, Toughness, VolumeCorrection,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -51,28 +51,11 @@ impl Problem {
             },
             stages: Vec::new(),
             output: Output {
-                name: None,
                 every: Some(Interval::Seconds(end / OUTPUTS)),
-                times: Vec::new(),
-                fields: DEFAULT_FIELDS.to_vec(),
-                single: false,
-                set: None,
+                ..Output::default()
             },
             further_outputs: Vec::new(),
-            history: History {
-                every: None,
-                reactions: Vec::new(),
-                support_forces: Vec::new(),
-                fragments: false,
-                angular_momentum: false,
-                damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
-                statistics: Vec::new(),
-                probes: Vec::new(),
-                fronts: Vec::new(),
-                cracks: Vec::new(),
-                tips: Vec::new(),
-                j_integrals: Vec::new(),
-            },
+            history: History::default(),
             checkpoint: CheckpointRule::default(),
             balance: None,
         }

@@ -58,6 +58,20 @@ pub struct Output {
     pub set: Option<(usize, Range<usize>)>,
 }
 
+impl Default for Output {
+    /// Return a main result with the default fields of all points, without outputs.
+    fn default() -> Self {
+        Self {
+            name: None,
+            every: None,
+            times: Vec::new(),
+            fields: DEFAULT_FIELDS.to_vec(),
+            single: false,
+            set: None,
+        }
+    }
+}
+
 impl Output {
     /// Return the section of this output in the deck, for messages.
     pub fn section(&self) -> String {
@@ -106,6 +120,26 @@ pub struct History {
     pub tips: Vec<Tip>,
     /// J integrals over boxes.
     pub j_integrals: Vec<JIntegral>,
+}
+
+impl Default for History {
+    /// Return a history with the columns that all decks have, and the default interval of rows.
+    fn default() -> Self {
+        Self {
+            every: None,
+            reactions: Vec::new(),
+            support_forces: Vec::new(),
+            fragments: false,
+            angular_momentum: false,
+            damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
+            statistics: Vec::new(),
+            probes: Vec::new(),
+            fronts: Vec::new(),
+            cracks: Vec::new(),
+            tips: Vec::new(),
+            j_integrals: Vec::new(),
+        }
+    }
 }
 
 /// A set whose reaction force is recorded.

@@ -125,9 +125,9 @@ impl Files {
             )));
         }
         fs::create_dir_all(&self.folder)
-            .map_err(|error| file_error(&self.folder, "create the folder", &error))?;
+            .map_err(|error| Error::file(&self.folder, "create the folder", &error))?;
         let path = self.folder.join(".lock");
-        let file = fs::File::create(&path).map_err(|error| file_error(&path, "create", &error))?;
+        let file = fs::File::create(&path).map_err(|error| Error::file(&path, "create", &error))?;
         let begin = Instant::now();
         loop {
             match file.try_lock() {
@@ -171,7 +171,7 @@ impl Files {
         for file in files {
             if is_taken(file) {
                 fs::rename(file, aside(file))
-                    .map_err(|error| file_error(file, "rename", &error))?;
+                    .map_err(|error| Error::file(file, "rename", &error))?;
                 renamed.push(aside(file));
             }
         }
@@ -199,12 +199,8 @@ pub fn crack_table(folder: &Path, crack: &str) -> PathBuf {
 pub fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => {
-            Err(file_error(path, "remove", &error))
+            Err(Error::file(path, "remove", &error))
         }
         _ => Ok(()),
     }
-}
-
-fn file_error(path: &Path, doing: &str, error: &std::io::Error) -> Error {
-    Error::run(format!("cannot {doing} {}: {error}", path.display()))
 }

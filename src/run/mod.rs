@@ -136,7 +136,7 @@ fn run_unlocated(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
-    let calibrated = calibrated(problem)?;
+    let calibrated = agree(comm, calibrated(problem))?;
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
     let files = Files::new(problem, options.folder.clone());

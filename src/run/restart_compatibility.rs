@@ -2,7 +2,7 @@
 
 use crate::deck::{self, Source};
 use crate::error::Result;
-use crate::problem::{Interval, Output, Problem};
+use crate::problem::{History, Output, Problem};
 
 /// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
@@ -32,27 +32,12 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     }
     problem.time.end = 0.0;
     problem.further_outputs.clear();
-    problem.output = Output {
-        name: None,
+    problem.output = Output::default();
+    // The interval of the rows may change without a new result.
+    let history = History {
         every: None,
-        times: Vec::new(),
-        fields: Vec::new(),
-        single: false,
-        set: None,
+        ..std::mem::take(&mut problem.history)
     };
-    problem.history.every = Some(Interval::Steps(1));
-    let history = problem.history.clone();
-    problem.history.reactions.clear();
-    problem.history.support_forces.clear();
-    problem.history.fragments = false;
-    problem.history.angular_momentum = false;
-    problem.history.statistics.clear();
-    problem.history.damage_threshold = 0.0;
-    problem.history.probes.clear();
-    problem.history.fronts.clear();
-    problem.history.cracks.clear();
-    problem.history.tips.clear();
-    problem.history.j_integrals.clear();
     problem.checkpoint = Default::default();
     problem.balance = None;
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")

@@ -61,6 +61,15 @@ impl Signals {
         Ok(signals)
     }
 
+    /// Return signals of which SIGUSR2 has arrived.
+    #[cfg(test)]
+    pub(super) fn requested() -> Self {
+        Self {
+            stop: Arc::default(),
+            request: Arc::new(AtomicBool::new(true)),
+        }
+    }
+
     /// Test whether a stop was requested.
     pub(super) fn stop(&self) -> bool {
         self.stop.load(Ordering::Relaxed)

@@ -24,8 +24,7 @@ const LONGEST_HEADING: u64 = 1 << 20;
 /// If the folder cannot be read.
 pub fn find(problem: &Problem, files: &Files) -> Result<Vec<PathBuf>> {
     let folder = &files.folder;
-    let failed = |error| Error::run(format!("cannot read {}: {error}", folder.display()));
-    let entries = fs::read_dir(folder).map_err(failed)?;
+    let entries = fs::read_dir(folder).map_err(|error| Error::file(folder, "read", &error))?;
     let heading = heading(&files.history).unwrap_or_default();
     let mut paths = Vec::new();
     for path in entries.flatten().map(|entry| entry.path()) {

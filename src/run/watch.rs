@@ -187,12 +187,14 @@ impl<'a> Watch<'a> {
             let reserve = (RESERVED_FRACTION * limit).clamp(MIN_RESERVE, MAX_RESERVE);
             start.elapsed().as_secs_f64() + reserve + 2.0 * self.cost.as_secs_f64() >= limit
         });
+        // The request is taken also if a checkpoint is due, which fulfils the request.
+        let is_requested = self.signals.is_some_and(Signals::take_request);
         let flag = |set: bool| f64::from(u8::from(set));
         let requests = observer.entries();
         let mut votes = [
             flag(self.signals.is_some_and(Signals::stop)),
             flag(late),
-            flag(due || self.signals.is_some_and(Signals::take_request)),
+            flag(is_requested || due),
             per_iteration,
             requests[0],
             requests[1],
@@ -230,4 +232,24 @@ fn slurm_time_left() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
     Some(Duration::from_secs(end).saturating_sub(now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+
+    #[test]
+    fn a_request_when_a_checkpoint_is_due_causes_no_second_checkpoint() {
+        let (comm, signals) = (threads::alone(), Signals::requested());
+        let mut watch = Watch::new(Some(&signals), CheckpointRule::WallClock(0.0), None);
+        let observer = OwnRequests {
+            stop: false,
+            is_wrong: false,
+            factors: 0.0,
+        };
+        assert!(watch.decide(&comm, None, observer).checkpoint);
+        watch.rule = CheckpointRule::WallClock(f64::INFINITY);
+        assert!(!watch.decide(&comm, None, observer).checkpoint);
+    }
 }

@@ -95,8 +95,8 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration and conditions. This includes the time to copy displacements and thermal stretches for
-    /// the bond passes.
+    /// The rest of the steps: integration, conditions, and the solution of load steps. This includes the time
+    /// to copy displacements and thermal stretches for the bond passes.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -104,11 +104,42 @@ pub struct Times {
     pub regridding: Duration,
 }
 
+/// Start of a phase, see [`Times::start`].
+pub(super) struct PhaseStart {
+    start: Instant,
+    /// Time of all phases of the time loop at the start.
+    counted: Duration,
+}
+
+impl Times {
+    /// Start a phase that may contain other phases, such as motion with force evaluations.
+    pub(super) fn start(&self) -> PhaseStart {
+        PhaseStart {
+            start: Instant::now(),
+            counted: self.counted(),
+        }
+    }
+
+    /// Time since the start of a phase, without the phases that have been counted since. Therefore no time
+    /// counts twice.
+    pub(super) fn since(&self, phase: &PhaseStart) -> Duration {
+        let others = self.counted() - phase.counted;
+        phase.start.elapsed().saturating_sub(others)
+    }
+
+    /// Time of all phases of the time loop.
+    fn counted(&self) -> Duration {
+        self.forces.whole() + self.contact + self.motion + self.regridding
+    }
+}
+
 /// The first point of this rank whose motion, force or reaction is not finite. If several points are found at
 /// the same step, this is the one with the smallest id.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
+    /// Index of the stage. At the end of a stage, it is this stage and not the next one.
+    stage: usize,
     time: f64,
     id: u64,
     block: u16,
@@ -217,7 +248,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(density) = &mut fields.fictitious_density {
             *density = fictitious_density(&stiffness);
         }
-        are_finite(problem, comm, &model, 0.0)?;
+        are_finite(problem, comm, &model, (0, 0.0))?;
         let intact_at_start = starts_deformed(problem).then(|| {
             let mut intact = 0;
             forces.for_each_intact(|_, _| intact += 1);
@@ -291,6 +322,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// must still be applied. This argument must be false if a stage begins or if contact changes the step.
     /// Returns whether the second half kick of this step must still be applied. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
+        let start = self.times.start();
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
@@ -303,12 +335,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let is_pending = integrator.advance(self, half_kick_pending);
         self.integrator = Some(integrator);
         self.progress.newton.evaluations += self.times.evaluations - evaluations;
+        let motion = self.times.since(&start);
+        self.times.motion += motion;
         is_pending
     }
 
     /// Apply the second half kick of the step that ends at the present time.
     pub(super) fn kick(&mut self) {
-        let start = Instant::now();
+        let start = self.times.start();
         let clock = self.clock;
         self.set_second_half(&clock);
         let finite =
@@ -316,13 +350,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if !finite {
             self.note_bad(&clock);
         }
-        self.times.motion += start.elapsed();
+        let motion = self.times.since(&start);
+        self.times.motion += motion;
     }
 
     /// Make one explicit step without its second half kick. If the second half kick of the previous step is
     /// pending, apply that half kick first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
-        let start = Instant::now();
         let before = self.clock;
         let step = before.step();
         if half_kick_pending {
@@ -352,7 +386,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if !finite {
             self.note_bad(&before);
         }
-        self.times.motion += start.elapsed();
         self.evaluate_at_bond_inputs(BondUpdate::Step(step));
     }
 
@@ -509,7 +542,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Return the point with the smallest id among the owned points whose motion, force or reaction is not
-    /// finite. The step and the time of the returned [`BadPoint`] are those of `clock`.
+    /// finite. The step and the time of the returned [`BadPoint`] are those of `clock`, in the present stage.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -527,6 +560,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .min_by_key(|k| self.model.ids[*k])
             .map(|index| BadPoint {
                 step: clock.number(),
+                stage: self.progress.stage,
                 time: clock.time(),
                 id: self.model.ids[index],
                 block: self.model.block[index],
@@ -545,16 +579,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// - If no equilibrium has been found. The message names a loaded piece that no support holds, if there
     ///   is one.
     pub fn check(&mut self) -> Result<()> {
-        let mut earliest = self
-            .bad
-            .map_or([f64::MAX; 2], |bad| [bad.step as f64, bad.time]);
+        let mut earliest = self.bad.map_or([f64::MAX; 3], |bad| {
+            [bad.step as f64, bad.stage as f64, bad.time]
+        });
         comm::min(self.comm, &mut earliest);
-        let [step, time] = earliest;
+        let [step, stage, time] = earliest;
         if step == f64::MAX {
             self.check_rigid()?;
             return self.check_equilibrium();
         }
-        let valued = are_finite(self.problem, self.comm, &self.model, time);
+        let place = (stage as usize, time);
+        let valued = are_finite(self.problem, self.comm, &self.model, place);
         valued.map_err(|error| Error {
             kind: ErrorKind::Run,
             ..error

@@ -1,6 +1,8 @@
 //! Contact in relaxations: closed-form reactions, energies, thermal expansion, and equal bits on any number
 //! of ranks and after a restart.
 
+use std::time::Instant;
+
 use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
 use crate::support::{displace, largest_force, problem, simulate, simulate_on};
@@ -83,6 +85,25 @@ fn a_block_between_a_rigid_floor_and_a_rigid_plate() {
         assert!(row[5] <= 1e-9, "{row:?}");
     }
     assert_balance(&rows, 4, rows[3][3]);
+}
+
+#[test]
+fn no_time_of_a_relaxation_counts_twice() {
+    let deck = bars(
+        "rigid.floor.half_space = { through = [0], normal = [1] }
+        rigid.plate = { half_space = { through = [40], normal = [-1] }, motion = ['-0.1*t'] }
+        body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [40] } }",
+    );
+    simulate(&deck, |mut simulation: Simulation<1>| {
+        let start = Instant::now();
+        while !simulation.is_over() {
+            simulation.advance();
+        }
+        let (times, whole) = (simulation.times, start.elapsed());
+        let phases = times.forces.whole() + times.contact + times.motion;
+        assert!(!times.contact.is_zero());
+        assert!(phases <= whole, "{phases:?} of {whole:?}");
+    });
 }
 
 #[test]

@@ -104,6 +104,34 @@ fn a_body_that_is_let_go_swings_about_its_place() {
     assert!(seen.error < 1e-3 * strain, "{:e}", seen.error / strain);
 }
 
+/// At the end of a stage, the conditions of this stage act, and not those of the next stage.
+#[test]
+fn a_load_without_a_value_at_the_end_of_its_stage_is_named() {
+    let deck = "
+        dimension = '1d'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [30] } }
+        set.right.where = 'x > 29'
+        condition.pull = { set = 'right', force = ['1/(1 - t)'] }
+        time = { end = 2, step = 0.5 }
+        [[stage]]
+        end = 1
+        [[stage]]
+        off = ['pull']
+        ";
+    let messages = simulate_on(2, deck, |mut simulation: Simulation<1>| {
+        while !simulation.is_over() {
+            simulation.advance();
+        }
+        simulation.check().unwrap_err().message
+    });
+    for message in messages {
+        assert!(message.starts_with("[condition.pull] force: "), "{message}");
+        assert!(message.contains(" at t = 1 s at point 29"), "{message}");
+    }
+}
+
 #[test]
 fn ranks_do_not_change_a_bit() {
     let run = |ranks: usize| {

@@ -8,7 +8,7 @@ use fissure::output::{ResultReader, StoredColumn};
 use fissure::picture::chart::{Chart, Label, Series};
 
 use super::{PlotArguments, check_ending};
-use crate::cli::{Verbosity, errln, file_error, outln};
+use crate::cli::{Verbosity, errln, outln};
 
 /// The default of `--x`.
 const TIME: &str = "time";
@@ -132,7 +132,7 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     } else {
         chart.image().write_png(&path)
     };
-    written.map_err(|error| file_error(&path, "write", &error))?;
+    written.map_err(|error| Error::file(&path, "write", &error))?;
     if verbosity > Verbosity::Quiet {
         let curves = match series.len() {
             1 => "1 curve".to_owned(),

@@ -12,7 +12,7 @@ use super::painter::Painter;
 use super::picture::{LEAST_WIDTH, PictureArguments, beside, check_png, nothing_to_draw};
 use super::{PlotArguments, Verbosity};
 use crate::cli::format::si;
-use crate::cli::{file_error, outln, result_file};
+use crate::cli::{outln, result_file};
 
 /// Draw the requested outputs of each result side by side, with the same axes and range of colours.
 ///
@@ -82,7 +82,7 @@ pub fn plot(arguments: &PlotArguments, results: &[PathBuf], verbosity: Verbosity
     let images: Vec<Image> = images.collect::<Result<_>>()?;
     Image::row(&images)
         .write_png(&path)
-        .map_err(|error| file_error(&path, "write", &error))?;
+        .map_err(|error| Error::file(&path, "write", &error))?;
     if verbosity > Verbosity::Quiet {
         let label = &painters[0].quantity.label;
         outln!("wrote {}: {count} pictures of {label}", path.display());

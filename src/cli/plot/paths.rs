@@ -4,8 +4,6 @@ use std::path::Path;
 
 use fissure::error::{Error, Result};
 
-use crate::cli::file_error;
-
 /// A line through positions in the plane, m.
 pub type Line = Vec<[f64; 2]>;
 
@@ -19,7 +17,7 @@ pub type Line = Vec<[f64; 2]>;
 /// If the file cannot be read, or if the column `x` or `y` is missing. If a coordinate is not a finite
 /// number, or if a row has more or fewer values than the first row.
 pub fn read(path: &Path) -> Result<Vec<Line>> {
-    let text = std::fs::read_to_string(path).map_err(|error| file_error(path, "read", &error))?;
+    let text = std::fs::read_to_string(path).map_err(|error| Error::file(path, "read", &error))?;
     let wrong = |line: usize, message: String| {
         Error::input(format!("{}:{line}: {message}", path.display()))
     };

@@ -10,7 +10,7 @@ use super::choice::choose_times;
 use super::painter::Painter;
 use super::{PlotArguments, check_ending};
 use crate::cli::format::si;
-use crate::cli::{Verbosity, file_error, outln, result_file};
+use crate::cli::{Verbosity, outln, result_file};
 
 /// Smallest width of a picture, pixels.
 pub const LEAST_WIDTH: u32 = 200;
@@ -131,7 +131,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
         let image = painter.image(*index, &si(times[*index], "s"), None)?;
         image
             .write_png(&path)
-            .map_err(|error| file_error(&path, "write", &error))?;
+            .map_err(|error| Error::file(&path, "write", &error))?;
         if verbosity > Verbosity::Quiet {
             let (time, what) = (si(times[*index], "s"), &painter.quantity.label);
             outln!("wrote {}: {what} at t = {time}", path.display());

@@ -12,7 +12,6 @@ use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::Signals;
 
 use super::SweepArguments;
-use crate::cli::file_error;
 
 /// File with the text that a run prints.
 pub const LOG: &str = "log.txt";
@@ -227,7 +226,7 @@ impl<'a> Program<'a> {
                 let state = if status.success() {
                     let mark = run.folder.join(COMPLETE);
                     let marked =
-                        File::create(&mark).map_err(|error| file_error(&mark, "create", &error));
+                        File::create(&mark).map_err(|error| Error::file(&mark, "create", &error));
                     outcome = outcome.and(marked.map(|_| ()));
                     State::Complete
                 } else {
@@ -256,7 +255,7 @@ impl<'a> Program<'a> {
     /// `--overwrite` is given.
     fn start(&self, run: &Run) -> Result<Child> {
         let folder = &run.folder;
-        std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
+        std::fs::create_dir_all(folder).map_err(|error| Error::file(folder, "create", &error))?;
         let known = folder.join(DECK);
         let has_checkpoint = CHECKPOINTS.iter().any(|name| folder.join(name).exists());
         let begin = if run.is_begun() && has_checkpoint && !self.arguments.overwrite {
@@ -265,12 +264,12 @@ impl<'a> Program<'a> {
             "--overwrite"
         };
         let _ = std::fs::remove_file(folder.join(COMPLETE));
-        std::fs::write(&known, &run.deck).map_err(|error| file_error(&known, "write", &error))?;
+        std::fs::write(&known, &run.deck).map_err(|error| Error::file(&known, "write", &error))?;
         let path = folder.join(LOG);
-        let log = File::create(&path).map_err(|error| file_error(&path, "create", &error))?;
+        let log = File::create(&path).map_err(|error| Error::file(&path, "create", &error))?;
         let errors = log
             .try_clone()
-            .map_err(|error| file_error(&path, "write", &error))?;
+            .map_err(|error| Error::file(&path, "write", &error))?;
         let mut command = match &self.launcher[..] {
             [first, others @ ..] => {
                 let mut command = Command::new(first);

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use fissure::error::Result;
+use fissure::error::{Error, Result};
 use fissure::picture::chart::{Chart, Label, Series};
 
 use super::convergence::rates;
 use super::design::Design;
 use super::value::{self, Column};
-use crate::cli::{file_error, outln};
+use crate::cli::outln;
 
 /// Width of the pictures in pixels.
 const WIDTH: u32 = 900;
@@ -87,7 +87,7 @@ impl<'a> Table<'a> {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path, prints: bool) -> Result<()> {
-        std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
+        std::fs::create_dir_all(folder).map_err(|error| Error::file(folder, "create", &error))?;
         let cells = self.cells();
         if prints {
             outln!("{}", printed(&cells));
@@ -97,7 +97,7 @@ impl<'a> Table<'a> {
         let part = folder.join(format!("sweep.csv.{}", std::process::id()));
         std::fs::write(&part, csv(&cells))
             .and_then(|()| std::fs::rename(&part, &path))
-            .map_err(|error| file_error(&path, "write", &error))?;
+            .map_err(|error| Error::file(&path, "write", &error))?;
         if prints {
             outln!("table    {}", path.display());
         }
@@ -251,7 +251,7 @@ impl<'a> Table<'a> {
             width: WIDTH,
         };
         let written = chart.image().write_png(path);
-        written.map_err(|error| file_error(path, "write", &error))?;
+        written.map_err(|error| Error::file(path, "write", &error))?;
         Ok(true)
     }
 }

@@ -14,8 +14,9 @@ use super::members;
 /// Words before the value in the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
-/// Check that the values of all conditions that act at `time` (s) are finite at all of their points, and that
-/// thermal stretches are above −1. At time 0, also check that all initial values are finite. Collective.
+/// Check that the values of all conditions that act in a stage are finite at `time` (s) at all of their points,
+/// and that thermal stretches are above −1. `stage` is the index of the stage. At time 0, also check that all
+/// initial values are finite. Collective.
 ///
 /// # Errors
 /// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
@@ -25,7 +26,7 @@ pub fn are_finite<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
     model: &Model<D>,
-    time: f64,
+    (stage, time): (usize, f64),
 ) -> Result<()> {
     let check = FiniteCheck {
         problem,
@@ -48,9 +49,7 @@ pub fn are_finite<const D: usize>(
         }
     }
     let stages = problem.all_stages();
-    let now = stages.iter().find(|stage| time < stage.time.end);
-    let acting = now.or(stages.last()).map(|stage| &stage.acting);
-    let conditions = problem.conditions.iter().zip(acting.into_iter().flatten());
+    let conditions = problem.conditions.iter().zip(&stages[stage].acting);
     for (condition, _) in conditions.filter(|(_, acting)| **acting) {
         let key = format!("[condition.{}] {}", condition.name, condition.quantity);
         let (place, set) = (&condition.place, condition.set);

@@ -32,8 +32,6 @@
 //! broken is not repeated: bonds break only at an equilibrium, so an equilibrium at the full load was found.
 //! A load step is also not repeated if a loaded piece of a body is not held by supports.
 
-use std::time::Instant;
-
 use rayon::prelude::*;
 
 use crate::comm::sum::reduce;
@@ -146,7 +144,6 @@ impl<const D: usize> NewtonKrylov<D> {
 
 impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
     fn advance(&mut self, simulation: &mut Simulation<'_, D>, _half_kick_pending: bool) -> bool {
-        let (start, forces) = (Instant::now(), simulation.times.forces.whole());
         let rule = self.rule;
         let vectors = (self.vectors).get_or_insert_with(|| Vectors::new(simulation));
         if simulation.progress.load_step.is_settled {
@@ -169,8 +166,6 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
         {
             vectors.bisect_or_fail(simulation, &rule);
         }
-        let forces = simulation.times.forces.whole() - forces;
-        simulation.times.motion += start.elapsed().saturating_sub(forces);
         false
     }
 }

@@ -23,8 +23,6 @@
 //! when points separate, stiff contacts would bounce forever. Rigid bodies with a prescribed motion move with
 //! time, as supports do. The forces of rigid bodies on the points count as reactions.
 
-use std::time::Instant;
-
 use rayon::prelude::*;
 
 use crate::comm::ExactSum;
@@ -61,7 +59,6 @@ impl<const D: usize> Simulation<'_, D> {
     /// Make one iteration towards the equilibrium of the present load step. If this load step is already
     /// settled, begin the next load step. Collective.
     fn relax(&mut self, rule: &Relaxation) {
-        let (start, forces) = (Instant::now(), self.times.forces.whole());
         let before = if self.progress.load_step.is_settled {
             self.begin_load_step(true);
             self.stop();
@@ -71,8 +68,6 @@ impl<const D: usize> Simulation<'_, D> {
         };
         self.evaluate_at_rest();
         self.update_damping_and_residual(before);
-        let forces = self.times.forces.whole() - forces;
-        self.times.motion += start.elapsed().saturating_sub(forces);
         if self.is_drifting() {
             self.progress.load_step.has_failed = true;
         } else if self.progress.load_step.residual <= rule.tolerance {

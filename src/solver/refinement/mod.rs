@@ -9,7 +9,6 @@
 //! separates.
 
 use std::cell::OnceCell;
-use std::time::Instant;
 
 use crate::comm::sum::reduce;
 use crate::comm::{self, IdOrder};
@@ -117,7 +116,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
         };
-        let start = Instant::now();
+        let start = self.times.start();
         let snapshot = if trigger.energy.is_some() {
             Snapshot::new(self)
         } else {
@@ -146,7 +145,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (new_energy, new_bonds) = self.energy_and_bonds();
         self.progress.refined.energy += new_energy - energy;
         self.progress.refined.bonds += new_bonds as i64 - bonds as i64;
-        self.times.regridding += start.elapsed();
+        let regridding = self.times.since(&start);
+        self.times.regridding += regridding;
         let removed = removed.len() as u64;
         Ok(Some(Regridded {
             created: self.model.total + removed - before,
