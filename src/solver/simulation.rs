@@ -144,6 +144,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         laws_are_possible(problem)?;
         refinement::is_possible(problem)?;
+        problem.check_contact()?;
         let cutoffs = cutoffs(problem);
         size::is_feasible(problem, &cutoffs, comm.size())?;
         let (coarse, coarsest) = points::generate(problem, comm)?;
