@@ -471,7 +471,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.conditions.set_loads(then, factors, true);
             self.walk(|part, mut conditions| {
                 let reaction = reaction.as_ref().map(|field| part.of(field));
-                conditions.find_loads();
+                conditions.find_loads(part);
                 conditions.record_for_work(part.of(displacement), reaction);
                 true
             });
@@ -479,7 +479,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.conditions.set_loads(now, factors, true);
         }
         self.walk(|part, mut conditions| {
-            conditions.find_loads();
+            conditions.find_loads(part);
             conditions.add_work(part, work);
             true
         });
