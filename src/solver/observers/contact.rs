@@ -16,7 +16,6 @@ use crate::comm::{self, Communicator, Found, least};
 use crate::points::bins::Bins;
 use crate::points::distance_squared;
 use crate::solver::Simulation;
-use crate::solver::model::Model;
 
 /// Edge of a cell divided by [`Meeting::radius`]. If cells are large, fewer points in total lie near the
 /// border of a cell, so fewer points are sent to several ranks.
@@ -164,11 +163,11 @@ impl ContactWatch {
         }
         // Lower corners of the bounding boxes, and negative upper corners, so that one element-wise minimum
         // gives both.
-        let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
+        let (model, fields) = (&simulation.model, &simulation.fields);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
             let first = 6 * simulation.problem.body_of(usize::from(model.block[point]));
-            for (k, x) in place_of(model, displacement, point).into_iter().enumerate() {
+            for (k, x) in fields.position(model, point).into_iter().enumerate() {
                 corners[first + k] = corners[first + k].min(x);
                 corners[first + 3 + k] = corners[first + 3 + k].min(-x);
             }
@@ -204,19 +203,6 @@ impl ContactWatch {
     }
 }
 
-/// Present position of an owned point, m.
-fn place_of<const D: usize>(
-    model: &Model<D>,
-    displacement: &[Vec<f64>; D],
-    point: usize,
-) -> [f64; 3] {
-    let mut place = model.position(point);
-    for d in 0..D {
-        place[d] += displacement[d][point];
-    }
-    place
-}
-
 /// Select the owned points in the boxes where bodies may touch. If bonds joined two bodies at the start of
 /// the run, select only those of their points that have broken bonds. Returns the points as bytes, one buffer
 /// for each receiving rank.
@@ -232,11 +218,11 @@ fn candidates<const D: usize>(
             of_body[body].push((number, second));
         }
     }
-    let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
-    let broken = simulation.fields.broken_bonds.as_deref();
+    let (model, fields) = (&simulation.model, &simulation.fields);
+    let broken = fields.broken_bonds.as_deref();
     for (point, block) in model.block.iter().enumerate() {
         let is_whole = broken.is_none_or(|broken| broken[point] == 0.0);
-        let place = place_of(model, displacement, point);
+        let place = fields.position(model, point);
         for (number, second) in &of_body[simulation.problem.body_of(usize::from(*block))] {
             let meeting = &meetings[*number];
             if meeting.pair.were_bonded && is_whole {
