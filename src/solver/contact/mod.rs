@@ -17,7 +17,7 @@
 //! earlier. The work of friction and damping in a step is computed by the trapezoidal rule.
 
 mod by_pair;
-mod cells;
+pub(super) mod cells;
 mod ghosts;
 mod pair;
 mod rigid;

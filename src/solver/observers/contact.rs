@@ -16,6 +16,7 @@ use crate::comm::{self, Communicator, Found, least};
 use crate::points::bins::Bins;
 use crate::points::distance_squared;
 use crate::solver::Simulation;
+use crate::solver::contact::cells::{cell_of, hash};
 
 /// Edge of a cell divided by [`Meeting::radius`]. If cells are large, fewer points in total lie near the
 /// border of a cell, so fewer points are sent to several ranks.
@@ -255,13 +256,12 @@ fn candidates<const D: usize>(
 fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
     let mut homes = Vec::with_capacity(1);
     for corner in 0..1_u32 << D {
-        let hash = (0..D).fold(0_u64, |hash, k| {
+        let mut corner_place = place;
+        for (k, x) in corner_place[..D].iter_mut().enumerate() {
             let side = f64::from(2 * (corner >> k & 1)) - 1.0;
-            let cell = ((place[k] + side * reach) / edge).floor() as i64;
-            let mixed = (hash ^ cell as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            mixed ^ mixed >> 29
-        });
-        let home = (hash % ranks as u64) as usize;
+            *x += side * reach;
+        }
+        let home = (hash(cell_of(corner_place, edge)) % ranks as u64) as usize;
         if !homes.contains(&home) {
             homes.push(home);
         }
