@@ -17,9 +17,9 @@ use super::conditions::{Conditions, PartConditions, Work, apply_initials, are_fi
 use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
+use super::motion::fictitious_density::fictitious_density;
 use super::motion::fields::{Needs, plastic_columns};
 use super::motion::integrator::{Integrator, integrator};
-use super::motion::load_step::fictitious_density;
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
