@@ -1,13 +1,15 @@
 //! Validation of the initial values, loads and supports of a deck.
 
+use std::ops::Range;
+
 use super::grammar::{self, Deck};
-use super::number::Vector;
+use super::number::{Number, Vector};
 use super::resolve::Scope;
 use super::sets::find_set;
 use super::time::first_method;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
-use crate::expression::{Expression, POSITION, POSITION_AND_TIME};
+use crate::expression::{POSITION, POSITION_AND_TIME};
 use crate::points::value_file;
 use crate::problem::{self, Action, Depth, Selector};
 
@@ -105,28 +107,15 @@ pub fn conditions(
         .map(|(name, table)| {
             let condition = table.get_ref();
             let key = format!("[condition.{name}]");
-            let vector = |vector: &Option<Vector>| vector.as_ref().map(Spanned::span);
-            let given = [
-                ("displacement", vector(&condition.displacement)),
-                ("velocity", vector(&condition.velocity)),
-                ("body_force", vector(&condition.body_force)),
-                ("traction", vector(&condition.traction)),
-                ("pressure", condition.pressure.as_ref().map(Spanned::span)),
-                ("force", vector(&condition.force)),
-                (
-                    "temperature",
-                    condition.temperature.as_ref().map(Spanned::span),
-                ),
-            ];
-            let (quantity, place) = &given[scope.exactly_one(table.span(), &key, &given)?];
+            let (name_of_quantity, place, quantity) = quantity(scope, table, &key)?;
             let resolved = problem::Condition {
                 name: name.clone(),
                 set: find_set(scope, &condition.set, sets, &format!("{key} set"))?,
                 span: condition.set.span(),
-                quantity,
-                place: place.clone().unwrap_or(table.span()),
-                depth: depth(scope, &key, condition)?,
-                action: action(scope, &key, condition)?,
+                quantity: name_of_quantity,
+                place,
+                depth: depth(scope, &key, condition, quantity)?,
+                action: action(scope, &key, condition, (name_of_quantity, quantity))?,
             };
             let (set, dimension) = (&sets[resolved.set], scope.dimension);
             let possible = set.possible_bodies(bodies);
@@ -169,16 +158,78 @@ pub fn temperatures_act<'m>(
     Err(scope.error(condition.place.clone(), message))
 }
 
-/// Return whether a condition acts on a surface layer. Only tractions and pressures act on a layer.
-fn on_a_layer(condition: &grammar::Condition) -> bool {
-    condition.traction.is_some() || condition.pressure.is_some()
+/// The quantity that a condition prescribes, with its value in the deck.
+#[derive(Clone, Copy)]
+enum Quantity<'d> {
+    Displacement(&'d Vector),
+    Velocity(&'d Vector),
+    BodyForce(&'d Vector),
+    Traction(&'d Vector),
+    Pressure(&'d Number),
+    Force(&'d Vector),
+    Temperature(&'d Number),
+}
+
+impl Quantity<'_> {
+    /// Return whether the quantity acts on a surface layer.
+    fn is_on_a_layer(self) -> bool {
+        matches!(self, Self::Traction(_) | Self::Pressure(_))
+    }
+}
+
+/// Return the quantity of a condition, with its key and the byte range of its value. It is an error if the
+/// condition gives no quantity or several quantities.
+fn quantity<'d>(
+    scope: &Scope,
+    table: &'d Spanned<grammar::Condition>,
+    key: &str,
+) -> Result<(&'static str, Range<usize>, Quantity<'d>)> {
+    let condition = table.get_ref();
+    let vector = |vector: &'d Option<Vector>, quantity: fn(&'d Vector) -> Quantity<'d>| {
+        let vector = vector.as_ref();
+        vector.map(|vector| (vector.span(), quantity(vector)))
+    };
+    let number = |number: &'d Option<Number>, quantity: fn(&'d Number) -> Quantity<'d>| {
+        let number = number.as_ref();
+        number.map(|number| (number.span(), quantity(number)))
+    };
+    let all = [
+        (
+            "displacement",
+            vector(&condition.displacement, Quantity::Displacement),
+        ),
+        ("velocity", vector(&condition.velocity, Quantity::Velocity)),
+        (
+            "body_force",
+            vector(&condition.body_force, Quantity::BodyForce),
+        ),
+        ("traction", vector(&condition.traction, Quantity::Traction)),
+        ("pressure", number(&condition.pressure, Quantity::Pressure)),
+        ("force", vector(&condition.force, Quantity::Force)),
+        (
+            "temperature",
+            number(&condition.temperature, Quantity::Temperature),
+        ),
+    ];
+    let spans = all.each_ref().map(|(name, given)| {
+        let span = given.as_ref().map(|(span, _)| span.clone());
+        (*name, span)
+    });
+    let (name, given) = &all[scope.exactly_one(table.span(), key, &spans)?];
+    let (span, quantity) = given.clone().expect("this quantity is given");
+    Ok((name, span, quantity))
 }
 
 /// Return the thickness of the layer on which a condition acts; `None` for a condition without a layer. The
 /// key `depth` of a condition without a layer is an error.
-fn depth(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Option<Depth>> {
+fn depth(
+    scope: &Scope,
+    key: &str,
+    condition: &grammar::Condition,
+    quantity: Quantity<'_>,
+) -> Result<Option<Depth>> {
     match &condition.depth {
-        Some(depth) if on_a_layer(condition) => {
+        Some(depth) if quantity.is_on_a_layer() => {
             let depth = scope.positive(depth, &format!("{key} depth"))?;
             Ok(Some(Depth::Given(depth)))
         }
@@ -186,58 +237,45 @@ fn depth(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Opt
             let message = format!("{key} depth: only a traction or a pressure has a depth");
             Err(scope.error(depth.span(), message))
         }
-        None => Ok(on_a_layer(condition).then_some(Depth::Spacing)),
+        None => Ok(quantity.is_on_a_layer().then_some(Depth::Spacing)),
     }
 }
 
-fn action(scope: &Scope, key: &str, condition: &grammar::Condition) -> Result<Action> {
+fn action(
+    scope: &Scope,
+    key: &str,
+    condition: &grammar::Condition,
+    (name, quantity): (&str, Quantity<'_>),
+) -> Result<Action> {
     if let (Some(normal), None) = (&condition.normal, &condition.pressure) {
         let message = format!("{key} normal: only a pressure has a normal");
         return Err(scope.error(normal.span(), message));
     }
-    let expressions = |vector, name: &str| -> Result<Vec<Expression>> {
-        scope.expressions(vector, &format!("{key} {name}"), &POSITION_AND_TIME)
-    };
-    if let Some(vector) = &condition.displacement {
-        return scope
-            .motion(vector, &format!("{key} displacement"))
-            .map(Action::Displacement);
-    }
-    if let Some(vector) = &condition.velocity {
-        return scope
-            .motion(vector, &format!("{key} velocity"))
-            .map(Action::Velocity);
-    }
-    if let Some(vector) = &condition.body_force {
-        return Ok(Action::BodyForce(
-            expressions(vector, "body_force")?,
+    let key_of_quantity = format!("{key} {name}");
+    let expressions = |vector| scope.expressions(vector, &key_of_quantity, &POSITION_AND_TIME);
+    let expression = |number| scope.expression(number, &key_of_quantity, &POSITION_AND_TIME);
+    let motion = |vector| scope.motion(vector, &key_of_quantity);
+    match quantity {
+        Quantity::Displacement(vector) => motion(vector).map(Action::Displacement),
+        Quantity::Velocity(vector) => motion(vector).map(Action::Velocity),
+        Quantity::BodyForce(vector) | Quantity::Traction(vector) => Ok(Action::BodyForce(
+            expressions(vector)?,
             vec![1.0; scope.dimension],
-        ));
+        )),
+        Quantity::Force(vector) => expressions(vector).map(Action::Force),
+        Quantity::Temperature(number) => expression(number).map(Action::Temperature),
+        Quantity::Pressure(number) => {
+            let Some(normal) = &condition.normal else {
+                let message =
+                    format!("{key_of_quantity}: needs `normal`, the outward normal of the surface");
+                return Err(scope.error(number.span(), message));
+            };
+            let direction = scope.direction(normal, &format!("{key} normal"))?;
+            let factors = direction[..scope.dimension].iter().map(|n| -n);
+            Ok(Action::BodyForce(
+                vec![expression(number)?; scope.dimension],
+                factors.collect(),
+            ))
+        }
     }
-    if let Some(vector) = &condition.force {
-        return Ok(Action::Force(expressions(vector, "force")?));
-    }
-    if let Some(value) = &condition.temperature {
-        let key = format!("{key} temperature");
-        let value = scope.expression(value, &key, &POSITION_AND_TIME)?;
-        return Ok(Action::Temperature(value));
-    }
-    if let Some(vector) = &condition.traction {
-        return Ok(Action::BodyForce(
-            expressions(vector, "traction")?,
-            vec![1.0; scope.dimension],
-        ));
-    }
-    let pressure = condition.pressure.as_ref().expect("one quantity is given");
-    let Some(normal) = &condition.normal else {
-        let message = format!("{key} pressure: needs `normal`, the outward normal of the surface");
-        return Err(scope.error(pressure.span(), message));
-    };
-    let direction = scope.direction(normal, &format!("{key} normal"))?;
-    let value = scope.expression(pressure, &format!("{key} pressure"), &POSITION_AND_TIME)?;
-    let factors = direction[..scope.dimension].iter().map(|n| -n);
-    Ok(Action::BodyForce(
-        vec![value; scope.dimension],
-        factors.collect(),
-    ))
 }

@@ -6,7 +6,7 @@ use super::resolve::{Scope, find};
 use super::time::methods;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
-use crate::problem::{self, ContactModel, ContactRule};
+use crate::problem::{self, ContactModel, ContactRule, FRICTION_IN_RELAXATION};
 
 /// Smallest allowed coefficient of restitution. With a smaller coefficient, the contact damping would require
 /// very short time steps.
@@ -26,17 +26,15 @@ pub(super) struct Keys<'a> {
 /// Validate `[contact]`. Return `None` for a deck without this section.
 ///
 /// # Errors
-/// On numbers out of range, and on invalid or repeated pairs. On friction in a relaxation, and on methods or
-/// grids that do not support contact or rigid bodies. On a pair that has another model than `[contact]`
-/// but inherits the stiffness of `[contact]`. Such a pair is allowed if its model is `"none"`.
+/// On numbers out of range, and on invalid or repeated pairs. On friction in a relaxation. On a pair that has
+/// another model than `[contact]` but inherits the stiffness of `[contact]`. Such a pair is allowed if its
+/// model is `"none"`. Methods and grids that do not support contact are rejected later, by
+/// [`Problem::check_contact`](problem::Problem::check_contact).
 pub fn contact(
     scope: &Scope,
     deck: &Deck,
     bodies: &[problem::Body],
 ) -> Result<Option<problem::Contact>> {
-    if deck.contact.is_some() || !deck.rigid.is_empty() {
-        require_contact_is_possible(scope, deck)?;
-    }
     let Some(table) = &deck.contact else {
         return Ok(None);
     };
@@ -102,25 +100,6 @@ pub fn contact(
     Ok(Some(contact))
 }
 
-/// Return an error if a run with contact refines its grid during the run, or uses Newton's method.
-fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
-    let refinement = deck.refinement.as_ref();
-    if let Some(trigger) = refinement.and_then(|table| table.get_ref().trigger.as_ref()) {
-        let message = "[refinement.trigger]: contact is not available on grids that change during the run; refine \
-                       regions from the start, or remove [contact] and [rigid]";
-        return Err(scope.error(trigger.span(), message));
-    }
-    for (section, method) in methods(deck) {
-        if *method.get_ref() == grammar::Method::Static {
-            let message = format!(
-                "{section} method: \"static\" is not available with contact; use \"relaxation\" or \"explicit\", or remove [contact] and [rigid]"
-            );
-            return Err(scope.error(method.span(), message));
-        }
-    }
-    Ok(())
-}
-
 /// Return whether any stage of the run is a relaxation.
 pub(super) fn has_relaxation(deck: &Deck) -> bool {
     let mut all = methods(deck).into_iter();
@@ -168,10 +147,7 @@ pub(super) fn rule(
     ];
     for (key, number, value) in frictions {
         if let (Some(number), true) = (number, has_relaxation && value > 0.0) {
-            let message = format!(
-                "{section} {key}: friction depends on velocities, and a relaxation has none; leave it \
-                 out, or load slowly with \"explicit\""
-            );
+            let message = format!("{section} {key}: {FRICTION_IN_RELAXATION}");
             return Err(scope.error(number.span(), message));
         }
     }

@@ -8,7 +8,7 @@ use super::shapes;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{Expression, Variable};
-use crate::problem::{self, RigidMotion, RigidShape, Shape};
+use crate::problem::{self, FREE_BODY_IN_RELAXATION, RigidMotion, RigidShape, Shape};
 
 /// Validate rigid bodies.
 ///
@@ -58,9 +58,7 @@ fn body(
     };
     let rule = contact::rule(scope, &key, keys, has_relaxation)?;
     if let (Some(mass), true) = (&table.mass, has_relaxation) {
-        let message = format!(
-            "{key} mass: a free body is not available in a relaxation; drive it by `motion`, or use \"explicit\""
-        );
+        let message = format!("{key} mass: {FREE_BODY_IN_RELAXATION}");
         return Err(scope.error(mass.span(), message));
     }
     Ok(problem::Rigid {

@@ -1,6 +1,6 @@
 //! Validation of a deck: conversion of the parsed deck to a problem, with a check of every value and name.
 
-use super::grammar::{ConstraintName, Deck, DimensionName, Family, VolumeCorrection};
+use super::grammar::{ConstraintName, Deck, DimensionName, Family, Method, VolumeCorrection};
 use super::number::{Edges, Number};
 use super::resolve::{Scope, resolve_each};
 use super::{
@@ -69,6 +69,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
         sets,
         time,
     };
+    (problem.check_contact()).map_err(|error| scope.source.locate(error))?;
     tables::cover_the_run(scope, &problem)?;
     Ok(problem)
 }
@@ -77,11 +78,14 @@ fn spans(deck: &Deck) -> problem::Spans {
     let time = deck.time.get_ref();
     let of_stages = deck.stage.iter().map(|stage| &stage.get_ref().adaptive);
     let mut adaptive = std::iter::once(&time.adaptive).chain(of_stages).flatten();
+    let mut methods = time::methods(deck).into_iter().map(|(_, method)| method);
+    let newton = methods.find(|method| *method.get_ref() == Method::Static);
     problem::Spans {
         horizon: deck.grid.get_ref().horizon.span(),
         end: time.end.span(),
         step: time.step.as_ref().unwrap_or(&time.end).span(),
         adaptive: adaptive.next().map_or(time.end.span(), Spanned::span),
+        newton: newton.map_or(time.end.span(), Spanned::span),
     }
 }
 

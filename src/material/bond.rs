@@ -90,19 +90,19 @@ impl Weights {
 
     /// Return the weight at point i.
     #[inline(always)]
-    pub fn own(self) -> Lanes {
+    pub fn at_i(self) -> Lanes {
         match self {
             Self::One => Lanes::splat(1.0),
-            Self::Same(own) | Self::Each([own, _]) => own,
+            Self::Same(weight) | Self::Each([weight, _]) => weight,
         }
     }
 
     /// Return the weight at neighbour j.
     #[inline(always)]
-    pub fn far(self) -> Lanes {
+    pub fn at_j(self) -> Lanes {
         match self {
             Self::One => Lanes::splat(1.0),
-            Self::Same(far) | Self::Each([_, far]) => far,
+            Self::Same(weight) | Self::Each([_, weight]) => weight,
         }
     }
 

@@ -1,6 +1,15 @@
 //! Contact settings: forces between points that no intact bond joins.
 
-use super::Body;
+use super::{Body, Problem, RigidMotion};
+use crate::error::{Error, Result};
+
+/// Message for friction in a run with a relaxation, after the section or key of the friction.
+pub(crate) const FRICTION_IN_RELAXATION: &str = "friction depends on velocities, and a relaxation has none; leave it out, \
+                                                or load slowly with \"explicit\"";
+
+/// Message for a free rigid body in a run with a relaxation, after the section or key of the body.
+pub(crate) const FREE_BODY_IN_RELAXATION: &str =
+    "a free body is not available in a relaxation; drive it by `motion`, or use \"explicit\"";
 
 /// Contact rules of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,5 +88,66 @@ impl ContactRule {
             kinetic_friction: 0.0,
             restitution: 1.0,
         }
+    }
+    fn has_friction(&self) -> bool {
+        self.static_friction > 0.0 || self.kinetic_friction > 0.0
+    }
+}
+
+impl Problem {
+    /// Check that the grid and the methods of the run support its contact.
+    ///
+    /// # Errors
+    /// In a run with contact or rigid bodies:
+    ///
+    /// - If points may be refined during the run.
+    /// - If a stage uses Newton's method.
+    /// - If a stage is a relaxation, and a rule has friction or a rigid body is free.
+    pub fn check_contact(&self) -> Result<()> {
+        if !self.has_contact() {
+            return Ok(());
+        }
+        if let Some(trigger) = self.refinement_trigger() {
+            let message = "[refinement.trigger]: contact is not available on grids that change during the run; refine \
+                           regions from the start, or remove [contact] and [rigid]";
+            return Err(Error::input(message).at(&trigger.span));
+        }
+        if self.has_newton() {
+            let message = "method: \"static\" is not available with contact; use \"relaxation\" or \"explicit\", or remove \
+                           [contact] and [rigid]";
+            return Err(Error::input(message).at(&self.spans.newton));
+        }
+        if self.has_relaxation() {
+            self.check_contact_in_relaxation()
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Return an error if a rule has friction or a rigid body is free. A relaxation has no velocities, so it
+    /// would ignore friction, and free bodies would not move.
+    fn check_contact_in_relaxation(&self) -> Result<()> {
+        if let Some(contact) = &self.contact {
+            let pairs = contact.pairs.iter();
+            let pairs = pairs.map(|pair| (format!("[contact.pair.{}]", pair.name), pair.rule));
+            let mut rules = std::iter::once(("[contact]".to_owned(), contact.rule)).chain(pairs);
+            let is_rough =
+                |rule: &Option<ContactRule>| rule.is_some_and(|rule| rule.has_friction());
+            if let Some((section, _)) = rules.find(|(_, rule)| is_rough(rule)) {
+                return Err(Error::input(format!("{section}: {FRICTION_IN_RELAXATION}")));
+            }
+        }
+        for rigid in &self.rigid {
+            let is_free = matches!(rigid.motion, RigidMotion::Free { .. });
+            let faults = [
+                (rigid.rule.has_friction(), FRICTION_IN_RELAXATION),
+                (is_free, FREE_BODY_IN_RELAXATION),
+            ];
+            if let Some((_, fault)) = faults.into_iter().find(|(is, _)| *is) {
+                let message = format!("[rigid.{}]: {fault}", rigid.name);
+                return Err(Error::input(message).at(&rigid.span));
+            }
+        }
+        Ok(())
     }
 }

@@ -108,4 +108,7 @@ pub struct Spans {
     /// Span of the first table `adaptive` of the run or of its stages; the span of the end time if there is
     /// no such table.
     pub adaptive: Range<usize>,
+    /// Span of the first method `"static"` of the run or of its stages; the span of the end time if no stage
+    /// uses Newton's method.
+    pub newton: Range<usize>,
 }

@@ -53,7 +53,7 @@ use crate::output::{self, Creation};
 use crate::problem::Problem;
 use crate::solver::calibration::calibrated;
 use crate::solver::conditions::output_members;
-use crate::solver::observers::{ContactWatch, HistoryRow};
+use crate::solver::observers::{HistoryRow, InterpenetrationWatch};
 use crate::solver::repartition::BalanceWatch;
 use crate::solver::{Simulation, Stepper};
 use crate::survey::Survey;
@@ -281,7 +281,7 @@ impl<'a> Job<'a> {
         let mut watch = Watch::new(signals.as_ref(), self.problem.checkpoint, limit);
         let simulation = stepper.at_full_step();
         let without_contact = self.problem.contact.is_none();
-        let mut contact = without_contact.then(|| ContactWatch::new(simulation));
+        let mut interpenetration = without_contact.then(|| InterpenetrationWatch::new(simulation));
         let (mut warned_of_contact, mut warned_of_depth) = (false, false);
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
@@ -344,12 +344,12 @@ impl<'a> Job<'a> {
                 }
                 if due {
                     let simulation = stepper.at_full_step();
-                    if let Some(found) = contact
+                    if let Some(found) = interpenetration
                         .as_ref()
-                        .and_then(|watch| watch.find_contact(simulation))
+                        .and_then(|watch| watch.find(simulation))
                     {
-                        self.warn_of_contact(&found, clock.time());
-                        contact = None;
+                        self.warn_of_interpenetration(&found, clock.time());
+                        interpenetration = None;
                     }
                     recorder.record(stepper, self.observer)?;
                     // The observer may have made requests during the output of the row. If the requests of

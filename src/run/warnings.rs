@@ -6,7 +6,7 @@ use super::recorder::Recorder;
 use crate::error::Result;
 use crate::message::format_number;
 use crate::solver::motion::Clock;
-use crate::solver::observers::Contact;
+use crate::solver::observers::Interpenetration;
 use crate::solver::steps::choose_steps;
 use crate::solver::{Simulation, Stepper};
 
@@ -29,11 +29,11 @@ const UNCHECKED_FRACTION: f64 = 0.1;
 
 impl<'a> Job<'a> {
     /// Warn of bodies whose points have moved into each other.
-    pub(super) fn warn_of_contact(&mut self, contact: &Contact, time: f64) {
-        let [a, b] = contact.bodies.map(|body| &self.problem.bodies[body].name);
-        let position = &contact.place[..self.problem.dimension.count()];
+    pub(super) fn warn_of_interpenetration(&mut self, found: &Interpenetration, time: f64) {
+        let [a, b] = found.bodies.map(|body| &self.problem.bodies[body].name);
+        let position = &found.place[..self.problem.dimension.count()];
         let position: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
-        let (closer, which) = if contact.were_bonded {
+        let (closer, which) = if found.were_bonded {
             ("half their spacing", "bodies whose bonds have broken")
         } else {
             ("their spacing", "bodies without bonds between them")

@@ -93,7 +93,7 @@ impl BalanceWatch {
 
 impl<const D: usize> Simulation<'_, D> {
     /// Return the owned points as [`Point`] values, the form in which points migrate.
-    pub(super) fn pieces(&self) -> Vec<Point> {
+    pub(super) fn owned_points(&self) -> Vec<Point> {
         let model = &self.model;
         let point = |k: usize| {
             let block = usize::from(model.block[k]);
@@ -126,14 +126,14 @@ impl<const D: usize> Simulation<'_, D> {
     /// because its points have been freed.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
-        let pieces = self.pieces();
-        let mut before: Vec<u64> = pieces.iter().map(|point| point.id).collect();
+        let points = self.owned_points();
+        let mut before: Vec<u64> = points.iter().map(|point| point.id).collect();
         before.sort_unstable();
         self.release();
         let mut other = Self::of_points(
             self.problem,
             self.comm,
-            (pieces, self.grids.clone()),
+            (points, self.grids.clone()),
             Some(time),
             &mut || Ok(()),
         )?;

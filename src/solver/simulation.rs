@@ -17,9 +17,9 @@ use super::conditions::{Conditions, PartConditions, Work, apply_initials, are_fi
 use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
+use super::motion::fictitious_density::fictitious_density;
 use super::motion::fields::{Needs, plastic_columns};
 use super::motion::integrator::{Integrator, integrator};
-use super::motion::load_step::fictitious_density;
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
@@ -175,14 +175,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         laws_are_possible(problem)?;
         refinement::is_possible(problem)?;
+        problem.check_contact()?;
         let cutoffs = cutoffs(problem);
         size::is_feasible(problem, &cutoffs, comm.size())?;
         let (coarse, coarsest) = points::generate(problem, comm)?;
         let mut refined = Grids::new(problem, coarsest)?;
         refined.refine_regions(comm, &coarse)?;
-        let pieces = refined.points(coarse);
+        let points = refined.points(coarse);
         between()?;
-        let mut simulation = Self::of_points(problem, comm, (pieces, refined), None, between)?;
+        let mut simulation = Self::of_points(problem, comm, (points, refined), None, between)?;
         apply_initials(problem, comm, &simulation.model, &mut simulation.fields)?;
         simulation.begin();
         simulation.check_loads_are_held()?;
@@ -192,22 +193,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Distribute the points of the given grids over the ranks, and create the bonds of these points.
-    /// `pieces` are the points of this rank before the distribution. `time` is the measured computing time of
+    /// `points` are the points of this rank before the distribution. `time` is the measured computing time of
     /// this rank's points (ns); `None` if this time is not known. `between` is the same as for
     /// [`Self::set_up`]. Initial values are not set, and forces are not evaluated. Collective.
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
-        (pieces, refined): (Vec<Point>, Grids<'a>),
+        (points, refined): (Vec<Point>, Grids<'a>),
         time: Option<u64>,
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
         let cutoffs = cutoffs(problem);
-        let total = comm::total(comm, pieces.len() as u64);
+        let total = comm::total(comm, points.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // With this slack, both ends of the longest bonds exist on the rank, for any rounding of the bond
         // length.
-        let mut domain = distribute_by_time(comm, pieces, total, longest * (1.0 + SLACK), time)?;
+        let mut domain = distribute_by_time(comm, points, total, longest * (1.0 + SLACK), time)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);

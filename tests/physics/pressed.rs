@@ -1,5 +1,5 @@
 //! Contact in relaxations: closed-form reactions, energies, thermal expansion, and equal bits on any number
-//! of ranks and after a restart.
+//! of ranks and after a restart. Also the errors of runs that do not support their contact.
 
 use std::time::Instant;
 
@@ -403,5 +403,63 @@ fn check_restarts(deck: &str) {
     for share in [0.2, 0.55, 0.9] {
         let found = run((share * turns as f64) as usize).0;
         assert!(found == expected, "stopped after {share} of {turns}");
+    }
+}
+
+#[test]
+fn contact_that_a_run_does_not_support_is_rejected_without_a_deck() {
+    let deck = |settings: &str| {
+        problem(&format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.plate = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [8, 6] }} }}
+            {settings}
+            "
+        ))
+    };
+    let with_method = |contact: &str, method: &str| {
+        let mut problem = deck(&format!("time.end = 2\n{contact}"));
+        let other = deck(&format!("time = {{ end = 2, method = '{method}' }}"));
+        problem.time.method = other.time.method;
+        problem
+    };
+    let mut refined = deck("time.end = 2\ncontact = {}");
+    let trigger = deck("time.end = 2\nrefinement = { levels = 1, trigger = { energy = 0.5 } }");
+    refined.refinement = trigger.refinement;
+    let ball = |keys: &str| {
+        format!("rigid.ball = {{ shape.disc = {{ centre = [4, 9], radius = 2 }}, {keys} }}")
+    };
+    let rough_pair = "contact.pair.own = { bodies = ['plate', 'plate'], static_friction = 0.3, model = 'penalty' }";
+    let cases = [
+        (refined, "[refinement.trigger]: contact is not available"),
+        (with_method("contact = {}", "static"), "method: \"static\""),
+        (
+            with_method(&ball("stiffness = 3"), "static"),
+            "method: \"static\"",
+        ),
+        (
+            with_method("contact.friction = 0.3", "relaxation"),
+            "[contact]: friction depends on velocities",
+        ),
+        (
+            with_method(rough_pair, "relaxation"),
+            "[contact.pair.own]: friction depends on velocities",
+        ),
+        (
+            with_method(&ball("friction = 0.3"), "relaxation"),
+            "[rigid.ball]: friction depends on velocities",
+        ),
+        (
+            with_method(&ball("mass = 3"), "relaxation"),
+            "[rigid.ball]: a free body is not available",
+        ),
+    ];
+    for (problem, expected) in cases {
+        let comm = threads::alone();
+        let result = Simulation::<2>::new(&problem, &comm);
+        let message = result.err().map(|error| error.message);
+        let message = message.unwrap_or_else(|| panic!("no error: {expected}"));
+        assert!(message.starts_with(expected), "{message}");
     }
 }

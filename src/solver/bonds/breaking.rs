@@ -43,7 +43,7 @@ impl BreakingBonds {
 impl<const D: usize> Kernel<D> for BreakingBonds {
     type Sums = ([Lanes; 3], [Lanes; D]);
     type Point = AnyPoint;
-    type Far = AnyPoint;
+    type PointJ = AnyPoint;
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 4];
     const READS_STRESSES: bool = true;
@@ -65,8 +65,8 @@ impl<const D: usize> Kernel<D> for BreakingBonds {
         let (breaking, points) = (group.intact, group.points());
         let bond = group.bond.with_stretch(Kernel::<D>::is_linear(self));
         let work = self.work(simd, group);
-        let share = group.weights.own() * group.own_volume * group.volume;
-        let energy = self.laws[0].bond_energy(&bond, group.own, &group.history[0]) * share;
+        let share = group.weights.at_i() * group.volume_i * group.volume_j;
+        let energy = self.laws[0].bond_energy(&bond, group.numbers_i, &group.history[0]) * share;
         let scale = PairLaw::new(self.laws[0], self.laws[1]).toughness_scale(&bond, points);
         let late = (self.criterion).overshoot(simd, &bond, group.ends(), scale, work);
         let overshoot = if self.criterion.reads_work() {

@@ -30,7 +30,7 @@ pub struct MomentSums;
 impl<const D: usize> Kernel<D> for MomentSums {
     type Sums = [Lanes; 14];
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const EXISTS: bool = D == 3;

@@ -148,7 +148,7 @@ impl<L> Force<L> {
 impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Sums = [Lanes; D];
     type Point = L::Point;
-    type Far = L::Point;
+    type PointJ = L::Point;
     type BondHistory = L::BondHistory;
     type Rotation = <L::Force as ForceState<D>>::Rotation;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;

@@ -268,9 +268,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// Same as for [`Self::numbers`].
     #[inline(always)]
-    unsafe fn far_numbers(&self, place: usize) -> K::Far {
+    unsafe fn numbers_j(&self, place: usize) -> K::PointJ {
         // SAFETY: `new` has checked the length.
-        K::Far::load_first::<K::Point>(&self.numbers, |column| unsafe { eight(column, place) })
+        K::PointJ::load_first::<K::Point>(&self.numbers, |column| unsafe { eight(column, place) })
     }
 
     /// # Safety
@@ -337,7 +337,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             let displacement: [Lanes; D] = LaneTuple::each(component);
             (
                 displacement,
-                self.far_numbers(far),
+                self.numbers_j(far),
                 self.limits::<FAST_PATH>(far),
                 self.rotations::<FAST_PATH>(far),
             )
@@ -370,8 +370,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
                 self.limit,
                 K::wanted(self.is_linear),
             ),
-            own_volume: self.volumes[0],
-            volume: self.volumes[1],
+            volume_i: self.volumes[0],
+            volume_j: self.volumes[1],
             force_volume,
             weights: match vector.weighted {
                 [false, _] => Weights::One,
@@ -381,8 +381,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
                     Weights::Each([Lanes::splat(own), Lanes::splat(far)])
                 }
             },
-            own: &here.numbers,
-            far: numbers,
+            numbers_i: &here.numbers,
+            numbers_j: numbers,
             limits_i: &here.limits,
             limits_j: limits,
             rotation_i: &here.rotation,

@@ -13,18 +13,18 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     /// Geometry of the bonds in the form that laws read.
     pub bond: Bond<D>,
     /// Volumes of points i, m³.
-    pub own_volume: Lanes,
+    pub volume_i: Lanes,
     /// Volumes of points j, m³.
-    pub volume: Lanes,
+    pub volume_j: Lanes,
     /// Factor from force states to the force density: V_j/(1 + a), m³, where a is the thermal stretch of the
     /// bond.
     pub force_volume: Lanes,
     /// Weights of the bonds at each end: influence function times volume correction.
     pub weights: Weights,
     /// Point numbers of points i.
-    pub own: &'a K::Point,
+    pub numbers_i: &'a K::Point,
     /// Point numbers of points j.
-    pub far: K::Far,
+    pub numbers_j: K::PointJ,
     /// Thresholds, truncation factors and stress measures of points i.
     pub limits_i: &'a Limits,
     /// Thresholds, truncation factors and stress measures of points j.
@@ -46,12 +46,12 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
 
 impl<K, const D: usize> Group<'_, K, D>
 where
-    K: Kernel<D, Far = <K as Kernel<D>>::Point>,
+    K: Kernel<D, PointJ = <K as Kernel<D>>::Point>,
 {
     /// Point numbers of points i and j.
     #[inline(always)]
     pub fn points(&self) -> [&K::Point; 2] {
-        [self.own, &self.far]
+        [self.numbers_i, &self.numbers_j]
     }
 }
 
@@ -82,14 +82,20 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         K: Kernel<
                 D,
                 Point = L::Point,
-                Far = L::Point,
+                PointJ = L::Point,
                 BondHistory = L::BondHistory,
                 Rotation = <L::Force as ForceState<D>>::Rotation,
             >,
     {
         let ([law_i, law_j], [history_i, history_j]) = (laws, &self.history);
-        let i = law_i.end_work(simd, &self.bond, self.own, history_i, self.rotation_i);
-        let j = law_j.end_work(simd, &self.bond, &self.far, history_j, &self.rotation_j);
+        let i = law_i.end_work(simd, &self.bond, self.numbers_i, history_i, self.rotation_i);
+        let j = law_j.end_work(
+            simd,
+            &self.bond,
+            &self.numbers_j,
+            history_j,
+            &self.rotation_j,
+        );
         weights.sum(i, j)
     }
 
@@ -107,17 +113,17 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     pub fn family(&self) -> u8 {
         match self.weights {
             Weights::One => self.intact,
-            weights => self.intact & weights.own().above(0.0),
+            weights => self.intact & weights.at_i().above(0.0),
         }
     }
 
     /// Multiply a quantity of each bond by V_j and by the weight at point i.
     #[inline(always)]
     pub fn weighted_by_volume(&self, share: Lanes) -> Lanes {
-        let share = share * self.volume;
+        let share = share * self.volume_j;
         match self.weights {
             Weights::One => share,
-            weights => share * weights.own(),
+            weights => share * weights.at_i(),
         }
     }
 }
@@ -153,7 +159,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     type Point: LaneTuple;
 
     /// Point numbers that the kernel reads for points j: none, or the first numbers of [`Self::Point`].
-    type Far: LaneTuple;
+    type PointJ: LaneTuple;
 
     /// Bond history that the kernel reads.
     type BondHistory: LaneTuple;

@@ -124,9 +124,11 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// # Safety
     /// The indices must be below the `reach` of [`Self::new`].
     #[inline(always)]
-    unsafe fn far_numbers(&self, indices: &[u32; 8]) -> K::Far {
+    unsafe fn numbers_j(&self, indices: &[u32; 8]) -> K::PointJ {
         // SAFETY: `new` has checked the length.
-        K::Far::load_first::<K::Point>(&self.numbers, |column| unsafe { gather(column, indices) })
+        K::PointJ::load_first::<K::Point>(&self.numbers, |column| unsafe {
+            gather(column, indices)
+        })
     }
 
     /// # Safety
@@ -217,7 +219,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             inverse_square,
         };
         // SAFETY: as above.
-        let numbers = unsafe { self.far_numbers(&indices) };
+        let numbers = unsafe { self.numbers_j(&indices) };
         // SAFETY: as above.
         let (limits, rotation) = unsafe { (self.limits(&indices), self.rotations(&indices)) };
         let intact = row.groups.intact[group];
@@ -238,16 +240,16 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
                 self.limit,
                 K::wanted(self.is_linear),
             ),
-            own_volume: here.volume,
-            volume,
+            volume_i: here.volume,
+            volume_j: volume,
             force_volume,
             weights: match row.weights {
                 [None, _] => Weights::One,
                 [Some(weights), None] => Weights::Same(weights[group]),
                 [Some(own), Some(far)] => Weights::Each([own[group], far[group]]),
             },
-            own: &here.numbers,
-            far: numbers,
+            numbers_i: &here.numbers,
+            numbers_j: numbers,
             limits_i: &here.limits,
             limits_j: limits,
             rotation_i: &here.rotation,

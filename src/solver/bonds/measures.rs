@@ -33,7 +33,7 @@ pub struct EnergiesAndFamilies {
 impl<const D: usize> Kernel<D> for EnergiesAndFamilies {
     type Sums = [Lanes; 4];
     type Point = AnyPoint;
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;
@@ -54,11 +54,11 @@ impl<const D: usize> Kernel<D> for EnergiesAndFamilies {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
-        let (family, own) = (group.family(), group.own);
+        let (family, own) = (group.family(), group.numbers_i);
         let energy = self.law.bond_energy(&group.bond, own, &group.history[0]);
         let energy = simd.opaque(group.weighted_by_volume(energy));
         sums[0] += simd.keep(energy, family);
-        sums[1] += simd.keep(group.volume, family);
+        sums[1] += simd.keep(group.volume_j, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
         if self.keeps_history {
             let dissipated = Law::<D>::dissipated(&self.law, group.bond.length, &group.history[0]);
@@ -77,7 +77,7 @@ pub struct IntactFamilies;
 impl<const D: usize> Kernel<D> for IntactFamilies {
     type Sums = [Lanes; 2];
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     // AVX2 is enough: this kernel runs only at set-up, after refinements and rebalances, and for outputs.
@@ -90,7 +90,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 2]) {
-        sums[0] += simd.keep(group.volume, group.family());
+        sums[0] += simd.keep(group.volume_j, group.family());
         sums[1] += simd.keep(Lanes::splat(1.0), group.intact);
     }
 }
@@ -106,7 +106,7 @@ pub struct Softened {
 impl<const D: usize> Kernel<D> for Softened {
     type Sums = [Lanes; 1];
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const ISA_SET: IsaSet = IsaSet::Avx2;
@@ -115,7 +115,7 @@ impl<const D: usize> Kernel<D> for Softened {
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
         let lost = Law::<D>::lost_stiffness(&self.law, &group.history[0]);
-        sums[0] += simd.keep(lost * group.volume, group.family());
+        sums[0] += simd.keep(lost * group.volume_j, group.family());
     }
 }
 
@@ -151,7 +151,7 @@ pub struct Stiffness {
 impl<const D: usize> Kernel<D> for Stiffness {
     type Sums = [Lanes; 6];
     type Point = AnyPoint;
-    type Far = AnyPoint;
+    type PointJ = AnyPoint;
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     // AVX2 is enough: this kernel runs only at set-up, and after refinements and rebalances.
@@ -172,14 +172,14 @@ impl<const D: usize> Kernel<D> for Stiffness {
         let length = group.bond.length;
         let xi = &group.bond.reference;
         let bond = &group.bond;
-        let own = Law::<D>::stiffness(&self.laws[0], bond, group.own) * group.weights.own();
-        let far = Law::<D>::stiffness(&self.laws[1], bond, &group.far) * group.weights.far();
+        let own = Law::<D>::stiffness(&self.laws[0], bond, group.numbers_i) * group.weights.at_i();
+        let far = Law::<D>::stiffness(&self.laws[1], bond, &group.numbers_j) * group.weights.at_j();
         // A law with `resists_across` has bond stiffness k I; any other law has k n⊗n.
         let [own_across, far_across] = self.laws.map(|law| Law::<D>::resists_across(&law));
         let none = Lanes::splat(0.0);
         let sum = |across: bool| {
             let share = |end, is| if is == across { end } else { none };
-            (share(own, own_across) + share(far, far_across)) * group.volume
+            (share(own, own_across) + share(far, far_across)) * group.volume_j
         };
         let weight = sum(false) / (length * length);
         add_tensor::<S, D>(simd, sums, group.intact, |_, a, b| weight * xi[a] * xi[b]);
@@ -206,7 +206,7 @@ pub struct Stress {
 impl<const D: usize> Kernel<D> for Stress {
     type Sums = [Lanes; 6];
     type Point = AnyPoint;
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const ANY_LAW: bool = true;
@@ -218,8 +218,8 @@ impl<const D: usize> Kernel<D> for Stress {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
-        let numbers = (group.own, &group.history[0]);
-        let factors = [group.weights.own(), group.volume];
+        let numbers = (group.numbers_i, &group.history[0]);
+        let factors = [group.weights.at_i(), group.volume_j];
         let stress = (self.law).stress_contribution(&group.bond, numbers, factors, PAIRS);
         add_tensor::<S, D>(simd, sums, group.intact, |k, _, _| stress[k]);
     }
@@ -235,7 +235,7 @@ pub struct OutOfPlaneStress {
 impl<const D: usize> Kernel<D> for OutOfPlaneStress {
     type Sums = [Lanes; 1];
     type Point = AnyPoint;
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const EXISTS: bool = D == 2;
@@ -248,7 +248,9 @@ impl<const D: usize> Kernel<D> for OutOfPlaneStress {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
-        let stress = self.law.out_of_plane_bond_stress(&group.bond, group.own);
+        let stress = self
+            .law
+            .out_of_plane_bond_stress(&group.bond, group.numbers_i);
         sums[0] += simd.keep(group.weighted_by_volume(stress), group.intact);
     }
 }
@@ -266,7 +268,7 @@ pub struct FamilyTensors {
 impl<const D: usize> Kernel<D> for FamilyTensors {
     type Sums = FamilyShare<D>;
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const WANTED: Wanted = wanted(true);
@@ -299,7 +301,7 @@ pub struct EnergyRate {
 impl<const D: usize> Kernel<D> for EnergyRate {
     type Sums = [Lanes; 1];
     type Point = ([Lanes; D], AnyPoint);
-    type Far = [Lanes; D];
+    type PointJ = [Lanes; D];
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
     const ANY_LAW: bool = true;
@@ -311,7 +313,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
-        let ((rate_i, numbers), rate_j) = (group.own, &group.far);
+        let ((rate_i, numbers), rate_j) = (group.numbers_i, &group.numbers_j);
         let force: [Lanes; D] = self
             .law
             .force_state(&group.bond, numbers, &group.history[0]);
@@ -319,7 +321,7 @@ impl<const D: usize> Kernel<D> for EnergyRate {
         for d in 0..D {
             power += force[d] * (rate_j[d] - rate_i[d]);
         }
-        let share = power * group.weights.own() * group.force_volume;
+        let share = power * group.weights.at_i() * group.force_volume;
         sums[0] += simd.keep(share, group.intact);
     }
 }
@@ -339,7 +341,7 @@ pub struct Dilatation {
 impl<const D: usize> Kernel<D> for Dilatation {
     type Sums = [Lanes; 3];
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;
@@ -357,7 +359,7 @@ impl<const D: usize> Kernel<D> for Dilatation {
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 3]) {
         let length = group.bond.length;
-        let weight = length * length * group.volume * group.weights.own();
+        let weight = length * length * group.volume_j * group.weights.at_i();
         let growth = weight * group.bond.stretch;
         sums[0] += simd.keep(weight, group.whole);
         sums[1] += simd.keep(weight, group.intact);

@@ -30,7 +30,7 @@ pub struct PassSum<L, const N: usize> {
 impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Sums = L::Sum;
     type Point = L::Point;
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = L::BondHistory;
     type Rotation = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
@@ -50,11 +50,11 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
             && self.law.reads_advanced_history(N)
             && let Some(step) = self.bond_update.history_step()
         {
-            history = (self.law).bond_history(&group.bond, group.own, &history, step);
+            history = (self.law).bond_history(&group.bond, group.numbers_i, &history, step);
         }
         let share = self
             .law
-            .pass_contribution::<N>(&group.bond, group.own, &history);
+            .pass_contribution::<N>(&group.bond, group.numbers_i, &history);
         let weight = simd.keep(group.weighted_by_volume(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
             // Lanes without a bond have no valid length, stretch or direction.
@@ -84,7 +84,7 @@ pub struct FamilySum<const D: usize> {
 impl<const D: usize> Kernel<D> for FamilySum<D> {
     type Sums = <AnyLaw as Law<D>>::ReferenceSum;
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;
@@ -113,7 +113,7 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
         };
         let share = self.law.reference_contribution(&group.bond);
         for k in 0..self.count {
-            let share = share.get(k) * group.volume * group.weights.own();
+            let share = share.get(k) * group.volume_j * group.weights.at_i();
             *sums.get_mut(k) += simd.keep(share, counted);
         }
     }
@@ -127,7 +127,7 @@ pub struct SmallestStretch;
 impl<const D: usize> Kernel<D> for SmallestStretch {
     type Sums = [Lanes; 1];
     type Point = [Lanes; 0];
-    type Far = [Lanes; 0];
+    type PointJ = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;

@@ -26,7 +26,6 @@ pub struct Loaded<const D: usize> {
     load: usize,
     /// Indices of the points in the part.
     points: Vec<u16>,
-    positions: Vec<[f64; 3]>,
     /// Fraction of each point on which the load acts; `None` if the fraction is 1 for all points.
     fractions: Option<Vec<f64>>,
     /// Force density at the present time, N/m³.
@@ -69,22 +68,18 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Force density (N/m³) on a point at a position (m), if the load acts on the whole point.
-    fn on(&self, position: [f64; 3]) -> [f64; D] {
+    /// Force density (N/m³) on a point, if the load acts on the whole point. `position` returns the reference
+    /// position of the point (m).
+    fn on(&self, position: impl Fn() -> [f64; 3]) -> [f64; D] {
         std::array::from_fn(|d| {
-            self.scale * (self.factors[d] * self.values[d].of(&self.now[d], position))
+            self.scale * (self.factors[d] * self.values[d].of(&self.now[d], &position))
         })
     }
 }
 
 impl<const D: usize> Loaded<D> {
     /// Create the loaded points of the load with index `load`. `points` are their indices in the part.
-    pub fn new(
-        load: usize,
-        points: Vec<u16>,
-        positions: Vec<[f64; 3]>,
-        fractions: Option<Vec<f64>>,
-    ) -> Self {
+    pub fn new(load: usize, points: Vec<u16>, fractions: Option<Vec<f64>>) -> Self {
         let none = || vec![[0.0; D]; points.len()];
         Self {
             load,
@@ -92,19 +87,19 @@ impl<const D: usize> Loaded<D> {
             before: none(),
             moved_from: none(),
             points,
-            positions,
             fractions,
         }
     }
 
-    /// Compute the force densities if [`Load::is_due`] is true.
-    pub fn compute_densities(&mut self, loads: &[Load<D>]) {
+    /// Compute the force densities on the points of `part` if [`Load::is_due`] is true.
+    pub fn compute_densities(&mut self, loads: &[Load<D>], part: &Part<'_, D>) {
         let load = &loads[self.load];
         if !load.is_due {
             return;
         }
+        let (model, first) = (part.model, part.first);
         for (k, force) in self.force.iter_mut().enumerate() {
-            let whole = load.on(self.positions[k]);
+            let whole = load.on(|| model.position(first + usize::from(self.points[k])));
             let fraction = self.fractions.as_ref().map(|fractions| fractions[k]);
             *force =
                 whole.map(|component| fraction.map_or(component, |fraction| fraction * component));

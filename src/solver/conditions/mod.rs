@@ -273,7 +273,7 @@ impl<const D: usize> Conditions<D> {
                         };
                         let factors = std::array::from_fn(|d| factors[d] / divisor);
                         let points = only(&points, is_divided);
-                        conditions.add_load(model, Load::new(index, values, factors), points);
+                        conditions.add_load(Load::new(index, values, factors), points);
                     }
                 }
                 Action::Force(values) => {
@@ -285,13 +285,12 @@ impl<const D: usize> Conditions<D> {
                     }
                     let volume = reduce(comm, &mut volume)[0];
                     let load = Load::new(index, values, [1.0 / volume; D]);
-                    conditions.add_load(model, load, points);
+                    conditions.add_load(load, points);
                 }
                 Action::Temperature(value) => {
                     let temperature = conditions.temperatures.add(value);
                     for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
-                        let (numbers, positions) = numbers_in_part(model, points);
-                        let heated = Heated::new(temperature, numbers, positions);
+                        let heated = Heated::new(temperature, numbers_in_part(points));
                         conditions.on_parts[part_of(points[0])].heated.push(heated);
                     }
                 }
@@ -299,8 +298,7 @@ impl<const D: usize> Conditions<D> {
         }
         for (support, points) in supported.iter().enumerate() {
             for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
-                let (numbers, positions) = numbers_in_part(model, points);
-                let supported = Supported::new(support, numbers, positions);
+                let supported = Supported::new(support, numbers_in_part(points));
                 conditions.on_parts[part_of(points[0])]
                     .supports
                     .push(supported);
@@ -311,19 +309,13 @@ impl<const D: usize> Conditions<D> {
 
     /// Add a load on `points`, which are local indices of owned points in ascending order. The load acts on
     /// the fraction `fractions[k]` of the point `points[k]`. `fractions` is `None` if all fractions are 1.
-    fn add_load(
-        &mut self,
-        model: &Model<D>,
-        load: Load<D>,
-        (points, fractions): (Vec<u32>, Option<Vec<f64>>),
-    ) {
+    fn add_load(&mut self, load: Load<D>, (points, fractions): (Vec<u32>, Option<Vec<f64>>)) {
         let mut first = 0;
         for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
             let own = first..first + points.len();
             first = own.end;
             let fractions = fractions.as_ref().map(|fractions| fractions[own].to_vec());
-            let (numbers, positions) = numbers_in_part(model, points);
-            let loaded = Loaded::new(self.loads.len(), numbers, positions, fractions);
+            let loaded = Loaded::new(self.loads.len(), numbers_in_part(points), fractions);
             self.on_parts[part_of(points[0])].loads.push(loaded);
         }
         self.loads.push(load);
@@ -482,11 +474,10 @@ fn part_of(point: u32) -> usize {
     point as usize / PART
 }
 
-/// Return two values for each of these owned points: its index in its part, and its position (m).
-fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16>, Vec<[f64; 3]>) {
+/// Return the index of each of these owned points in its part.
+fn numbers_in_part(points: &[u32]) -> Vec<u16> {
     let each = points.iter().map(|point| *point as usize);
-    each.map(|point| ((point % PART) as u16, model.position(point)))
-        .unzip()
+    each.map(|point| (point % PART) as u16).collect()
 }
 
 impl<'a, const D: usize> PartConditions<'a, D> {
@@ -538,9 +529,9 @@ impl<'a, const D: usize> PartConditions<'a, D> {
     }
 
     /// Compute the force densities of the loads that are due, see `Load::is_due`.
-    pub fn find_loads(&mut self) {
+    pub fn find_loads(&mut self, part: &Part<'_, D>) {
         for load in &mut self.on.loads {
-            load.compute_densities(self.stage.loads);
+            load.compute_densities(self.stage.loads, part);
         }
     }
 
@@ -549,7 +540,7 @@ impl<'a, const D: usize> PartConditions<'a, D> {
         if !self.stage.loads.iter().any(|load| load.is_due) {
             return;
         }
-        self.find_loads();
+        self.find_loads(part);
         for load in &self.on.loads {
             load.clear(part);
         }

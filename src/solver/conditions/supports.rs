@@ -50,7 +50,6 @@ pub struct Supported {
     support: usize,
     /// Index of each of these points within the part.
     points: Vec<u16>,
-    positions: Vec<[f64; 3]>,
     /// Reaction before the step, N/m³.
     before: Vec<f64>,
     /// Displacement before the step, m.
@@ -134,14 +133,13 @@ impl Support {
 impl Supported {
     /// Create the supported points of the support with index `support`. `points` are the indices of these
     /// points in the part.
-    pub fn new(support: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
+    pub fn new(support: usize, points: Vec<u16>) -> Self {
         Self {
             support,
             before: vec![0.0; points.len()],
             moved_from: vec![0.0; points.len()],
             motion: Vec::new(),
             points,
-            positions,
         }
     }
 
@@ -189,18 +187,19 @@ impl Supported {
     ) {
         let support = &supports[self.support];
         let PrescribedDisplacement { step, values: at } = &support.displacement;
-        let value = |at: &At, k: usize| support.values.of(at, self.positions[k]);
+        let (model, first) = (part.model, part.first);
+        let value = |at: &At, point: usize| support.values.of(at, || model.position(first + point));
         let moving = part.component(support.component);
         for (k, point) in self.points.iter().enumerate() {
             let point = usize::from(*point);
             let displacement = &mut moving.displacement[point];
             match support.motion {
-                Motion::Displacement => *displacement = value(&at[1], k),
+                Motion::Displacement => *displacement = value(&at[1], point),
                 // Integrate the velocity by the trapezoidal rule, from the displacement before the drift.
                 Motion::Velocity if *step > 0.0 => {
                     *displacement = self.moved_from[k];
                     for at in at {
-                        *displacement += 0.5 * step * value(at, k);
+                        *displacement += 0.5 * step * value(at, point);
                     }
                 }
                 // At the start, the points have their initial displacement.
@@ -223,8 +222,8 @@ impl Supported {
         let support = &supports[self.support];
         let PrescribedVelocity { time, step, same } = support.velocity;
         let (model, first) = (part.model, part.first);
-        self.react(support.component, part, |k, point| {
-            let own = || support.moving(self.positions[k], time, step);
+        self.react(support.component, part, |point| {
+            let own = || support.moving(model.position(first + point), time, step);
             let (velocity, acceleration) = same.unwrap_or_else(own);
             (velocity, model.density_of(first + point) * acceleration)
         })
@@ -239,26 +238,25 @@ impl Supported {
     ) -> bool {
         // A required force of −0 makes the reaction the exact opposite of the other forces, even for a force
         // of 0.
-        self.react(supports[self.support].component, part, |_, _| (0.0, -0.0))
+        self.react(supports[self.support].component, part, |_| (0.0, -0.0))
     }
 
     /// Set the velocities of the points, and compute the reactions that give the required total force
     /// density. `wanted` returns the velocity (m/s) and the total force density (N/m³) of a point, given its
-    /// index in this support and its index in the part. Returns whether the velocities and reactions are
-    /// finite.
+    /// index in the part. Returns whether the velocities and reactions are finite.
     fn react<const D: usize>(
         &self,
         component: usize,
         part: &mut Part<'_, D>,
-        wanted: impl Fn(usize, usize) -> (f64, f64),
+        wanted: impl Fn(usize) -> (f64, f64),
     ) -> bool {
         let (model, first) = (part.model, part.first);
         let moving = part.component(component);
         let reaction = moving.reaction.expect("a run with supports has reactions");
         let mut finite = true;
-        for (k, point) in self.points.iter().enumerate() {
+        for point in &self.points {
             let point = usize::from(*point);
-            let (velocity, needed) = wanted(k, point);
+            let (velocity, needed) = wanted(point);
             let other = model.with_damping(first + point, moving.force.at(point), velocity);
             moving.velocity[point] = velocity;
             reaction[point] = needed - other;

@@ -17,7 +17,6 @@ pub struct Heated {
     temperature: usize,
     /// Indices of the points in the part.
     points: Vec<u16>,
-    positions: Vec<[f64; 3]>,
 }
 
 /// All prescribed temperatures of a stage.
@@ -76,8 +75,9 @@ impl Temperatures {
         }
         for heated in heated {
             let Temperature { values, now } = &self.each[heated.temperature];
-            for (point, position) in heated.points.iter().zip(&heated.positions) {
-                temperature[usize::from(*point)] = values.of(now, *position);
+            for point in &heated.points {
+                let point = usize::from(*point);
+                temperature[point] = values.of(now, || model.position(first + point));
             }
         }
         for (k, (stretch, value)) in stretch.iter_mut().zip(temperature.iter()).enumerate() {
@@ -91,11 +91,10 @@ impl Temperatures {
 impl Heated {
     /// Create the entry for a temperature condition. `temperature` is the index of the condition, and
     /// `points` are the indices of its points within the part.
-    pub fn new(temperature: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
+    pub fn new(temperature: usize, points: Vec<u16>) -> Self {
         Self {
             temperature,
             points,
-            positions,
         }
     }
 }

@@ -39,9 +39,10 @@ impl Values {
         }
     }
 
-    /// The value at a position (m).
-    pub fn of(&self, at: &At, position: [f64; 3]) -> f64 {
-        let own = || self.expression.evaluate(position, at.time);
+    /// The value at a point. `position` returns the position of the point (m). It is called only if the value
+    /// depends on the position.
+    pub fn of(&self, at: &At, position: impl Fn() -> [f64; 3]) -> f64 {
+        let own = || self.expression.evaluate(position(), at.time);
         at.same.unwrap_or_else(own)
     }
 }

@@ -2,14 +2,15 @@
 //! memory does not depend on the extent of the positions.
 
 /// Integer coordinates of a cell; 0 beyond the dimension.
-pub(super) type Cell = [i64; 3];
+pub type Cell = [i64; 3];
 
 /// Return the cell that contains a position (m). `edge` is the edge length of the cells, m.
-pub(super) fn cell_of(position: [f64; 3], edge: f64) -> Cell {
+pub fn cell_of(position: [f64; 3], edge: f64) -> Cell {
     position.map(|x| (x / edge).floor() as i64)
 }
 
-pub(super) fn hash(cell: Cell) -> u64 {
+/// Return the hash of a cell. The ranks and buckets of cells follow from it.
+pub fn hash(cell: Cell) -> u64 {
     cell.into_iter().fold(0_u64, |hash, k| {
         let mixed = (hash ^ k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         mixed ^ mixed >> 29

@@ -17,7 +17,7 @@
 //! earlier. The work of friction and damping in a step is computed by the trapezoidal rule.
 
 mod by_pair;
-mod cells;
+pub(super) mod cells;
 mod ghosts;
 mod pair;
 mod rigid;
@@ -38,7 +38,7 @@ use crate::problem::Problem;
 use super::bonds::Forces;
 use super::model::Model;
 use super::motion::Fields;
-use super::motion::load_step::stable_density;
+use super::motion::fictitious_density::stable_density;
 use ghosts::Ghosts;
 use pair::{ContactPoint, Demand, PairRule, Touch};
 use rigid::{RigidBody, WrenchSums};

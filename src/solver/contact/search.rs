@@ -102,20 +102,13 @@ impl<const D: usize> Contact<D> {
         let (skin, expansion) = (SKIN * self.largest, 1.0 + stretch);
         let reach = self.largest * expansion + skin;
         let mut all: Vec<Ghost> = (0..model.owned())
-            .map(|point| {
-                let reference = model.position(point);
-                let mut position = reference;
-                for d in 0..D {
-                    position[d] += fields.displacement[d][point];
-                }
-                Ghost {
-                    id: model.ids[point],
-                    index: point as u64,
-                    block: model.block[point].into(),
-                    volume: model.volume[point],
-                    reference,
-                    position,
-                }
+            .map(|point| Ghost {
+                id: model.ids[point],
+                index: point as u64,
+                block: model.block[point].into(),
+                volume: model.volume[point],
+                reference: model.position(point),
+                position: fields.position(model, point),
             })
             .collect();
         let is_thermal = fields.thermal_stretch.is_some();

@@ -515,6 +515,15 @@ impl<const D: usize> Fields<D> {
         fields.flat_map(|(_, columns)| columns)
     }
 
+    /// Present position of a local point, m; components beyond the dimension are 0.
+    pub fn position(&self, model: &Model<D>, point: usize) -> [f64; 3] {
+        let mut position = model.position(point);
+        for d in 0..D {
+            position[d] += self.displacement[d][point];
+        }
+        position
+    }
+
     /// Allocate the fields with all points at rest at their reference positions.
     pub fn new(model: &Model<D>, needs: Needs) -> Self {
         let (owned, local) = (model.owned(), model.volume.len());

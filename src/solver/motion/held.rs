@@ -214,6 +214,7 @@ impl<const D: usize> Simulation<'_, D> {
                 && plane.iter().any(|d| pieces.is_unloaded[*d][point] == 0.0)
         };
         let any = |point: usize| planes().any(|axis| is_suspect(point, axis));
+        let position = |point: usize| self.fields.position(&self.model, point);
         self.first_of_pieces(pieces, any, |piece| {
             let mut flags = [0.0; 3];
             let mut moments = [const { ExactSum::ZERO }; 4];
@@ -221,25 +222,25 @@ impl<const D: usize> Simulation<'_, D> {
                 planes().for_each(|axis| flags[axis] = f64::from(is_suspect(*point, axis)));
                 let volume = self.model.volume[*point];
                 moments[3].add(volume);
-                let place = self.place(*point);
-                (0..D).for_each(|d| moments[d].add(volume * place[d]));
+                let position = position(*point);
+                (0..D).for_each(|d| moments[d].add(volume * position[d]));
             }
             self.comm.max(&mut flags);
             let moments = reduce(self.comm, &mut moments);
             let centroid: [f64; D] = std::array::from_fn(|d| moments[d] / moments[3]);
             let torque = |axis: usize, point: usize, force: [f64; D]| {
                 let [a, b] = PLANES[axis];
-                let place = self.place(point);
-                (place[a] - centroid[a]) * force[b] - (place[b] - centroid[b]) * force[a]
+                let position = position(point);
+                (position[a] - centroid[a]) * force[b] - (position[b] - centroid[b]) * force[a]
             };
             let mut sums = [const { ExactSum::ZERO }; 6];
             for point in &piece.points {
                 let force = load_on(&self.model, &self.fields, *point);
-                let place = self.place(*point);
+                let position = position(*point);
                 for axis in planes() {
                     let plane = PLANES[axis];
                     let norm = |of: [f64; D]| libm::hypot(of[plane[0]], of[plane[1]]);
-                    let arm = std::array::from_fn(|d| place[d] - centroid[d]);
+                    let arm = std::array::from_fn(|d| position[d] - centroid[d]);
                     sums[axis].add(torque(axis, *point, force));
                     sums[3 + axis].add(norm(arm) * norm(force));
                 }
@@ -260,12 +261,6 @@ impl<const D: usize> Simulation<'_, D> {
                 ),
             })
         })
-    }
-
-    /// Present position of an owned point, m.
-    fn place(&self, point: usize) -> [f64; D] {
-        let displacement = &self.fields.displacement;
-        std::array::from_fn(|d| self.model.reference[d][point] + displacement[d][point])
     }
 
     /// Return the index of the condition with the largest load on a set of points. `points` contains the

@@ -36,13 +36,9 @@ use crate::solver::conditions::Work;
 use crate::solver::model::Model;
 
 use super::Fields;
-use super::stable_step::largest_eigenvalue;
 
 /// Minimum number of points of a task in a parallel loop; the last task may have fewer.
 pub(super) const CHUNK: usize = 4096;
-
-/// Safety factor on the fictitious density, because rotations of bonds can increase the stiffness of a point.
-const MARGIN: f64 = 1.2;
 
 /// The unbalanced force is round-off if its norm is below this fraction of ‖V ρ u‖.
 const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
@@ -178,26 +174,6 @@ impl LoadStep {
             has_failed: failed == 1,
         }
     }
-}
-
-/// Fictitious density (N/m⁴) with which iterations of Δt = 1 are stable. `eigenvalue` is the largest
-/// eigenvalue of the matrix D of a point (N/m⁴); see [`super::stable_step`].
-pub fn stable_density(eigenvalue: f64) -> f64 {
-    0.5 * MARGIN * eigenvalue
-}
-
-/// Fictitious density of each owned point (N/m⁴): an upper bound of the point's stiffness, with which
-/// iterations of Δt = 1 are stable. The density of a point without bonds is infinite. `stiffness` contains
-/// the matrices D of the owned points; see [`super::stable_step`].
-pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
-    let density = |point: usize| {
-        let entries = stiffness.each_ref().map(|column| column[point]);
-        match stable_density(largest_eigenvalue(&entries)) {
-            0.0 => f64::INFINITY,
-            density => density,
-        }
-    };
-    (0..stiffness[0].len()).map(density).collect()
 }
 
 /// Return the squared norms (N²) of four vectors of a point: total force, load, reaction, and V ρ u with the
@@ -470,7 +446,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.conditions.set_loads(then, factors, true);
             self.walk(|part, mut conditions| {
                 let reaction = reaction.as_ref().map(|field| part.of(field));
-                conditions.find_loads();
+                conditions.find_loads(part);
                 conditions.record_for_work(part.of(displacement), reaction);
                 true
             });
@@ -478,7 +454,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.conditions.set_loads(now, factors, true);
         }
         self.walk(|part, mut conditions| {
-            conditions.find_loads();
+            conditions.find_loads(part);
             conditions.add_work(part, work);
             true
         });

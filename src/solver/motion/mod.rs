@@ -5,6 +5,7 @@ mod banded;
 pub mod clock;
 mod coarse_grid;
 mod contact_step;
+pub mod fictitious_density;
 pub mod fields;
 pub mod held;
 pub mod integrator;

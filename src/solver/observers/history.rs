@@ -728,11 +728,11 @@ fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Exact
     let axes = rotation_axes(D);
     sums_over(model.owned(), axes.len(), &|sums, point| {
         let mass = model.density_of(point) * model.volume[point];
-        let place = |d: usize| model.reference[d][point] + fields.displacement[d][point];
+        let position = fields.position(model, point);
         for (sum, axis) in sums.iter_mut().zip(axes.clone()) {
             let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
             let velocity = [a, b].map(|d| fields.velocity[d][point]);
-            sum.add(mass * (place(a) * velocity[1] - place(b) * velocity[0]));
+            sum.add(mass * (position[a] * velocity[1] - position[b] * velocity[0]));
         }
     })
 }

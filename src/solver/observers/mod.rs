@@ -3,7 +3,6 @@
 
 mod centre_line;
 mod columns;
-mod contact;
 mod crack_edge;
 mod crack_path;
 mod crack_points;
@@ -12,6 +11,7 @@ mod cracked;
 mod fragments;
 mod front;
 pub mod history;
+mod interpenetration;
 mod j_integral;
 mod j_weight;
 pub mod nearest;
@@ -23,9 +23,9 @@ mod statistics;
 mod tip;
 
 pub use centre_line::{Branch, Vertex};
-pub use contact::{Contact, ContactWatch};
 pub use crack_surface::Surface;
 pub use history::{Energies, HistoryObserver, HistoryRow, column_names, state_energies};
+pub use interpenetration::{Interpenetration, InterpenetrationWatch};
 pub use nearest::{Nearest, nearest};
 pub use schedule::Schedule;
 pub use snapshot::Snapshot;

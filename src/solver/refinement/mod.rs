@@ -175,15 +175,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// because its points have been freed.
     fn regrid(&mut self, grids: Grids<'a>, removed: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
-        let pieces = self.pieces_on(&grids);
+        let points = self.points_on(&grids);
         let GridState {
             rows,
             width,
             lengths,
             broken,
-        } = self.state_on(&grids, removed, &pieces);
+        } = self.state_on(&grids, removed, &points);
         self.release();
-        let mut other = self.on(grids, pieces)?;
+        let mut other = self.on(grids, points)?;
         let order = other.id_order();
         let rows = order.spread(comm, &rows, width);
         let own_lengths = order.spread(comm, &lengths, 1);
@@ -206,15 +206,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Create the points of `grids` that lie in the level-0 cells of this rank.
-    fn pieces_on(&self, grids: &Grids<'a>) -> Vec<Point> {
-        let coarse = self.pieces().into_iter();
+    fn points_on(&self, grids: &Grids<'a>) -> Vec<Point> {
+        let coarse = self.owned_points().into_iter();
         let coarse = coarse.filter(|point| point.id < grids.coarsest());
         grids.points(grids.unrefined(coarse))
     }
 
     /// Create the run on other grids, at time 0. Collective.
-    fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
-        Self::of_points(self.problem, self.comm, (pieces, grids), None, &mut || {
+    fn on(&self, grids: Grids<'a>, points: Vec<Point>) -> Result<Self> {
+        Self::of_points(self.problem, self.comm, (points, grids), None, &mut || {
             Ok(())
         })
     }
@@ -228,22 +228,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
-            let pieces = self.pieces_on(&grids);
+            let points = self.points_on(&grids);
             self.release();
-            *self = self.on(grids, pieces)?;
+            *self = self.on(grids, points)?;
         } else {
             self.grids = grids;
         }
         Ok(())
     }
 
-    /// Compute the state of the points of new grids from the present state. `pieces` are the points that this
+    /// Compute the state of the points of new grids from the present state. `points` are the points that this
     /// rank creates on the new grids. `removed` are the present nodes that the new grids no longer have.
     /// Collective.
-    fn state_on(&mut self, grids: &Grids<'_>, removed: &[NodeKey], pieces: &[Point]) -> GridState {
+    fn state_on(&mut self, grids: &Grids<'_>, removed: &[NodeKey], points: &[Point]) -> GridState {
         let comm = self.comm;
         let past = Past::new(self, grids, removed);
-        let (ids, rows) = past.rows(self, grids, pieces);
+        let (ids, rows) = past.rows(self, grids, points);
         let mut all_broken = self.broken();
         let (mut own, mut own_lengths) = (Vec::new(), vec![0; ids.len()]);
         let staying = past.staying(self.model.owned());

@@ -156,13 +156,13 @@ impl Past {
         Some((at(place)?, parents.collect::<Option<_>>()?))
     }
 
-    /// Return ids and rows of the owned points that are not removed, and of the new points in `pieces`, which
+    /// Return ids and rows of the owned points that are not removed, and of the new points in `points`, which
     /// this rank creates.
     pub fn rows<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
         grids: &Grids<'_>,
-        pieces: &[Point],
+        points: &[Point],
     ) -> (Vec<u64>, Vec<f64>) {
         let model = &simulation.model;
         let mut ids = Vec::new();
@@ -172,13 +172,13 @@ impl Past {
             rows.extend(self.columns.iter().map(|column| column[point]));
         }
         let mut born = Born::default();
-        for piece in pieces.iter().filter(|piece| piece.id >= model.coarsest) {
-            let body = simulation.problem.body_of(piece.block as usize);
-            let Some(place) = grids.index_at(body, piece.position) else {
+        for point in points.iter().filter(|point| point.id >= model.coarsest) {
+            let body = simulation.problem.body_of(point.block as usize);
+            let Some(place) = grids.index_at(body, point.position) else {
                 continue;
             };
             if !self.at.contains_key(&(body, place)) {
-                ids.push(piece.id);
+                ids.push(point.id);
                 let row = self.row(grids, (body, place), &mut born);
                 rows.extend_from_slice(&born.rows[row..row + self.columns.len()]);
             }

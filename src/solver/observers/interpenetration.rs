@@ -1,7 +1,7 @@
 //! Detection of bodies that pass through each other in runs without `[contact]`. This module finds two points
 //! of different bodies whose distance is below a limit. For bodies without common bonds, the limit is the
 //! spacing of the two points: the mean of the edges of their cells. For bodies whose common bonds have
-//! broken, the limit is half the spacing. [`Contact`] states the exact limits.
+//! broken, the limit is half the spacing. [`Interpenetration`] states the exact limits.
 //!
 //! If the bounding boxes of two bodies overlap or nearly touch, a third box is computed. It contains all
 //! points of each body that are near the other body. The points in this box are distributed to the ranks by
@@ -16,7 +16,7 @@ use crate::comm::{self, Communicator, Found, least};
 use crate::points::bins::Bins;
 use crate::points::distance_squared;
 use crate::solver::Simulation;
-use crate::solver::model::Model;
+use crate::solver::contact::cells::{cell_of, hash};
 
 /// Edge of a cell divided by [`Meeting::radius`]. If cells are large, fewer points in total lie near the
 /// border of a cell, so fewer points are sent to several ranks.
@@ -38,7 +38,7 @@ const CHUNK: usize = 1 << 15;
 /// initial distance. For bodies that bonds joined at the start of the run, the limits are smaller: half the
 /// spacing, and half the initial distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
+pub struct Interpenetration {
     /// Bodies of the points, the lower index first.
     pub bodies: [usize; 2],
     /// Ids of the points.
@@ -51,8 +51,8 @@ pub struct Contact {
     pub were_bonded: bool,
 }
 
-/// Pairs of bodies that may come into contact.
-pub struct ContactWatch {
+/// Pairs of bodies that may pass through each other.
+pub struct InterpenetrationWatch {
     /// All pairs of bodies if bonds can break in this run, otherwise the pairs that no bond joins.
     pairs: Vec<Pair>,
     /// Largest spacing of each body, m.
@@ -93,8 +93,8 @@ struct Candidate {
     spacing: f64,
 }
 
-impl ContactWatch {
-    /// Find the pairs of bodies that may come into contact. Collective.
+impl InterpenetrationWatch {
+    /// Find the pairs of bodies that may pass through each other. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let bodies = simulation.problem.bodies.len();
@@ -133,8 +133,8 @@ impl ContactWatch {
     }
 
     /// Find the nearest two points of different bodies; `None` if no two points are too near, see
-    /// [`Contact`]. The result is the same on all ranks. Collective.
-    pub fn find_contact<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
+    /// [`Interpenetration`]. The result is the same on all ranks. Collective.
+    pub fn find<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Interpenetration> {
         let meetings = self.meetings(simulation);
         if meetings.is_empty() {
             return None;
@@ -164,11 +164,11 @@ impl ContactWatch {
         }
         // Lower corners of the bounding boxes, and negative upper corners, so that one element-wise minimum
         // gives both.
-        let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
+        let (model, fields) = (&simulation.model, &simulation.fields);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
             let first = 6 * simulation.problem.body_of(usize::from(model.block[point]));
-            for (k, x) in place_of(model, displacement, point).into_iter().enumerate() {
+            for (k, x) in fields.position(model, point).into_iter().enumerate() {
                 corners[first + k] = corners[first + k].min(x);
                 corners[first + 3 + k] = corners[first + 3 + k].min(-x);
             }
@@ -204,19 +204,6 @@ impl ContactWatch {
     }
 }
 
-/// Present position of an owned point, m.
-fn place_of<const D: usize>(
-    model: &Model<D>,
-    displacement: &[Vec<f64>; D],
-    point: usize,
-) -> [f64; 3] {
-    let mut place = model.position(point);
-    for d in 0..D {
-        place[d] += displacement[d][point];
-    }
-    place
-}
-
 /// Select the owned points in the boxes where bodies may touch. If bonds joined two bodies at the start of
 /// the run, select only those of their points that have broken bonds. Returns the points as bytes, one buffer
 /// for each receiving rank.
@@ -232,11 +219,11 @@ fn candidates<const D: usize>(
             of_body[body].push((number, second));
         }
     }
-    let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
-    let broken = simulation.fields.broken_bonds.as_deref();
+    let (model, fields) = (&simulation.model, &simulation.fields);
+    let broken = fields.broken_bonds.as_deref();
     for (point, block) in model.block.iter().enumerate() {
         let is_whole = broken.is_none_or(|broken| broken[point] == 0.0);
-        let place = place_of(model, displacement, point);
+        let place = fields.position(model, point);
         for (number, second) in &of_body[simulation.problem.body_of(usize::from(*block))] {
             let meeting = &meetings[*number];
             if meeting.pair.were_bonded && is_whole {
@@ -269,13 +256,12 @@ fn candidates<const D: usize>(
 fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
     let mut homes = Vec::with_capacity(1);
     for corner in 0..1_u32 << D {
-        let hash = (0..D).fold(0_u64, |hash, k| {
+        let mut corner_place = place;
+        for (k, x) in corner_place[..D].iter_mut().enumerate() {
             let side = f64::from(2 * (corner >> k & 1)) - 1.0;
-            let cell = ((place[k] + side * reach) / edge).floor() as i64;
-            let mixed = (hash ^ cell as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            mixed ^ mixed >> 29
-        });
-        let home = (hash % ranks as u64) as usize;
+            *x += side * reach;
+        }
+        let home = (hash(cell_of(corner_place, edge)) % ranks as u64) as usize;
         if !homes.contains(&home) {
             homes.push(home);
         }
@@ -284,27 +270,27 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
 }
 
 /// Find the nearest pair among the given points of two bodies. A pair must have a distance below the limit,
-/// see [`Contact`]; `None` if there is no such pair.
-fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
+/// see [`Interpenetration`]; `None` if there is no such pair.
+fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Interpenetration> {
     if first.is_empty() || second.is_empty() {
         return None;
     }
     let places: Vec<[f64; 3]> = first.iter().map(|candidate| candidate.place).collect();
     let bins = Bins::new(&places, meeting.radius);
-    let mut nearest: Option<Contact> = None;
+    let mut nearest: Option<Interpenetration> = None;
     for b in second {
         bins.within(b.place, |index, squared| {
             let a = &first[index as usize];
             let spacing = 0.5 * (a.spacing + b.spacing);
             let reference = distance_squared(a.reference, b.reference).sqrt();
-            let found = Contact {
+            let found = Interpenetration {
                 bodies: meeting.pair.bodies,
                 ids: [a.id, b.id],
                 place: std::array::from_fn(|k| 0.5 * (a.place[k] + b.place[k])),
                 distance: squared.sqrt(),
                 were_bonded: meeting.pair.were_bonded,
             };
-            let is_nearer = |than: &Contact| {
+            let is_nearer = |than: &Interpenetration| {
                 let order = found.distance.total_cmp(&than.distance);
                 order.then(found.ids.cmp(&than.ids)).is_lt()
             };
@@ -322,16 +308,19 @@ fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<C
 }
 
 /// Return the nearest pair of all ranks; pairs at equal distance are ordered by ids. Collective.
-fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Contact> {
-    let found = own.map(|contact| {
-        let ([a, b], [x, y, z]) = (contact.bodies, contact.place);
+fn agree_on_nearest(
+    comm: &dyn Communicator,
+    own: Option<Interpenetration>,
+) -> Option<Interpenetration> {
+    let found = own.map(|own| {
+        let ([a, b], [x, y, z]) = (own.bodies, own.place);
         Found {
-            key: contact.distance,
-            ids: contact.ids,
+            key: own.distance,
+            ids: own.ids,
             payload: [
                 a as f64,
                 b as f64,
-                f64::from(u8::from(contact.were_bonded)),
+                f64::from(u8::from(own.were_bonded)),
                 x,
                 y,
                 z,
@@ -343,7 +332,7 @@ fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Con
         ids,
         payload: [a, b, were_bonded, x, y, z],
     } = least(comm, found)?;
-    Some(Contact {
+    Some(Interpenetration {
         bodies: [a as usize, b as usize],
         ids,
         place: [x, y, z],
