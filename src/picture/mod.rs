@@ -48,6 +48,7 @@ pub use arrows::Vectors;
 pub use canvas::Image;
 pub use colours::{ColourMap, is_damage};
 pub use projection::{Bounds, Camera};
+pub use scale::takes_prefix;
 pub use scene::{Axis, Scene, View, is_in_slice};
 
 use crate::error::Result;

@@ -167,7 +167,7 @@ pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
 }
 
 /// Test whether a prefix scales the whole unit: true for "m/s", false for "m²", because 1 mm² is 10⁻⁶ m².
-fn takes_prefix(unit: &str) -> bool {
+pub fn takes_prefix(unit: &str) -> bool {
     let end = unit
         .find(|character: char| !character.is_ascii_alphabetic())
         .unwrap_or(unit.len());
