@@ -338,6 +338,15 @@ fn the_difference_of_two_results_is_drawn() {
     let picture = slow.join("velocity_y_difference.png");
     let is_end = |[red, green, blue]: [u8; 3]| red.abs_diff(blue) > 120 && green < 100;
     assert!(fraction(&picture, is_end) < 0.02);
+    // The same holds for damage, whose range starts at 0 in other pictures.
+    let block = Drawings::new(&folder, "block", BLOCK);
+    let path = block.result.to_str().unwrap();
+    for times in [&[][..], &["--time", "0,last"]] {
+        let output = ["--minus", path, "-o", block.picture.to_str().unwrap()];
+        let output = command("plot", &[&block.result], &[&output[..], times].concat());
+        expect(&output, 0, &["difference of damage"]);
+        assert!(fraction(&block.picture, is_end) < 0.02, "{times:?}");
+    }
     for (subtrahend, options, words) in [
         (&other, &[][..], "has no output at t = 2e-6 s"),
         (&coarse, &[], "has other points at t = 2e-6 s"),
