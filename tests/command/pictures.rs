@@ -390,6 +390,21 @@ fn colour_maps_and_logarithmic_scales() {
 }
 
 #[test]
+fn lines_end_at_the_frame() {
+    let folder = Folder::new("lines");
+    let plate = Drawings::new(&folder, "plate", PLATE);
+    let path = folder.write("path.csv", "x,y\n0.01,0.003\n0.5,0.007\n");
+    let without = pixels(plate.draw(&[]));
+    let with = pixels(plate.draw(&["--path", path.to_str().unwrap()]));
+    assert_ne!(with, without);
+    // The frame ends before the last eighth of the columns, which contains the colour bar.
+    let (width, _, _) = png(&plate.picture);
+    let is_beside = |pixel: usize| pixel as u32 % width >= 7 * width / 8;
+    let mut beside = (0..with.len()).filter(|pixel| is_beside(*pixel));
+    assert!(beside.all(|pixel| with[pixel] == without[pixel]));
+}
+
+#[test]
 fn thresholds_and_half_spaces_leave_points_out() {
     let folder = Folder::new("filters");
     let plate = Drawings::new(&folder, "plate", PLATE);
