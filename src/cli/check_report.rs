@@ -16,7 +16,7 @@ use fissure::solver::assign::{block_laws, pair_damage_laws};
 use fissure::solver::calibration::separation_energy_ratio;
 use fissure::survey::{BodyFigures, Cost, Interior, Seconds, Survey};
 
-use super::format::{bytes, count, duration, si};
+use super::format::{bytes, count, duration, si, with_unit};
 use super::report::Report;
 
 /// Append the path, the title, the dimension and the horizon of the deck; in 1-D, also the constraint
@@ -313,7 +313,7 @@ pub fn rigid(report: &mut Report, problem: &Problem) {
         let motion = match &rigid.motion {
             RigidMotion::Driven(motion) if motion.is_empty() => "fixed".to_owned(),
             RigidMotion::Driven(_) => "driven".to_owned(),
-            RigidMotion::Free { mass, .. } => format!("free, {}", si(*mass, "kg")),
+            RigidMotion::Free { mass, .. } => format!("free, {}", with_unit(*mass, "kg")),
         };
         let at = place(&rigid.centre[..dimension]);
         let friction = rigid.rule.kinetic_friction;

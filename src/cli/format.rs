@@ -1,9 +1,27 @@
 //! Formatting of numbers, times and sizes.
 
+use fissure::picture::takes_prefix;
+
 /// Values of at least this absolute value are formatted without an SI prefix.
 const TOO_LARGE: f64 = 1e16;
 
-/// Format a value with four digits, an SI prefix and its unit, such as `50.00 µs`.
+/// Format a value with four digits and its unit. The unit has an SI prefix if it takes one, as in `50.00 µs`.
+/// Without a prefix, a value below 0.01 or from 10⁴ has a power of ten, as in `4.219e-10 m^3`.
+pub fn with_unit(value: f64, unit: &str) -> String {
+    let text = if takes_prefix(unit) {
+        si(value, unit)
+    } else if value == 0.0 {
+        format!("0 {unit}")
+    } else if (0.01..1e4).contains(&value.abs()) {
+        format!("{:.4} {unit}", Digits(value))
+    } else {
+        format!("{value:.3e} {unit}")
+    };
+    text.trim_end().to_owned()
+}
+
+/// Format a value with four digits, an SI prefix and its unit, such as `50.00 µs`. The unit must take a
+/// prefix; [`with_unit`] formats values with any unit.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 9] = [
         (1e12, "T"),
@@ -35,8 +53,14 @@ struct Digits(f64);
 
 impl std::fmt::Display for Digits {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let whole = self.0.abs().max(1.0).log10().floor() as usize + 1;
-        let places = formatter.precision().unwrap_or(4).saturating_sub(whole);
+        let further = formatter.precision().unwrap_or(4).saturating_sub(1);
+        // The exponent of the rounded number: 9.9996 is printed as 10.00.
+        let rounded = format!("{:.further$e}", self.0);
+        let exponent = rounded
+            .rsplit_once('e')
+            .map(|(_, exponent)| exponent.parse());
+        let exponent: i32 = exponent.and_then(|exponent| exponent.ok()).unwrap_or(0);
+        let places = (further as i32 - exponent).max(0) as usize;
         write!(formatter, "{:.places$}", self.0)
     }
 }
@@ -99,8 +123,9 @@ mod tests {
         assert_eq!(si(0.0, "J"), "0 J");
         assert_eq!(si(2e15, "Pa"), "2000 TPa");
         assert_eq!(si(-3e18, "Pa"), "-3.000e18 Pa");
-        assert_eq!(si(f64::INFINITY, "kg"), "inf kg");
-        assert_eq!(si(f64::NAN, "kg"), "NaN kg");
+        assert_eq!(si(f64::INFINITY, "J"), "inf J");
+        assert_eq!(si(f64::NAN, "J"), "NaN J");
+        assert_eq!(si(99.9996, "m"), "100.0 m");
         assert_eq!(count(1234567), "1 234 567");
         assert_eq!(count(12), "12");
         assert_eq!(duration(0.25), "250.0 ms");
@@ -108,5 +133,17 @@ mod tests {
         assert_eq!(duration(61.0), "1 min 1 s");
         assert_eq!(duration(1e12), "3.2e4 a");
         assert_eq!(bytes(3.0 * 1024.0 * 1024.0), "3.0 MiB");
+    }
+
+    #[test]
+    fn only_units_that_take_a_prefix_have_one() {
+        assert_eq!(with_unit(-0.02107, ""), "-0.02107");
+        assert_eq!(with_unit(0.1452, ""), "0.1452");
+        assert_eq!(with_unit(2886.0, ""), "2886");
+        assert_eq!(with_unit(0.0, ""), "0");
+        assert_eq!(with_unit(4.219e-10, "m^3"), "4.219e-10 m^3");
+        assert_eq!(with_unit(5e-4, "kg"), "5.000e-4 kg");
+        assert_eq!(with_unit(9.9996, "K"), "10.00 K");
+        assert_eq!(with_unit(4.5e4, "N/m^3"), "45.00 kN/m^3");
     }
 }

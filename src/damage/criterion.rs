@@ -85,8 +85,8 @@ impl StretchConversion {
         let [[ii, ij], [ji, jj]] = self.ratios;
         let critical_i = (i * ii).min(j * ij);
         let critical_j = (i * ji).min(j * jj);
-        let k_i = weights.own() * self.stiffness[0];
-        let k_j = weights.far() * self.stiffness[1];
+        let k_i = weights.at_i() * self.stiffness[0];
+        let k_j = weights.at_j() * self.stiffness[1];
         ((critical_i * critical_i * k_i + critical_j * critical_j * k_j) / (k_i + k_j)).sqrt()
     }
 

@@ -29,6 +29,12 @@ const ID: &str = "id";
 /// Name of the column by which rows are matched.
 const TIME: &str = "time";
 
+/// Beginnings of the names of the columns with components of momentum.
+const MOMENTUM: [&str; 2] = ["momentum_", "largest_fragment_momentum_"];
+
+/// Beginning of the names of the columns with components of angular momentum.
+const ANGULAR_MOMENTUM: &str = "angular_momentum_";
+
 /// Location of the largest difference of a quantity between two results.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
@@ -61,7 +67,8 @@ pub struct Difference {
     /// Largest absolute difference; infinite if the values of a pair differ and at least one of them is not
     /// finite.
     pub largest: f64,
-    /// Largest finite absolute value in the first result.
+    /// Largest finite absolute value in the first result. For momentum and angular momentum, the scale is at
+    /// least a sum over the points without cancellation, if the first result has its terms.
     pub scale: f64,
     /// Number of compared values.
     pub values: u64,
@@ -189,7 +196,11 @@ pub fn compare(
         matching = Some(found);
         progress(number + 1, pairs.pairs.len(), pair.time);
     }
-    compare_histories([&first.history()?, &second.history()?], &mut comparison);
+    let histories = [first.history()?, second.history()?];
+    compare_histories([&histories[0], &histories[1]], &mut comparison);
+    if let Some(momentum) = momentum_scale(&comparison.fields, &times[0], &histories[0]) {
+        raise_momentum_scales(momentum, &mut comparison);
+    }
     Ok(comparison)
 }
 
@@ -530,9 +541,86 @@ fn compare_histories(histories: [&[StoredColumn]; 2], comparison: &mut Compariso
     }
 }
 
+/// Return E/v, a momentum without cancellation, kg m/s. E is the largest kinetic energy of the first result at
+/// the times of its outputs, and v the largest velocity component in these outputs. With the mass m of a
+/// point, E/v is at most Σ m |u̇|. Return `None` if the first result lacks E or v, or if v is 0.
+fn momentum_scale(fields: &[Difference], outputs: &[f64], history: &[StoredColumn]) -> Option<f64> {
+    let column = |name: &str| history.iter().find(|column| column.name == name);
+    let (times, energies) = (column(TIME)?, column("kinetic_energy")?);
+    let rows = Matches::of(outputs, &times.values).pairs;
+    let energies = rows.iter().map(|[_, row]| energies.values[*row]);
+    let energy = energies
+        .filter(|energy| energy.is_finite())
+        .reduce(f64::max)?;
+    let velocity = fields.iter().find(|field| field.name == "velocity")?.scale;
+    let momentum = energy / velocity;
+    momentum.is_finite().then_some(momentum)
+}
+
+/// Raise the scales of momentum columns to at least `momentum`, kg m/s. In a balanced problem, the terms of
+/// the momentum cancel, and its largest value is round-off. For angular momentum, the scale is at least
+/// `momentum` times the largest coordinate.
+fn raise_momentum_scales(momentum: f64, comparison: &mut Comparison) {
+    let positions = comparison.fields.iter();
+    let length = positions
+        .filter(|field| field.name == POSITION)
+        .fold(0.0, |_, field| field.scale);
+    for column in &mut comparison.columns {
+        let begins = |beginning: &str| column.name.starts_with(beginning);
+        if MOMENTUM.into_iter().any(begins) {
+            column.scale = column.scale.max(momentum);
+        } else if begins(ANGULAR_MOMENTUM) {
+            column.scale = column.scale.max(momentum * length);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn momentum_is_relative_to_a_sum_without_cancellation() {
+        let difference = |name: &str, first: f64, second: f64| {
+            let mut difference = Difference::new(name, "", &[]);
+            difference.add(first, second);
+            difference
+        };
+        let column = |name: &str, values: &[f64]| StoredColumn {
+            name: name.to_owned(),
+            unit: String::new(),
+            values: values.to_vec(),
+        };
+        let fields = vec![
+            difference(POSITION, 2.0, 2.0),
+            difference("velocity", -10.0, -10.0),
+        ];
+        // The second row is between two outputs.
+        let history = [
+            column(TIME, &[0.0, 0.5, 1.0]),
+            column("kinetic_energy", &[0.0, 900.0, 30.0]),
+        ];
+        let momentum = momentum_scale(&fields, &[0.0, 1.0], &history);
+        assert_eq!(momentum, Some(3.0));
+        assert_eq!(momentum_scale(&fields[..1], &[0.0, 1.0], &history), None);
+        assert_eq!(momentum_scale(&fields, &[0.0, 1.0], &history[..1]), None);
+        let mut comparison = Comparison {
+            fields,
+            columns: vec![
+                difference("momentum_x", 1e-19, 2e-19),
+                difference("angular_momentum_z", -1e-19, 1e-19),
+                difference("momentum_y", 7.0, 7.0),
+                difference("energy_error", 1e-19, 2e-19),
+            ],
+            ..Comparison::default()
+        };
+        raise_momentum_scales(3.0, &mut comparison);
+        let columns = &comparison.columns;
+        let scales: Vec<f64> = columns.iter().map(|column| column.scale).collect();
+        assert_eq!(scales, [3.0, 6.0, 7.0, 1e-19]);
+        assert!(columns[0].is_within(1e-9) && columns[1].is_within(1e-9));
+        assert!(!columns[3].is_within(1e-9));
+    }
 
     #[test]
     fn ids_are_matched_across_blocks() {

@@ -149,6 +149,35 @@ impl Image {
     }
 }
 
+/// Return the part of a straight line that lies inside a rectangle. Return `None` if no part lies inside, or
+/// if an end of the line is not finite.
+pub fn clipped(
+    from: [f64; 2],
+    to: [f64; 2],
+    columns: [f64; 2],
+    rows: [f64; 2],
+) -> Option<[[f64; 2]; 2]> {
+    if !from.iter().chain(&to).all(|end| end.is_finite()) {
+        return None;
+    }
+    // The part of the line that is inside, as fractions of the line.
+    let mut inside = [0.0_f64, 1.0];
+    for (axis, [low, high]) in [columns, rows].into_iter().enumerate() {
+        let along = to[axis] - from[axis];
+        if along == 0.0 {
+            if !(low..=high).contains(&from[axis]) {
+                return None;
+            }
+            continue;
+        }
+        let crossings = [low, high].map(|edge| (edge - from[axis]) / along);
+        inside[0] = inside[0].max(crossings[0].min(crossings[1]));
+        inside[1] = inside[1].min(crossings[0].max(crossings[1]));
+    }
+    let end = |fraction: f64| [0, 1].map(|axis| from[axis] + fraction * (to[axis] - from[axis]));
+    (inside[0] <= inside[1]).then(|| inside.map(end))
+}
+
 /// Return the pixel rows that a convex polygon covers in a picture of the given height (pixels). For each
 /// row, also return the first column of the polygon and the first column after the polygon.
 /// [`Image::fill_polygon`] defines which pixels belong to a polygon.
@@ -187,6 +216,27 @@ mod tests {
 
     fn red_pixels(image: &Image) -> usize {
         image.rgb.chunks(3).filter(|pixel| **pixel == RED).count()
+    }
+
+    #[test]
+    fn lines_are_clipped_to_a_rectangle() {
+        let clip = |from, to| clipped(from, to, [10.0, 30.0], [0.0, 20.0]);
+        assert_eq!(
+            clip([12.0, 5.0], [28.0, 7.0]),
+            Some([[12.0, 5.0], [28.0, 7.0]])
+        );
+        assert_eq!(
+            clip([20.0, 5.0], [1020.0, 5.0]),
+            Some([[20.0, 5.0], [30.0, 5.0]])
+        );
+        assert_eq!(
+            clip([0.0, -10.0], [40.0, 30.0]),
+            Some([[10.0, 0.0], [30.0, 20.0]])
+        );
+        assert_eq!(clip([0.0, 5.0], [9.0, 5.0]), None);
+        assert_eq!(clip([20.0, 21.0], [25.0, 21.0]), None);
+        assert_eq!(clip([5.0, 15.0], [20.0, 45.0]), None);
+        assert_eq!(clip([20.0, 5.0], [f64::NAN, 5.0]), None);
     }
 
     #[test]

@@ -48,11 +48,12 @@ pub use arrows::Vectors;
 pub use canvas::Image;
 pub use colours::{ColourMap, is_damage};
 pub use projection::{Bounds, Camera};
+pub use scale::takes_prefix;
 pub use scene::{Axis, Scene, View, is_in_slice};
 
 use crate::error::Result;
 use axes::{Pen, Ruler};
-use canvas::{Colour, INK, PALE_INK};
+use canvas::{Colour, INK, PALE_INK, clipped};
 use layout::Layout;
 use lettering::{Lettering, Running};
 use projection::Projection;
@@ -133,15 +134,18 @@ pub fn render(scene: &Scene) -> Result<Image> {
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
-/// Draw the lines of a scene over its points. The number of a line selects its colour.
+/// Draw the lines of a scene over its points, as far as they lie inside the frame. The number of a line selects
+/// its colour.
 fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
     let thickness = 2.0 * pen.thickness();
     for (number, line) in scene.lines {
         let colour = LINE_COLOURS[number % LINE_COLOURS.len()];
         for ends in line.windows(2) {
             let pixel = |place: [f64; 3]| layout.pixel(projection.project(place));
-            pen.image
-                .line(pixel(ends[0]), pixel(ends[1]), thickness, colour);
+            let (from, to) = (pixel(ends[0]), pixel(ends[1]));
+            if let Some([from, to]) = clipped(from, to, layout.columns, layout.rows) {
+                pen.image.line(from, to, thickness, colour);
+            }
         }
     }
 }

@@ -142,32 +142,35 @@ const PREFIXES: [(i32, &str); 10] = [
 /// Unit symbols that take a prefix. Other symbols have a prefix already (kg, MPa) or take none (°C, %).
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
+/// Largest absolute value of the exponent that [`prefixed`] returns. Its power of ten, and the inverse of this
+/// power, are normal numbers.
+const LARGEST_EXPONENT: i32 = 306;
+
 /// Choose a power of ten for numbers up to `magnitude`. Return its exponent, and the unit with this power.
-/// The power becomes a prefix, as in "MPa". If the unit takes no prefix, the power becomes a factor, as in
-/// "×10⁻³ m²". A unit that takes no prefix stays as it is if `magnitude` is from 0.01 to 10⁴.
+/// The power becomes a prefix, as in "MPa". If the unit takes no prefix, or if there is no such prefix in
+/// [`PREFIXES`], the power becomes a factor, as in "×10⁻³ m²" or "×10¹⁸ Pa". A unit that takes no prefix
+/// stays as it is if `magnitude` is from 0.01 to 10⁴.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     let size = magnitude.abs();
     if !(size.is_finite() && size > 0.0) {
         return (0, unit.to_owned());
     }
     let exponent = 3 * ((size.log10() + 1e-9) / 3.0).floor() as i32;
-    if takes_prefix(unit) {
-        let exponent = exponent.clamp(-15, 12);
-        let prefix = PREFIXES
-            .iter()
-            .find(|(power, _)| *power == exponent)
-            .map_or("", |(_, prefix)| prefix);
-        (exponent, format!("{prefix}{unit}"))
-    } else if (0.01..1e4).contains(&size) {
-        (0, unit.to_owned())
-    } else {
-        let factor = format!("×10{} {unit}", superscript(exponent));
-        (exponent, factor.trim_end().to_owned())
+    let exponent = exponent.clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
+    let prefix = PREFIXES.iter().find(|(power, _)| *power == exponent);
+    let is_prefixable = takes_prefix(unit);
+    match prefix {
+        Some((_, prefix)) if is_prefixable => (exponent, format!("{prefix}{unit}")),
+        _ if !is_prefixable && (0.01..1e4).contains(&size) => (0, unit.to_owned()),
+        _ => {
+            let factor = format!("×10{} {unit}", superscript(exponent));
+            (exponent, factor.trim_end().to_owned())
+        }
     }
 }
 
 /// Test whether a prefix scales the whole unit: true for "m/s", false for "m²", because 1 mm² is 10⁻⁶ m².
-fn takes_prefix(unit: &str) -> bool {
+pub fn takes_prefix(unit: &str) -> bool {
     let end = unit
         .find(|character: char| !character.is_ascii_alphabetic())
         .unwrap_or(unit.len());
@@ -231,6 +234,9 @@ mod tests {
         assert_eq!(numbers, ["0.0", "0.2", "0.4", "0.6"]);
         assert_eq!(unit, "");
         assert_eq!(labels(0.0, 2.5e9, "Pa", 3).1, "GPa");
+        let (numbers, unit) = labels(-1e300, 1e300, "Pa", 3);
+        assert_eq!(numbers, ["−1", "0", "1"]);
+        assert_eq!(unit, "×10³⁰⁰ Pa");
     }
 
     #[test]
@@ -268,7 +274,11 @@ mod tests {
         assert_eq!(prefixed("", 5.0e-3), (-3, "×10⁻³".to_owned()));
         assert_eq!(prefixed("MPa", 50.0), (0, "MPa".to_owned()));
         assert_eq!(prefixed("m", 0.0), (0, "m".to_owned()));
-        assert_eq!(prefixed("m", 1e-30), (-15, "fm".to_owned()));
+        assert_eq!(prefixed("m", 2e-15), (-15, "fm".to_owned()));
+        assert_eq!(prefixed("Pa", 5e14), (12, "TPa".to_owned()));
+        assert_eq!(prefixed("m", 1e-30), (-30, "×10⁻³⁰ m".to_owned()));
+        assert_eq!(prefixed("N/m³", 5e17), (15, "×10¹⁵ N/m³".to_owned()));
+        assert_eq!(prefixed("Pa", 2e-310), (-306, "×10⁻³⁰⁶ Pa".to_owned()));
     }
 
     #[test]

@@ -153,9 +153,9 @@ impl Scene<'_> {
         match self.effective_view() {
             View::Plane if self.dimension == 3 => sort_by_key(&|mark| mark.position[2]),
             // Where cells overlap or share a pixel, damage must stay visible, so paint points with more
-            // damage later.
+            // damage later. A difference of damage can be negative.
             View::Plane if is_damage(self.field) => {
-                sort_by_key(&|mark| mark.value.max(0.0));
+                sort_by_key(&|mark| mark.value.abs().max(0.0));
             }
             View::Plane => {}
             // Paint the points nearest to the plane of the slice last.
@@ -413,6 +413,21 @@ mod tests {
         };
         let scene = scene(&positions, &[1.0, 2.0, 3.0], view);
         assert_eq!(scene.marks().unwrap().values(), [3.0, 1.0]);
+    }
+
+    #[test]
+    fn points_with_more_damage_are_painted_later() {
+        let order = |values: &[f64]| {
+            let scene = Scene {
+                dimension: 2,
+                field: "difference of damage",
+                ..scene(&[[0.0; 3]; 3], values, View::Plane)
+            };
+            scene.marks().unwrap().values()
+        };
+        assert_eq!(order(&[0.4, 0.1, 0.3]), [0.1, 0.3, 0.4]);
+        assert_eq!(order(&[-0.4, 0.1, 0.3]), [0.1, 0.3, -0.4]);
+        assert_eq!(order(&[0.4, f64::NAN, 0.0]), [0.0, 0.4]);
     }
 
     #[test]

@@ -338,6 +338,15 @@ fn the_difference_of_two_results_is_drawn() {
     let picture = slow.join("velocity_y_difference.png");
     let is_end = |[red, green, blue]: [u8; 3]| red.abs_diff(blue) > 120 && green < 100;
     assert!(fraction(&picture, is_end) < 0.02);
+    // The same holds for damage, whose range starts at 0 in other pictures.
+    let block = Drawings::new(&folder, "block", BLOCK);
+    let path = block.result.to_str().unwrap();
+    for times in [&[][..], &["--time", "0,last"]] {
+        let output = ["--minus", path, "-o", block.picture.to_str().unwrap()];
+        let output = command("plot", &[&block.result], &[&output[..], times].concat());
+        expect(&output, 0, &["difference of damage"]);
+        assert!(fraction(&block.picture, is_end) < 0.02, "{times:?}");
+    }
     for (subtrahend, options, words) in [
         (&other, &[][..], "has no output at t = 2e-6 s"),
         (&coarse, &[], "has other points at t = 2e-6 s"),
@@ -378,6 +387,21 @@ fn colour_maps_and_logarithmic_scales() {
     );
     let block = Drawings::new(&folder, "block", BLOCK);
     block.reject(&["--log"], "--log: no drawn value of damage is above 0");
+}
+
+#[test]
+fn lines_end_at_the_frame() {
+    let folder = Folder::new("lines");
+    let plate = Drawings::new(&folder, "plate", PLATE);
+    let path = folder.write("path.csv", "x,y\n0.01,0.003\n0.5,0.007\n");
+    let without = pixels(plate.draw(&[]));
+    let with = pixels(plate.draw(&["--path", path.to_str().unwrap()]));
+    assert_ne!(with, without);
+    // The frame ends before the last eighth of the columns, which contains the colour bar.
+    let (width, _, _) = png(&plate.picture);
+    let is_beside = |pixel: usize| pixel as u32 % width >= 7 * width / 8;
+    let mut beside = (0..with.len()).filter(|pixel| is_beside(*pixel));
+    assert!(beside.all(|pixel| with[pixel] == without[pixel]));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use fissure::error::{Error, Result};
 use fissure::picture::Bounds;
 
 use super::choice::number;
-use crate::cli::format::si;
+use crate::cli::format::with_unit;
 
 /// Percentiles at the ends of the automatic range of colours if there are outliers.
 const PERCENTILES: [f64; 2] = [0.5, 99.5];
@@ -171,13 +171,8 @@ impl Limits {
             Cut::Percentiles([low, high]) => format!("from percentile {low} to {high}"),
             Cut::Decades => format!("over {DECADES} decades"),
         };
-        let ends = self.all.map(|value| si(value, unit));
-        format!(
-            "colours {colours}; values from {} to {}",
-            ends[0].trim(),
-            ends[1].trim()
-        )
-        .replace('-', "−")
+        let [low, high] = self.all.map(|value| with_unit(value, unit));
+        format!("colours {colours}; values from {low} to {high}").replace('-', "−")
     }
 }
 
@@ -235,6 +230,8 @@ mod tests {
         assert_eq!((limits.shown, limits.all), ([6.0, 995.0], [0.0, 1e9]));
         let note = limits.note("Pa");
         assert!(note.ends_with("values from 0 Pa to 1.000 GPa"), "{note}");
+        let note = limits.note("m^3");
+        assert!(note.ends_with("values from 0 m^3 to 1.000e9 m^3"), "{note}");
         let limits = Limits::of(values.clone(), Range::All).unwrap();
         assert_eq!((limits.shown, limits.note("Pa").as_str()), ([0.0, 1e9], ""));
         let limits = Limits::of(values, Range::Percentiles([0.0, 50.0])).unwrap();

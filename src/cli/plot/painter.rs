@@ -454,7 +454,8 @@ impl<'a> Painter<'a> {
                     let [low, high] = limits.shown;
                     let from_zero = self.starts_at_zero() && !self.arguments.log;
                     let low = if from_zero { low.min(0.0) } else { low };
-                    (low < high).then_some((low, high))
+                    let zero_difference = self.minus.is_some().then_some((-1.0, 1.0));
+                    (low < high).then_some((low, high)).or(zero_difference)
                 }
                 _ => None,
             },
