@@ -169,6 +169,8 @@ class Results(unittest.TestCase):
         with self.assertRaisesRegex(fissure.RunError, "sped"):
             fissure.run(self.deck, output=out, overwrite=True, sped=1)
         fissure.run(self.deck, output=out, overwrite=True, dx=2e-3).close()
+        with self.assertRaisesRegex(ValueError, "`overwrite` and `restart` exclude each other"):
+            fissure.run(self.deck, output=out, overwrite=True, restart=True)
 
     def test_overlays_replace_keys(self):
         slow, short = self.folder / "slow.toml", self.folder / "short.toml"

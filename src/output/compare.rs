@@ -541,8 +541,8 @@ fn compare_histories(histories: [&[StoredColumn]; 2], comparison: &mut Compariso
     }
 }
 
-/// Return E/v, a momentum without cancellation, kg m/s. E is the largest kinetic energy of the first result at
-/// the times of its outputs, and v the largest velocity component in these outputs. With the mass m of a
+/// Return E/v, a momentum without cancellation, kg m/s. E is the largest kinetic energy of the first result
+/// at the times of its outputs, and v the largest velocity component in these outputs. With the mass m of a
 /// point, E/v is at most Σ m |u̇|. Return `None` if the first result lacks E or v, or if v is 0.
 fn momentum_scale(fields: &[Difference], outputs: &[f64], history: &[StoredColumn]) -> Option<f64> {
     let column = |name: &str| history.iter().find(|column| column.name == name);

@@ -8,6 +8,7 @@
 //!     positions: &[[0.0, 0.0, 0.0], [0.001, 0.0, 0.0]],
 //!     sizes: &[0.001, 0.001],
 //!     scattered: &[],
+//!     has_gaps: false,
 //!     values: &[0.0, 0.4],
 //!     field: "damage",
 //!     unit: "",
@@ -97,7 +98,14 @@ pub fn render(scene: &Scene) -> Result<Image> {
             let are_cells = move |mark: &Mark| (are_flat && mark.scattered) == scattered;
             marks.iter().filter(are_cells)
         });
-        points::paint(pen.image, others, colouring, &layout, projection);
+        points::paint(
+            pen.image,
+            others,
+            colouring,
+            &layout,
+            projection,
+            scene.has_gaps,
+        );
         cells::paint(
             pen.image,
             scattered,
@@ -134,8 +142,8 @@ pub fn render(scene: &Scene) -> Result<Image> {
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
-/// Draw the lines of a scene over its points, as far as they lie inside the frame. The number of a line selects
-/// its colour.
+/// Draw the lines of a scene over its points, as far as they lie inside the frame. The number of a line
+/// selects its colour.
 fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
     let thickness = 2.0 * pen.thickness();
     for (number, line) in scene.lines {

@@ -142,8 +142,8 @@ const PREFIXES: [(i32, &str); 10] = [
 /// Unit symbols that take a prefix. Other symbols have a prefix already (kg, MPa) or take none (°C, %).
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
-/// Largest absolute value of the exponent that [`prefixed`] returns. Its power of ten, and the inverse of this
-/// power, are normal numbers.
+/// Largest absolute value of the exponent that [`prefixed`] returns. Its power of ten, and the inverse of
+/// this power, are normal numbers.
 const LARGEST_EXPONENT: i32 = 306;
 
 /// Choose a power of ten for numbers up to `magnitude`. Return its exponent, and the unit with this power.

@@ -145,9 +145,14 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
         (["--component", "von_misses"], "did you mean `von_mises`?"),
         (["--range", "5%,4%"], "LOW must be below HIGH"),
         (["--x", "time"], "--x is for curves"),
+        (
+            ["--deform", "5"],
+            "result.vtkhdf has no field `displacement`; add it to `fields`",
+        ),
     ] {
         expect(&plot(&options), 2, &[words]);
     }
+    expect(&plot(&["--deform", "0"]), 0, &[]);
     let block = run(&folder, "block", BLOCK, &[]);
     let plot = |options: &[&str]| command("plot", &[&block], options);
     expect(&plot(&["--deform", "-1"]), 0, &["damage at t = "]);
@@ -639,6 +644,11 @@ fn curves_of_histories() {
     let nothing = folder.write("nothing.csv", "");
     let empty = folder.write("empty.csv", "time [s],a\n0,NaN\n1,inf\n");
     let broken = folder.write("broken.csv", "time [s],a\n0,1\n1\n");
+    let part = PLATE.replace(
+        "every_steps = 50,",
+        "every_steps = 50, part = { every_steps = 50 },",
+    );
+    let part = run(&folder, "part", &part, &[]).join("result_part.vtkhdf");
     for (result, options, words) in [
         (
             &history,
@@ -646,6 +656,11 @@ fn curves_of_histories() {
             "no column `kinetic`; did you mean `kinetic_energy`?",
         ),
         (&history, &["--y", "step", "--x", "t"], "--x t: "),
+        (
+            &part,
+            &["--y", "step"],
+            "result_part.vtkhdf: this result has no history; curves need `result.vtkhdf`",
+        ),
         (
             &history,
             &[],

@@ -45,8 +45,11 @@ def run(
     binary      the program [$FISSURE, or fissure on the path]
     parameters  other values of the deck's parameters: numbers or expressions
 
+    Raises ValueError if both `overwrite` and `restart` are true.
     Raises RunError if the run fails or is stopped; its `code` is 75 if the run can be restarted with `restart=True`.
     """
+    if overwrite and restart:
+        raise ValueError("`overwrite` and `restart` exclude each other: a restart continues the existing result")
     deck = pathlib.Path(deck)
     folder = pathlib.Path(output) if output is not None else pathlib.Path("out") / deck.stem
     command = [os.fspath(binary or os.environ.get("FISSURE") or "fissure"), "run", os.fspath(deck), "--quiet"]
@@ -55,7 +58,7 @@ def run(
         command += ["--threads", str(threads)]
     if restart:
         command.append("--restart")
-    elif overwrite:
+    if overwrite:
         command.append("--overwrite")
     for overlay in [overlays] if isinstance(overlays, (str, os.PathLike)) else overlays:
         command += ["--with", os.fspath(overlay)]

@@ -145,6 +145,9 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
 
 impl Table {
     /// Read a CSV file, the history of a result file, or `history.csv` in a folder.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or if it is a result without a history.
     fn read(path: &Path) -> Result<Self> {
         let path = if path.is_dir() {
             path.join("history.csv")
@@ -154,7 +157,15 @@ impl Table {
         let (columns, ignored_line) = if is_csv(&path) {
             read_csv(&path)?
         } else {
-            (ResultReader::open(&path)?.history()?, None)
+            let columns = ResultReader::open(&path)?.history()?;
+            if columns.is_empty() {
+                return Err(Error::input(format!(
+                    "{}: this result has no history; curves need `result.vtkhdf`, the main result of a run, or \
+                     `history.csv`",
+                    path.display()
+                )));
+            }
+            (columns, None)
         };
         let columns = columns.into_iter().map(|column| StoredColumn {
             unit: if column.unit == "1" {

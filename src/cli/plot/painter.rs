@@ -34,6 +34,8 @@ pub struct Painter<'a> {
     /// Result that is subtracted from the drawn result.
     pub(super) minus: Option<Subtrahend>,
     has_displacement: bool,
+    /// Whether the result has refinement levels.
+    is_refined: bool,
     pub(super) out_of_plane_measure: f64,
     range: Range,
     colours: Option<ColourMap>,
@@ -151,6 +153,7 @@ impl<'a> Painter<'a> {
             quantity,
             minus,
             has_displacement: fields.iter().any(|field| field.name == "displacement"),
+            is_refined: fields.iter().any(|field| field.name == "level"),
             out_of_plane_measure,
             range,
             clips: clips.collect::<Result<_>>()?,
@@ -176,7 +179,17 @@ impl<'a> Painter<'a> {
                 painter.is_displaced = factor.is_some();
                 factor.unwrap_or(1.0)
             }
-            text => number(text, "--deform must be `auto` or a number")?,
+            text => {
+                let factor = number(text, "--deform must be `auto` or a number")?;
+                if factor != 0.0 && !painter.has_displacement {
+                    return Err(Error::input(format!(
+                        "--deform {text}: {} has no field `displacement`; add it to `fields` of the output, or \
+                         leave the option out",
+                        path.display()
+                    )));
+                }
+                factor
+            }
         };
         Ok(painter)
     }
@@ -287,6 +300,13 @@ impl<'a> Painter<'a> {
         Ok(Some(quantity.of(values)))
     }
 
+    /// Test whether there can be gaps between the drawn cells: true for a deformed body, for scattered points
+    /// and for a refined grid.
+    fn has_gaps(&self) -> bool {
+        let is_deformed = self.has_displacement && self.factor != 0.0;
+        is_deformed || self.is_refined || self.scattered.contains(&true)
+    }
+
     /// Read the points of an output, in chunks of consecutive points to limit the memory. Keep only the
     /// points in the slice, in the half spaces and in the range of the threshold.
     pub(super) fn points(&self, index: usize) -> Result<Points> {
@@ -354,6 +374,7 @@ impl<'a> Painter<'a> {
             positions: &points.positions,
             sizes: &points.sizes,
             scattered: &points.scattered,
+            has_gaps: self.has_gaps(),
             values: &points.values,
             field: &self.quantity.label,
             unit: &self.quantity.unit,
